@@ -1,0 +1,32 @@
+"""Files appear whole or not at all: write beside the target, then rename."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from twin.errors import TwinError
+
+
+@contextmanager
+def atomic_path(target: Path) -> Iterator[Path]:
+    """Yield a temporary path in the target's folder; rename it to `target` on success, remove it on any failure.
+
+    Raises TwinError if the disk is full or the folder cannot be written.
+    """
+    target = Path(target)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        with open(temporary, "rb") as f:  # the rename must not overtake the data
+            os.fsync(f.fileno())
+        os.replace(temporary, target)
+    except OSError as e:
+        raise TwinError(
+            f"cannot write: {e.strerror or e}", str(target), "free disk space or choose another folder with -o"
+        ) from e
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,1 @@
+"""Offline: full model, reduction, certificate."""

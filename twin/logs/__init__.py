@@ -1,0 +1,1 @@
+"""Run folders: measured and simulated data in one shape."""

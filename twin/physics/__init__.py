@@ -1,0 +1,1 @@
+"""Cited pure functions: losses and film coefficients, one explicit table LAWS."""

@@ -1,0 +1,19 @@
+"""Film coefficients of convection [W/(m^2 K)]."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+
+
+def constant_film(natural):
+    """Natural convection as a literature value. Source: paper 000 eq (7), natural part."""
+    return jnp.asarray(natural)
+
+
+def forced_film(speed, natural, forced, exponent):
+    """alpha = alpha_natural + alpha_forced |v|^m with v in m/s. Source: paper 000 eq (7).
+
+    The forced part of moving components is a free parameter in paper 000; m = 0.8 as for a turbulent plate
+    (Nu ~ Re^0.8, VDI-Waermeatlas).
+    """
+    return natural + forced * jnp.abs(speed) ** exponent

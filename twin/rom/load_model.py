@@ -1,0 +1,134 @@
+"""What turns a load log into heat, film coefficients and contact positions: names, laws, parameters, wiring.
+
+It travels inside the artefact as JSON, so the runtime needs no machine description.
+All values SI, temperatures degC (differences K).
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A logged load channel."""
+
+    name: str  # "x_current"
+    column: str  # header in loads.csv without the unit
+    unit: str  # unit after conversion: SI ("m", "m/s", "A", "degC", "1/s", "1")
+    kind: str  # "value", "rms" or "peak" (peak is converted to rms on reading)
+    low: float  # certified range
+    high: float
+
+
+@dataclass(frozen=True)
+class AxisWiring:
+    """A linear axis: which signal is its position and what it carries."""
+
+    name: str
+    direction: tuple[float, float, float]
+    low: float  # m, stroke
+    high: float
+    position: str  # signal name
+
+
+@dataclass(frozen=True)
+class LawUse:
+    """A law of `twin.physics.laws.LAWS` with its parameters and the signals it reads."""
+
+    law: str
+    parameters: dict[str, float]
+    signals: dict[str, str]  # argument of the law -> signal name
+
+
+@dataclass(frozen=True)
+class Source:
+    """Heat into a surface, or into a moving contact (shared by rail segments, by dwell time, and pads)."""
+
+    name: str
+    use: LawUse
+    gain: float  # calibration factor, 1 by default
+    contact: str  # "" for a surface source, else a contact name
+    rail_share: float  # part of a contact source that goes into the rail or screw
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film coefficient [W/(m^2 K)] of a group of surfaces against an environment."""
+
+    name: str
+    use: LawUse
+    environment: int
+    low: float  # W/(m^2 K), certified range
+    high: float
+
+
+@dataclass(frozen=True)
+class Joint:
+    """The conductance [W/(m^2 K)] of a fixed contact inside a body: a constant parameter, an affine term."""
+
+    name: str
+    conductance: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Rail:
+    """A rail or screw: ports along an axis. `stations` are the centroids of its segments at axis position zero."""
+
+    name: str
+    first_port: int
+    stations: tuple[float, ...]  # m, increasing, along the axis direction
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A pad (carriage or nut) on a rail."""
+
+    contact: str  # "x_guide"
+    axis: int
+    rail: int
+    pad_port: int
+    station: float  # m: coordinate of the pad along the axis at axis position zero
+    rail_moves: bool  # True where the rail is on the carried body: the pad then sits at station - position
+    area: float  # m^2 of the pad
+    conductance: float  # W/(m^2 K)
+
+
+@dataclass(frozen=True)
+class LoadModel:
+    signals: tuple[Signal, ...]
+    axes: tuple[AxisWiring, ...]
+    environments: tuple[tuple[str, str, float], ...]  # (name, signal name or "", constant degC where no signal)
+    sources: tuple[Source, ...]
+    films: tuple[Film, ...]
+    joints: tuple[Joint, ...]
+    ports: tuple[str, ...]
+    rails: tuple[Rail, ...]
+    pairs: tuple[Pair, ...]
+
+    @property
+    def theta_names(self) -> tuple[str, ...]:
+        """Coefficients of the affine terms: films first, then joints."""
+        return tuple(f"films.{f.name}" for f in self.films) + tuple(f"contacts.{j.name}.conductance" for j in self.joints)
+
+    def to_json(self) -> dict:
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, d: dict) -> LoadModel:
+        def use(u: dict) -> LawUse:
+            return LawUse(u["law"], dict(u["parameters"]), dict(u["signals"]))
+
+        return cls(
+            signals=tuple(Signal(**s) for s in d["signals"]),
+            axes=tuple(AxisWiring(**{**a, "direction": tuple(a["direction"])}) for a in d["axes"]),
+            environments=tuple((n, s, float(v)) for n, s, v in d["environments"]),
+            sources=tuple(Source(**{**s, "use": use(s["use"])}) for s in d["sources"]),
+            films=tuple(Film(**{**f, "use": use(f["use"])}) for f in d["films"]),
+            joints=tuple(Joint(**j) for j in d["joints"]),
+            ports=tuple(d["ports"]),
+            rails=tuple(Rail(**{**r, "stations": tuple(r["stations"])}) for r in d["rails"]),
+            pairs=tuple(Pair(**p) for p in d["pairs"]),
+        )

@@ -1,0 +1,69 @@
+"""The affine state space of a body and of a machine, full or reduced.
+
+A *body* is the set of parts joined by fixed contacts: it moves as one. Bodies meet at moving contacts only.
+For every body (field temperatures relative to T_ref, x in K or in modal coordinates):
+
+    E x' = -(A0 + sum_k theta_k A_k) x + sum_k theta_k M_k (T_amb,k - T_ref) + B q + P q_port
+    T_port = P^T x          (area average of a port; P also distributes port heat: sum over nodes 1)
+    T_sensor = C x
+    w(pose) = G[pose] x     (this body's share of the TCP displacement, m)
+
+Moving contacts couple port temperatures: q_port = -Gamma(t) T_port with a symmetric positive semidefinite Gamma
+(`twin.rom.contact`). E, A0, A_k are symmetric positive semidefinite for the full model and every Galerkin projection
+of it, so the model is stable for all theta >= 0, all conductances >= 0 and all positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from twin.rom.load_model import LoadModel
+
+Matrix = Any  # numpy array or scipy.sparse.csr_array; `rom` itself never needs to know which
+
+
+@dataclass(frozen=True)
+class AffineBody:
+    """One body; n states. Sparse (full model) or dense (reduced) matrices."""
+
+    name: str
+    E: Matrix  # (n, n) J/K capacity
+    A0: Matrix  # (n, n) W/K conduction
+    A: tuple[Matrix, ...]  # (n, n) each: film terms per W/(m^2 K) [m^2], joint terms likewise
+    theta: tuple[int, ...]  # index of each term's coefficient in LoadModel.theta_names
+    M: np.ndarray  # (n, len(theta)) m^2: A_k @ 1 of film terms; zero columns for joints
+    B: np.ndarray  # (n, len(sources)) distribution of 1 W of each source
+    sources: tuple[int, ...]  # index of each column in LoadModel.sources
+    P: np.ndarray  # (n, n_ports of this body) 1: port averages
+    ports: tuple[int, ...]  # index of each column in LoadModel.ports
+    C: np.ndarray  # (len(sensors), n) 1
+    sensors: tuple[int, ...]  # index of each row in MachineModel.sensors
+    G: np.ndarray  # (n_poses, 3, n) m/K
+    one: np.ndarray  # (n,) coordinates of the field that is 1 K everywhere
+    energy: np.ndarray  # (n,) J/K: energy @ x is the heat stored relative to T_ref (= E one)
+
+    @property
+    def n(self) -> int:
+        return self.one.shape[0]
+
+
+@dataclass(frozen=True)
+class MachineModel:
+    """All bodies of a machine with what drives and couples them."""
+
+    name: str
+    bodies: tuple[AffineBody, ...]
+    load_model: LoadModel
+    reference_temperature: float  # degC
+    sensors: tuple[str, ...]  # structural sensors (degC), in output order
+    ambient_sensors: tuple[tuple[str, int], ...]  # sensors in air: (name, index in LoadModel.environments)
+    pose_axes: tuple[str, ...]  # axis names of the grid, e.g. ("x", "y", "z")
+    pose_grid: tuple[np.ndarray, ...]  # per axis the grid positions [m]
+    poses: np.ndarray  # (n_poses, n_axes) m, C order over pose_grid
+
+    @property
+    def n(self) -> int:
+        return sum(b.n for b in self.bodies)

@@ -1,0 +1,1 @@
+"""Edge: loads in, temperatures and TCP error out."""
