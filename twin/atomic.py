@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,3 +31,29 @@ def atomic_path(target: Path) -> Iterator[Path]:
         ) from e
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(target: Path) -> Iterator[Path]:
+    """The same for a folder: yield a new temporary folder, rename it to `target` on success, an older one removed.
+
+    Raises TwinError if the disk is full or the folder cannot be written.
+    """
+    target = Path(target)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    old = target.with_name(f".{target.name}.{os.getpid()}.old")
+    try:
+        temporary.mkdir(parents=True)
+        yield temporary
+        if target.exists():
+            os.replace(target, old)
+        os.replace(temporary, target)
+    except OSError as e:
+        if old.exists() and not target.exists():
+            os.replace(old, target)
+        raise TwinError(
+            f"cannot write: {e.strerror or e}", str(target), "free disk space or choose another folder with -o"
+        ) from e
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)

@@ -15,9 +15,12 @@ class Problem:
     what: str  # "unknown material 'stel'"
     where: str  # "machine.toml: parts.bed.material (line 12)"
     remedy: str  # "did you mean 'steel'? materials are: cast_iron, steel"
+    warning: bool = False  # worth a look, but results can be had; `twin check` prints it and still exits with 0
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.what}\n    remedy: {self.remedy}"
+        kind = "warning: " if self.warning else ""
+        where = f"{self.where}: " if self.where else ""
+        return f"{kind}{where}{self.what}" + (f"\n    remedy: {self.remedy}" if self.remedy else "")
 
 
 class TwinError(Exception):

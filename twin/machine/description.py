@@ -7,41 +7,54 @@ All part meshes are in machine coordinates [m] with every axis at position zero.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import core_schema
 
 from twin.units import to_si
 
-
-def _quantity(unit: str) -> BeforeValidator:
-    """Convert '120 mm' (or a bare SI number) to SI and check the dimension against `unit`."""
-    return BeforeValidator(lambda v: to_si(v, unit))
+BOX_SURFACES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
 
-Length = Annotated[float, _quantity("m")]
-Temperature = Annotated[float, _quantity("degC")]  # a point on the scale, degC
-Conductivity = Annotated[float, _quantity("W/(m*K)")]
-Density = Annotated[float, _quantity("kg/m^3")]
-HeatCapacity = Annotated[float, _quantity("J/(kg*K)")]
-Pressure = Annotated[float, _quantity("Pa")]
-Expansion = Annotated[float, _quantity("1/K")]
-FilmCoefficient = Annotated[float, _quantity("W/(m^2*K)")]
-Stiffness = Annotated[float, _quantity("N/m")]
+@dataclass(frozen=True)
+class _Quantity:
+    """Turn '120 mm' (or a bare SI number) into SI and check the dimension; editors learn that both may be written."""
+
+    unit: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:  # noqa: ANN401
+        return core_schema.no_info_before_validator_function(lambda v: to_si(v, self.unit), handler(source))
+
+    def __get_pydantic_json_schema__(self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"type": ["number", "string"], "description": f"SI number or a string with a unit of {self.unit}"}
+
+
+Length = Annotated[float, _Quantity("m")]
+Temperature = Annotated[float, _Quantity("degC")]  # a point on the scale, degC
+TemperatureDifference = Annotated[float, _Quantity("K")]
+Conductivity = Annotated[float, _Quantity("W/(m*K)")]
+Density = Annotated[float, _Quantity("kg/m^3")]
+HeatCapacity = Annotated[float, _Quantity("J/(kg*K)")]
+Pressure = Annotated[float, _Quantity("Pa")]
+Expansion = Annotated[float, _Quantity("1/K")]
+FilmCoefficient = Annotated[float, _Quantity("W/(m^2*K)")]
+Stiffness = Annotated[float, _Quantity("N/m")]
 Vector = tuple[float, float, float]
 Point = tuple[Length, Length, Length]
 
 
 class Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Material(Entry):
-    conductivity: Conductivity
-    density: Density
-    heat_capacity: HeatCapacity
-    youngs_modulus: Pressure
+    conductivity: Conductivity = Field(gt=0)
+    density: Density = Field(gt=0)
+    heat_capacity: HeatCapacity = Field(gt=0)
+    youngs_modulus: Pressure = Field(gt=0)
     poisson_ratio: float = Field(gt=-1, lt=0.5)
     expansion: Expansion
 
@@ -73,9 +86,9 @@ class Axis(Entry):
 class StiffnessOfPair(Entry):
     """Per pair, along: the axis, the pad's surface normal, and normal x axis. Zero means free."""
 
-    axial: Stiffness = 0.0
-    normal: Stiffness = 0.0
-    lateral: Stiffness = 0.0
+    axial: Stiffness = Field(0.0, ge=0)
+    normal: Stiffness = Field(0.0, ge=0)
+    lateral: Stiffness = Field(0.0, ge=0)
 
 
 class Contact(Entry):
@@ -85,7 +98,7 @@ class Contact(Entry):
     surfaces: tuple[str, str] | None = None  # fixed: "part.surface" twice
     axis: str | None = None  # moving
     pairs: tuple[tuple[str, str], ...] = ()  # moving: (rail "part.surface", pad "part.surface")
-    segments: int = 12  # moving: stations along each rail
+    segments: int = Field(12, ge=2)  # moving: stations along each rail
     conductance: FilmCoefficient = Field(gt=0)  # of the joint, or per pad area
     stiffness: StiffnessOfPair = StiffnessOfPair()  # moving; fixed joints are glued
 
@@ -148,14 +161,15 @@ class Support(Entry):
 class Limits(Entry):
     """Above these `twin verify` fails."""
 
-    temperature: Annotated[float, _quantity("delta_degC")] = 0.02
-    displacement: Length = 0.2e-6
+    temperature: TemperatureDifference = Field(0.02, gt=0)
+    displacement: Length = Field(0.2e-6, gt=0)
 
 
 class MachineEntry(Entry):
     name: str
     description: str = ""
     reference_temperature: Temperature = 20.0
+    vertical: Literal["x", "y", "z"] = "z"  # the machine coordinate that points up; pictures are drawn so
 
 
 class Machine(Entry):

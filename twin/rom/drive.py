@@ -1,14 +1,23 @@
 """A load log turned into what the thermal model is driven by, step by step.
 
 Losses and films are evaluated at every load sample and then averaged over each step: powers are averaged, never
-currents or speeds before a nonlinear law (paper 001, erratum E-001-4: 20 % duty at 10 A is a factor 5).
+currents or speeds before a nonlinear law (paper 001, erratum E-001-4: 20 % duty at 10 A is a factor 5). Scalar loads
+hold until the next sample, positions run linearly to it; all means are exact for that reading of the log, whatever
+the step, so energy is neither lost nor gained.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+
+from twin.errors import LogError
+from twin.rom.contact import dwell
+from twin.rom.law_values import law_values
+from twin.rom.load_model import LoadModel, Pair
+from twin.rom.sampling import Intervals, cut, path_points
 
 
 @dataclass(frozen=True)
@@ -16,7 +25,8 @@ class Drive:
     """Per step of length dt (n steps); everything the same for the full model, the reduced model and calibration."""
 
     time: np.ndarray  # (n + 1,) s, step edges
-    power: np.ndarray  # (n, n_sources) W, gains included
+    power: np.ndarray  # (n, n_sources) W, gains included; sources of surfaces and of contacts alike
+    port_heat: np.ndarray  # (n, n_ports) W that contact sources bring into each port, following the moving pads
     theta: np.ndarray  # (n, n_theta) W/(m^2 K): films, then joints
     environment: np.ndarray  # (n, n_environments) degC
     conductance: np.ndarray  # (n, n_pairs) W/K
@@ -24,9 +34,178 @@ class Drive:
     square: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w_i^2
     neighbour: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w_i w_{i+1}; last column zero
     position: np.ndarray  # (n, n_axes) m at the end of each step
-    flags: np.ndarray  # (n,) uint32, bit k set: flag_names[k] holds in this step
+    flags: np.ndarray  # (n, n_flags) bool: flag_names[k] holds at some time in this step
     flag_names: tuple[str, ...]  # e.g. "signals.x_current above 20 A", "gap in loads"
 
     @property
     def n_steps(self) -> int:
         return len(self.time) - 1
+
+
+def evaluate(
+    load_model: LoadModel,
+    time: np.ndarray,
+    signals: Mapping[str, np.ndarray],
+    dt: float,
+    n_steps: int | None = None,
+) -> Drive:
+    """Evaluate laws, contacts and environments of a load log over steps of `dt` [s] from its first sample on.
+
+    time (m,) [s] strictly increasing; signals: (m,) each, SI (temperatures degC); NaN means "no value": the last value
+    is held and the step flagged. Without `n_steps` the steps reach the last sample (at least one step). A contact
+    source is shared equally by the pairs of its contact, `rail_share` of it by the segments under the moving pad, each
+    by the heat made while the pad dwells there.
+
+    Raises LogError for missing or empty signals and for times that do not increase.
+    """
+    time, values, missing = _clean(load_model, time, signals)
+    if n_steps is None:
+        n_steps = max(1, int(np.ceil((time[-1] - time[0]) / dt - 1e-9)))
+    t = time - time[0]  # small numbers: seconds since 1970 would cost seven digits
+    edges = dt * np.arange(n_steps + 1)
+    intervals = cut(t, edges)
+
+    gains = np.array([source.gain for source in load_model.sources])
+    powers = gains * law_values([s.use for s in load_model.sources], values, len(t))
+    films = law_values([f.use for f in load_model.films], values, len(t))
+    joints = np.array([j.conductance for j in load_model.joints])
+    environments = _columns([values[s] if s else np.full(len(t), c) for _, s, c in load_model.environments], len(t))
+
+    path = {a.name: np.interp(np.append(intervals.start, intervals.end[-1]), t, values[a.position])
+            for a in load_model.axes}  # fmt: skip
+    flags = _flags(load_model, t, values, missing, films, path, intervals, dt)
+    weight, square, neighbour, port_heat = _contacts(load_model, path, powers, intervals)
+    return Drive(
+        time=time[0] + edges,
+        power=intervals.mean(powers),
+        port_heat=port_heat,
+        theta=np.hstack([intervals.mean(films), np.tile(joints, (n_steps, 1))]),
+        environment=intervals.mean(environments),
+        conductance=np.tile([p.conductance * p.area for p in load_model.pairs], (n_steps, 1)),
+        weight=weight,
+        square=square,
+        neighbour=neighbour,
+        position=_columns([np.interp(edges[1:], t, values[a.position]) for a in load_model.axes], n_steps),
+        flags=np.stack(list(flags.values()), axis=1),
+        flag_names=tuple(flags),
+    )
+
+
+def _columns(columns: list[np.ndarray], n: int) -> np.ndarray:
+    """(n, len(columns)); also of no columns."""
+    return np.stack(columns, axis=1) if columns else np.zeros((n, 0))
+
+
+def _clean(
+    load_model: LoadModel, time: np.ndarray, signals: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Time, signals without gaps, and where values were missing."""
+    time = np.asarray(time, dtype=float)
+    if time.ndim != 1 or len(time) == 0 or not np.all(np.diff(time) > 0.0) or not np.all(np.isfinite(time)):
+        raise LogError("times do not increase strictly", "loads", "run `twin check` on the run folder")
+    uses = [source.use for source in load_model.sources] + [film.use for film in load_model.films]
+    needed = {name for use in uses for name in use.signals.values()}
+    needed |= {a.position for a in load_model.axes} | {s for _, s, _ in load_model.environments if s}
+    absent = sorted(name for name in needed if name not in signals)
+    if absent:
+        raise LogError(f"missing signals: {', '.join(absent)}", "loads", "log them, or run `twin check` to see columns")
+    values, missing = {}, {}
+    for name in sorted(needed | {s.name for s in load_model.signals if s.name in signals}):
+        raw = np.asarray(signals[name], dtype=float)
+        if raw.shape != time.shape:
+            raise LogError(f"{raw.size} values for {time.size} times", f"loads: {name}", "give one value per time")
+        lost = ~np.isfinite(raw)
+        if lost.all():
+            if name not in needed:
+                continue
+            raise LogError("no valid value at all", f"loads: {name}", "check the sensor or the column's unit")
+        last = np.maximum.accumulate(np.where(lost, -1, np.arange(len(raw))))
+        values[name] = raw[np.where(last < 0, np.argmin(lost), last)]  # before the first value: that first value
+        missing[name] = lost
+    return time, values, missing
+
+
+def _pad_coordinate(pair: Pair, position: np.ndarray) -> np.ndarray:
+    """Coordinate of the pad on its rail at axis positions [m]."""
+    return pair.station - position if pair.rail_moves else pair.station + position
+
+
+def _contacts(
+    load_model: LoadModel, path: dict[str, np.ndarray], powers: np.ndarray, intervals: Intervals
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Dwell means (n_steps, n_pairs, n_segments) of w, w^2, w_i w_{i+1}, and port heat (n_steps, n_ports) [W]."""
+    n_steps = intervals.n_steps
+    longest = max((len(rail.stations) for rail in load_model.rails), default=0)
+    weight, square, neighbour = np.zeros((3, n_steps, len(load_model.pairs), longest))
+    port_heat = np.zeros((n_steps, len(load_model.ports)))
+    in_contact = {s.contact: sum(p.contact == s.contact for p in load_model.pairs) for s in load_model.sources}
+    for k, pair in enumerate(load_model.pairs):
+        rail = load_model.rails[pair.rail]
+        stations, n = np.asarray(rail.stations), len(rail.stations)
+        coordinate = _pad_coordinate(pair, path[load_model.axes[pair.axis].name])
+        rest = intervals.constant(coordinate[:-1], coordinate[1:])
+        use = ~rest[intervals.step]
+        use[intervals.first] = True  # a pad at rest needs one interval, whose share is the whole step
+        points = path_points(stations, coordinate[:-1][use], coordinate[1:][use])
+        step, sample = intervals.step[use][points.interval], intervals.sample[use][points.interval]
+        share = points.share * np.where(rest[step], 1.0, intervals.share[use][points.interval])
+        means = dwell(stations, points.s, step, share, n_steps)
+        weight[:, k, :n], square[:, k, :n], neighbour[:, k, : n - 1] = means.mean, means.square, means.neighbour
+        for j, source in enumerate(load_model.sources):
+            if source.contact != pair.contact:
+                continue
+            power = powers[:, j] / in_contact[source.contact]
+            mean = intervals.mean(power)
+            here = np.where(rest[step], mean[step], power[sample])
+            under_pad = dwell(stations, points.s, step, share * here, n_steps)
+            port_heat[:, rail.first_port : rail.first_port + n] += source.rail_share * under_pad.mean
+            port_heat[:, pair.pad_port] += (1.0 - source.rail_share) * mean
+    return weight, square, neighbour, port_heat
+
+
+def _margin(low: float, high: float) -> float:
+    """Values at a bound stay inside in spite of rounding."""
+    return 1e-9 * max((abs(v) for v in (low, high) if np.isfinite(v)), default=0.0)
+
+
+def _flags(
+    load_model: LoadModel,
+    t: np.ndarray,
+    values: dict[str, np.ndarray],
+    missing: dict[str, np.ndarray],
+    films: np.ndarray,
+    path: dict[str, np.ndarray],
+    intervals: Intervals,
+    dt: float,
+) -> dict[str, np.ndarray]:
+    """Name -> (n_steps,) bool for everything outside what the model was certified for."""
+    flags: dict[str, np.ndarray] = {}
+
+    def bounds(name: str, unit: str, samples: np.ndarray, low: float, high: float) -> None:
+        margin = _margin(low, high)
+        flags[f"{name} below {low:g} {unit}"] = intervals.any((samples < low - margin)[intervals.sample])
+        flags[f"{name} above {high:g} {unit}"] = intervals.any((samples > high + margin)[intervals.sample])
+
+    def beyond(name: str, coordinate: np.ndarray, low: float, high: float) -> None:
+        outside = (coordinate < low - _margin(low, high)) | (coordinate > high + _margin(low, high))
+        flags[name] = intervals.any(outside[:-1] | outside[1:])  # paths are straight: their ends are their extremes
+
+    for signal in load_model.signals:
+        if signal.name in values:
+            bounds(f"signals.{signal.name}", signal.unit, values[signal.name], signal.low, signal.high)
+    for name, lost in missing.items():
+        flags[f"signals.{name} missing, last value held"] = intervals.any(lost[intervals.sample])
+    for k, film in enumerate(load_model.films):
+        bounds(f"films.{film.name}", "W/(m^2*K)", films[:, k], film.low, film.high)
+    for axis in load_model.axes:
+        beyond(f"axes.{axis.name} beyond its stroke", path[axis.name], axis.low, axis.high)
+    for pair in load_model.pairs:
+        stations = load_model.rails[pair.rail].stations
+        coordinate = _pad_coordinate(pair, path[load_model.axes[pair.axis].name])
+        name = f"contacts.{pair.contact}: {load_model.ports[pair.pad_port]} beyond the stations of its rail"
+        beyond(name, coordinate, stations[0], stations[-1])
+    spacing = np.diff(t)
+    gap = (spacing > 5.0 * np.median(spacing)) & (spacing > dt) if len(spacing) else np.zeros(0, bool)
+    flags["gap in loads"] = intervals.any(np.append(gap, False)[intervals.sample])
+    flags["after the end of loads, last values held"] = intervals.any(intervals.start >= t[-1] + (1.0 - 1e-9) * dt)
+    return flags

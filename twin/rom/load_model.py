@@ -111,7 +111,9 @@ class LoadModel:
     @property
     def theta_names(self) -> tuple[str, ...]:
         """Coefficients of the affine terms: films first, then joints."""
-        return tuple(f"films.{f.name}" for f in self.films) + tuple(f"contacts.{j.name}.conductance" for j in self.joints)
+        return tuple(f"films.{f.name}" for f in self.films) + tuple(
+            f"contacts.{j.name}.conductance" for j in self.joints
+        )
 
     def to_json(self) -> dict:
         return asdict(self)

@@ -44,6 +44,18 @@ class AffineBody:
     G: np.ndarray  # (n_poses, 3, n) m/K
     one: np.ndarray  # (n,) coordinates of the field that is 1 K everywhere
     energy: np.ndarray  # (n,) J/K: energy @ x is the heat stored relative to T_ref (= E one)
+    P_out: np.ndarray | None = None  # (n, n_ports) where reading a port differs from feeding it (oblique projection)
+    F: Matrix | None = None  # (m, n) 1: temperatures of the surface vertices, for pictures
+
+    @property
+    def port_rows(self) -> np.ndarray:
+        """(n_ports, n): T_port = port_rows @ x."""
+        return (self.P if self.P_out is None else self.P_out).T
+
+    @property
+    def symmetric(self) -> bool:
+        """True for the full model and Galerkin projections, False for oblique ones."""
+        return self.P_out is None
 
     @property
     def n(self) -> int:

@@ -1,0 +1,71 @@
+# Everything from a fresh clone: `make demo` or `make test`. Needs make and Python 3.11 or 3.12 with venv, nothing else.
+.DEFAULT_GOAL := help
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+
+PYTHON ?= $(firstword $(foreach p,python3.11 python3.12 python3,$(shell command -v $(p) 2>/dev/null)))
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+OUT ?= out
+PYTEST_ARGS ?=
+
+.PHONY: help
+help: ## this list
+	@echo "usage: make TARGET"; echo
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+# The stamp follows the lock, so a changed pin reaches an existing .venv with the next command.
+$(READY): requirements.lock pyproject.toml
+	@[ -n "$(PYTHON)" ] || { echo "no python3 found: install Python 3.11 (Debian: apt-get install python3 python3-venv)"; exit 2; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' || { \
+	    echo "$(PYTHON) is not Python 3.11 or 3.12; name one: make PYTHON=/path/to/python3.11 ..."; exit 2; }
+	@[ -x $(BIN)/python ] || "$(PYTHON)" -m venv $(VENV) || { \
+	    rm -rf $(VENV); echo "cannot make .venv (Debian: apt-get install python3-venv)"; exit 2; }
+	@echo "installing the pinned dependencies into $(VENV) (about 350 MB of downloads the first time)"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+.PHONY: setup
+setup: $(READY) ## make .venv with the pinned dependencies and this package
+	@echo "ready: $(BIN)/twin --help"
+
+.PHONY: check
+check: $(READY) ## style, format, types and the import rules
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --cache-dir .cache/import_linter
+
+.PHONY: test
+test: $(READY) ## the fast tests
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+.PHONY: test-all
+test-all: $(READY) ## every test, the slow ones too
+	$(BIN)/python -m pytest -m "slow or not slow" $(PYTEST_ARGS)
+
+.PHONY: bench
+bench: $(READY) ## what is claimed about speed, memory and accuracy, measured here
+	$(BIN)/python -m benchmarks
+
+.PHONY: demo
+demo: $(READY) ## build, verify and run the shipped five-axis machine; leaves out/ with pictures
+	@$(BIN)/twin demo -o "$(OUT)"
+
+.PHONY: notebooks
+notebooks: $(READY) ## execute the notebooks and check the numbers they assert
+	$(BIN)/python notebooks/execute.py
+
+.PHONY: lock
+lock: ## resolve requirements.lock anew (keeps pins that still hold; UPGRADE=1 moves them)
+	@[ -x .cache/lock/bin/uv ] || { "$(PYTHON)" -m venv .cache/lock && .cache/lock/bin/pip install --quiet uv; }
+	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --universal \
+	    --python-version 3.11 --generate-hashes --no-config --no-emit-index-url --quiet \
+	    --custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o requirements.lock
+
+.PHONY: clean
+clean: ## remove what was made here: .venv, caches, out/
+	rm -rf $(VENV) .cache out build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	find twin tests models benchmarks notebooks -name __pycache__ -type d -prune -exec rm -rf {} +

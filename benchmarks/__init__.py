@@ -1,0 +1,1 @@
+"""What is claimed about accuracy, speed and memory, as commands: `python -m benchmarks [NAME ...]`."""

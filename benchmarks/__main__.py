@@ -1,0 +1,26 @@
+"""Run benchmarks by name, all of them by default; every figure is printed with what it is compared with."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import resource
+import time
+
+NAMES = ("poses", "moved", "step", "replay", "growth", "pymor")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", default=NAMES, help=f"of {', '.join(NAMES)}")
+    for name in parser.parse_args().names:
+        module = importlib.import_module(f"benchmarks.{name}")
+        print(f"\n== {name}: {module.__doc__.strip().splitlines()[0]}", flush=True)
+        began = time.perf_counter()
+        module.main()
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+        print(f"   ({time.perf_counter() - began:.0f} s, peak memory of this process so far {peak:.2f} GiB)", flush=True)
+
+
+if __name__ == "__main__":
+    main()

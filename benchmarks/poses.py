@@ -1,0 +1,42 @@
+"""TCP rows: part-wise flexibility against one direct solve of the coupled machine, and interpolation between poses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.five_axis import full, machine
+from twin.build.coupled_direct import coupled_rows
+from twin.build.pipeline import VERIFY_SEED
+from twin.build.scenario import draw
+from twin.build.stepper import CoupledStepper, tcp_at_poses
+from twin.rom.poses import pose_weights
+
+
+def main() -> None:
+    model, structure = full().thermal, full().structure
+    rng = np.random.default_rng(0)
+    low = np.array([g[0] for g in model.pose_grid])
+    high = np.array([g[-1] for g in model.pose_grid])
+    worst = 0.0
+    for position in rng.uniform(low, high, (5, len(low))):
+        direct = coupled_rows(machine(), full().bodies, dict(zip(model.pose_axes, position, strict=True)))
+        ours = [G[0] for G in structure.pose_rows(position[None, :])]
+        error = max(np.abs(a - b).max() for a, b in zip(ours, direct, strict=True))
+        worst = max(worst, error / max(np.abs(b).max() for b in direct))
+    print(f"   flexibility against direct solve at 5 random poses: {worst:.1e} of the largest row entry")
+
+    fields = []
+    for seed in range(3):  # fields as loads make them: steady states of held-out scenarios, the largest errors there are
+        scenario = draw(model.load_model, VERIFY_SEED + seed, 1.0, 60.0)
+        fields.append(CoupledStepper(model).steady_state(scenario.drive, scenario.drive.n_steps // 2))
+    positions = rng.uniform(low, high, (200, len(low)))
+    exact = [
+        np.array([structure.displacement(dict(zip(model.pose_axes, p, strict=True)), tuple(x)) for p in positions])
+        for x in fields
+    ]
+    grids = [tcp_at_poses(model, x) for x in fields]
+    span = max(np.abs(g).max() for g in grids)
+    for kind in ("linear", "cubic", "lagrange"):
+        weights, _ = pose_weights(model.pose_grid, positions, kind)
+        error = max(np.abs(weights @ g - e).max() for g, e in zip(grids, exact, strict=True))
+        print(f"   {kind:>8} interpolation at 200 random poses: max {1e6 * error:.3f} um at TCP errors up to {1e6 * span:.1f} um")

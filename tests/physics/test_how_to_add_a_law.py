@@ -1,0 +1,49 @@
+"""The worked example of docs/how_to_add_a_law.md runs, and what it says of the table holds."""
+
+import inspect
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from twin.physics.laws import LAWS, Law
+
+PAGE = (Path(__file__).parents[2] / "docs" / "how_to_add_a_law.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def example() -> dict[str, object]:
+    names: dict[str, object] = {}
+    for code in blocks("python"):
+        exec(code, names)
+    return names
+
+
+def test_its_own_test_passes(example):
+    example["test_copper_loss_of_torque"]()
+
+
+def test_its_row_fits_its_function_as_all_rows_do(example):
+    row = example["row"]
+    assert isinstance(row, Law)
+    for name, law in {**LAWS, "motor_copper_of_torque": row}.items():
+        arguments = list(inspect.signature(law.function).parameters)
+        assert sorted(arguments) == sorted([*law.signals, *law.parameters]), name
+        assert law.kind in ("loss", "film"), name
+        assert law.source, name
+
+
+def test_its_description_gives_every_argument_and_no_other(example):
+    (text,) = blocks("toml")
+    description = tomllib.loads(text)
+    source = description["sources"]["y_motor"]
+    row = example["row"]
+    assert source["law"] == row.function.__name__
+    assert set(source["parameters"]) == set(row.parameters)
+    assert set(source["signals"]) == set(row.signals)
+    assert set(source["signals"].values()) <= set(description["signals"])

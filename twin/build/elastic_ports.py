@@ -1,0 +1,156 @@
+"""Where springs and the TCP take hold of a body: area-mean functionals of surface patches on its displacements.
+
+A *mean* port is the mean displacement of a patch (3 scalars). A *rigid* port adds the patch's rotation (3 scalars), the
+least-squares fit of a rigid motion u + w x (x - c) to its displacements (paper 000, Fig. 6, fits a plane to nodes: the
+fit over the area depends on the patch, not on its mesh). The transpose of a port spreads a force over its patch, so
+that every force and moment that passes a port is conserved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from twin.build.mesh import BodyMesh
+from twin.build.surface import Patch, patch, segments
+
+COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True)
+class MeanPort:
+    """Three columns: the mean displacement [m] of a patch."""
+
+    body: int
+    first: int  # column within the body's ports
+    centroid: np.ndarray  # (3,) m, mesh coordinates
+
+
+@dataclass(frozen=True)
+class RigidPort:
+    """Six columns: mean displacement [m] and rotation vector [rad] of a patch."""
+
+    body: int
+    first: int
+    centroid: np.ndarray  # (3,) m, mesh coordinates
+    normal: np.ndarray  # (3,) area-mean outward normal: of length 1 for a plane patch
+
+    def motion_at(self, point: np.ndarray) -> np.ndarray:
+        """(3, 6): displacement at `point` (3,) [m, mesh coordinates] of the patch's rigid motion."""
+        return np.hstack([np.eye(3), -cross_matrix(point - self.centroid)])
+
+
+@dataclass(frozen=True)
+class RailPort:
+    """Three columns per segment, in order along the axis."""
+
+    body: int
+    first: int
+    centroids: np.ndarray  # (n_segments, 3) m, mesh coordinates
+    stations: np.ndarray  # (n_segments,) m along the axis
+
+
+@dataclass
+class PortTable:
+    """Collects the ports of all bodies; asking twice for the same port gives the same columns."""
+
+    bodies: tuple[BodyMesh, ...]
+    names: list[list[str]] = field(default_factory=list)
+    _rows: list[list[tuple[np.ndarray, np.ndarray]]] = field(default_factory=list)
+    _known: dict[tuple[object, ...], MeanPort | RigidPort | RailPort] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.names = [[] for _ in self.bodies]
+        self._rows = [[] for _ in self.bodies]
+
+    def mean(self, surface: str) -> MeanPort:
+        """The mean port of a "part.surface"."""
+        key = ("mean", surface)
+        if key not in self._known:
+            body, offset, whole = self._patch(surface)
+            self._known[key] = MeanPort(body, self._add_mean(body, offset, surface, whole), whole.centroid)
+        port = self._known[key]
+        assert isinstance(port, MeanPort)
+        return port
+
+    def rigid(self, surface: str) -> RigidPort:
+        """The rigid port of a "part.surface"."""
+        key = ("rigid", surface)
+        if key not in self._known:
+            body, offset, whole = self._patch(surface)
+            first = self._add_mean(body, offset, surface, whole)
+            self._add_rotation(body, offset, surface, whole)
+            self._known[key] = RigidPort(body, first, whole.centroid, whole.normal)
+        port = self._known[key]
+        assert isinstance(port, RigidPort)
+        return port
+
+    def rail(self, surface: str, direction: np.ndarray, n: int) -> RailPort:
+        """The segments of a rail surface, `n` equal lengths along the unit vector `direction`."""
+        key = ("rail", surface, tuple(direction), n)
+        if key not in self._known:
+            body, offset, part, facets = self._surface(surface)
+            pieces = segments(part, facets, direction, n)
+            firsts = [self._add_mean(body, offset, f"{surface}[{i}]", s) for i, s in enumerate(pieces)]
+            centroids = np.array([s.centroid for s in pieces])
+            self._known[key] = RailPort(body, firsts[0], centroids, centroids @ direction)
+        port = self._known[key]
+        assert isinstance(port, RailPort)
+        return port
+
+    def matrices(self) -> tuple[csr_array, ...]:
+        """Per body U (3n, n_ports): port displacements are U^T u, port forces load the body with U f."""
+        result = []
+        for body, rows in zip(self.bodies, self._rows, strict=True):
+            dofs = np.concatenate([d for d, _ in rows]) if rows else np.zeros(0, dtype=int)
+            values = np.concatenate([v for _, v in rows]) if rows else np.zeros(0)
+            port = np.repeat(np.arange(len(rows)), [len(d) for d, _ in rows])
+            result.append(coo_array((values, (dofs, port)), shape=(3 * body.n, len(rows))).tocsr())
+        return tuple(result)
+
+    def _surface(self, surface: str):  # noqa: ANN202 - (body index, node offset, PartMesh, facets)
+        name, _, face = surface.partition(".")
+        for i, body in enumerate(self.bodies):
+            if any(part.name == name for part in body.parts):
+                part, offset = body.part(name)
+                return i, offset, part, part.facets(face)
+        raise AssertionError(f"no body has part '{name}'; the description was not checked")
+
+    def _patch(self, surface: str) -> tuple[int, int, Patch]:
+        body, offset, part, facets = self._surface(surface)
+        return body, offset, patch(part, facets)
+
+    def _add_mean(self, body: int, offset: int, label: str, p: Patch) -> int:
+        first = len(self.names[body])
+        for a in range(3):
+            self.names[body].append(f"{label}.{COMPONENTS[a]}")
+            self._rows[body].append((3 * (p.nodes + offset) + a, p.mean))
+        return first
+
+    def _add_rotation(self, body: int, offset: int, label: str, p: Patch) -> None:
+        # normal equations of min int |u - mean - w x r|^2 dA:  (tr(S) 1 - S) w = (1/A) int r x u dA
+        inertia = np.trace(p.second_moment) * np.eye(3) - p.second_moment
+        r_cross = np.zeros((3, 3, len(p.nodes)))  # [component of r x u, component of u, node]
+        for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            r_cross[a, c], r_cross[a, b] = p.moment[b], -p.moment[c]
+        fit = np.einsum("ij,jan->ina", np.linalg.inv(inertia), r_cross)
+        dofs = (3 * (p.nodes + offset)[:, None] + np.arange(3)).ravel()
+        for i in range(3):
+            self.names[body].append(f"{label}.{COMPONENTS[3 + i]}")
+            self._rows[body].append((dofs, fit[i].ravel()))
+
+
+def cross_matrix(r: np.ndarray) -> np.ndarray:
+    """[r]x with [r]x w = r x w."""
+    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+
+
+def rigid_modes(points: np.ndarray) -> np.ndarray:
+    """(3n, 6) rigid motions of points (n, 3): translations and rotations about the origin, u = t + w x x."""
+    modes = np.zeros((len(points), 3, 6))
+    modes[:, :, :3] = np.eye(3)
+    for i, axis in enumerate(np.eye(3)):
+        modes[:, :, 3 + i] = np.cross(axis, points)
+    return modes.reshape(-1, 6)

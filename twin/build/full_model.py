@@ -1,0 +1,59 @@
+"""The full model of a machine: thermal bodies with TCP rows, and the structure for poses off the grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from twin.build.mesh import BodyMesh, load_body_meshes
+from twin.build.structure import Structure, assemble_structure
+from twin.build.thermal import assemble_thermal
+from twin.machine.description import Machine
+from twin.progress import Progress, silent
+from twin.rom.model import MachineModel
+
+
+@dataclass(frozen=True)
+class SurfaceMesh:
+    """The outer surface of a body, for pictures: flat triangles between vertices of the mesh."""
+
+    points: np.ndarray  # (m, 3) m
+    triangles: np.ndarray  # (k, 3) rows of `points`
+
+
+@dataclass(frozen=True)
+class FullModel:
+    thermal: MachineModel  # sparse bodies, G filled for the pose grid, F for their surfaces
+    structure: Structure
+    bodies: tuple[BodyMesh, ...]
+    surfaces: tuple[SurfaceMesh, ...]
+
+
+def assemble(machine: Machine, progress: Progress = silent) -> FullModel:
+    """Read meshes, assemble and condense. Raises DescriptionError and ModelError."""
+    with progress("meshes and thermal matrices", 2) as advance:
+        bodies = load_body_meshes(machine)
+        advance("meshes")
+        thermal = assemble_thermal(machine, bodies)
+        advance("thermal matrices")
+    structure = assemble_structure(machine, bodies, progress)
+    rows = structure.pose_rows(thermal.poses)
+    surfaces, selections = zip(*(_surface(body) for body in bodies), strict=True)
+    parts = zip(thermal.bodies, rows, selections, strict=True)
+    thermal = replace(thermal, bodies=tuple(replace(b, G=G, F=F) for b, G, F in parts))
+    return FullModel(thermal, structure, bodies, surfaces)
+
+
+def _surface(body: BodyMesh) -> tuple[SurfaceMesh, sp.csr_array]:
+    """Surface triangles of a body and the (m, n) selection of its vertices among the nodes."""
+    triangles = np.vstack(
+        [
+            part.mesh.facets[:, part.mesh.boundary_facets()].T + offset
+            for part, offset in zip(body.parts, body.offsets, strict=True)
+        ]
+    )
+    vertices, index = np.unique(triangles, return_inverse=True)
+    selection = sp.csr_array((np.ones(len(vertices)), (np.arange(len(vertices)), vertices)), (len(vertices), body.n))
+    return SurfaceMesh(body.nodes[vertices], index.reshape(triangles.shape)), selection

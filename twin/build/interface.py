@@ -1,0 +1,130 @@
+"""Two surfaces of a body joined over their common area, whether or not their meshes match.
+
+Facet pairs are intersected (polygon clipping) and integrated exactly, as scikit-fem has no three-dimensional mortar
+integration. The result, int (N_A - N_B)(N_A - N_B)^T dA, serves thermal joints (times a conductance) and, per
+component, the stiffness that glues displacements. Its rows sum to zero: no jump, no flux.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from twin.build.clip import clip, fan, p2_triangle, triangle_rule
+from twin.build.mesh import BodyMesh
+from twin.build.surface import facet_nodes, scatter
+from twin.errors import DescriptionError
+from twin.machine.bodies import split_surface
+
+# Facets that face each other: exact for coplanar ones; the tolerances admit facetted cylinders and rounded coordinates.
+MIN_COSINE = 0.95  # of the angle between a normal and the other's reverse
+MAX_GAP = 0.1  # distance of the planes, in sizes of the smaller facet
+PAIRS = 20_000  # facet pairs integrated at once
+
+
+@dataclass(frozen=True)
+class Interface:
+    """The coupling of two surfaces of a body with n unknowns."""
+
+    matrix: sp.csr_array  # (n, n) m^2: int (N_A - N_B)(N_A - N_B)^T dA
+    area: float  # m^2, common area
+
+
+@dataclass(frozen=True)
+class _Facets:
+    nodes: np.ndarray  # (m, 6) unknowns of the body
+    corners: np.ndarray  # (m, 3, 3) m
+    centre: np.ndarray  # (m, 3) m
+    radius: np.ndarray  # (m,) m, about the centre
+    normal: np.ndarray  # (m, 3) unit, outward
+
+
+def interface(body: BodyMesh, a: str, b: str, where: str = "contacts") -> Interface:
+    """Intersect the surfaces `a` and `b` ("part.surface") of a body.
+
+    Raises DescriptionError where they do not touch or a surface is unknown.
+    """
+    fa, fb = _facets(body, a), _facets(body, b)
+    pairs = _facing(fa, fb)
+    matrix, area = sp.csr_array((body.n, body.n)), 0.0
+    for start in range(0, len(pairs), PAIRS):
+        i, j = pairs[start : start + PAIRS].T
+        nodes, local, shared = _intersect(fa, fb, i, j)
+        matrix, area = matrix + scatter(nodes, nodes, local, body.n), area + shared
+    touching = 1e-9 * min(_area(fa), _area(fb))
+    if not area > touching:
+        gap = float(cKDTree(fb.centre).query(fa.centre)[0].min())
+        raise DescriptionError(
+            f"'{a}' and '{b}' have no common area",
+            where,
+            f"fixed contacts join faces that lie on each other (nearest facet centres are {gap:.3g} m apart): "
+            "check positions, mesh_unit and surface names",
+        )
+    return Interface(matrix, area)
+
+
+def _facets(body: BodyMesh, surface: str) -> _Facets:
+    part_name, name = split_surface(surface)
+    part, offset = body.part(part_name)
+    nodes = facet_nodes(part, part.facets(name))
+    corners = part.nodes[nodes[:, :3]]
+    centre = corners.mean(axis=1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return _Facets(
+        nodes + offset,
+        corners,
+        centre,
+        np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1),
+        normal / np.linalg.norm(normal, axis=1, keepdims=True),
+    )
+
+
+def _area(f: _Facets) -> float:
+    edges = f.corners[:, 1:] - f.corners[:, :1]
+    return float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 2)
+
+
+def _facing(fa: _Facets, fb: _Facets) -> np.ndarray:
+    """Index pairs (k, 2) of facets that may overlap: near, facing each other, in one plane."""
+    near = cKDTree(fb.centre).query_ball_point(fa.centre, fa.radius + fb.radius.max())
+    i = np.repeat(np.arange(len(fa.centre)), [len(n) for n in near])
+    j = np.concatenate([np.asarray(n, dtype=int) for n in near]) if len(i) else i
+    offset = fb.centre[j] - fa.centre[i]
+    gap = np.abs(np.einsum("kx,kx->k", offset, fa.normal[i]))
+    keep = (
+        (np.linalg.norm(offset, axis=1) < fa.radius[i] + fb.radius[j])
+        & (np.einsum("kx,kx->k", fa.normal[i], fb.normal[j]) < -MIN_COSINE)
+        & (gap < MAX_GAP * np.minimum(fa.radius[i], fb.radius[j]))
+    )
+    return np.column_stack([i[keep], j[keep]])
+
+
+def _intersect(fa: _Facets, fb: _Facets, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Unknowns (t, 12), local matrices (t, 12, 12) and the area of the intersections of facet pairs.
+
+    Each corner of B's triangle carries its barycentric coordinates in A (projected along A's normal) and in B; both
+    are linear, so clipping where A's turn negative keeps both along.
+    """
+    a = fa.corners[i]
+    edge_1, edge_2 = a[:, 1] - a[:, 0], a[:, 2] - a[:, 0]
+    cross = np.cross(edge_1, edge_2)
+    twice_area_2 = np.einsum("kx,kx->k", cross, cross)
+    lever = fb.corners[j] - a[:, None, 0]  # (k, 3 corners, 3)
+    l1 = np.einsum("kcx,kx->kc", np.cross(lever, edge_2[:, None]), cross) / twice_area_2[:, None]
+    l2 = np.einsum("kcx,kx->kc", np.cross(edge_1[:, None], lever), cross) / twice_area_2[:, None]
+    in_a = np.stack([1.0 - l1 - l2, l1, l2], axis=2)
+    polygons = np.concatenate([in_a, np.broadcast_to(np.eye(3), in_a.shape)], axis=2)
+    counts = np.full(len(i), 3)
+    for side in range(3):
+        polygons, counts = clip(polygons, counts, polygons[:, :, side])
+    triangles, owner = fan(polygons, counts)
+
+    rule, weights = triangle_rule(4)
+    at = np.einsum("qk,tkc->tqc", rule, triangles)
+    jump = np.concatenate([p2_triangle(at[:, :, :3]), -p2_triangle(at[:, :, 3:])], axis=2)
+    area = np.abs(np.linalg.det(triangles[:, :, :3])) * np.sqrt(twice_area_2[owner]) / 2.0
+    local = np.einsum("t,q,tqi,tqj->tij", area, weights, jump, jump, optimize=True)
+    return np.concatenate([fa.nodes[i[owner]], fb.nodes[j[owner]]], axis=1), local, float(area.sum())

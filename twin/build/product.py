@@ -1,0 +1,98 @@
+"""From a description to an artefact on disk, and back from an artefact to its certificate."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from twin import __version__
+from twin.build.cache import machine_hash, source_hash
+from twin.build.certificate import Certificate
+from twin.build.pipeline import (
+    BUILD_SEED,
+    VERIFY_SEED,
+    BuildOptions,
+    certificate,
+    compact_model,
+    full_model,
+    rich_model,
+)
+from twin.errors import ArtefactError
+from twin.machine.load import load_machine
+from twin.progress import Progress, silent
+from twin.rom.artefact import Artefact, SurfaceField, read_artefact, write_artefact
+
+PACKAGES = ("numpy", "scipy", "scikit-fem", "h5py", "jax")
+
+
+def build_artefact(
+    machine_path: Path, target: Path, options: BuildOptions = BuildOptions(), progress: Progress = silent
+) -> Certificate:
+    """Build, certify (compact against rich) and write an artefact atomically.
+
+    Equal input gives an equal file apart from the attribute `created`. The certificate of the build says how far the
+    compact model is from the rich one; `verify_artefact` adds how far the rich one is from the full model.
+    """
+    machine = load_machine(machine_path)
+    full = full_model(machine, progress)
+    rich = rich_model(machine, full, options.rich, progress)
+    compact = compact_model(machine, rich, options, progress)
+    result = certificate(machine, rich, compact, None, options, BUILD_SEED, progress=progress)
+    fields = [
+        SurfaceField(body.name, surface.points, surface.triangles, np.asarray(body.F))
+        for body, surface in zip(compact.bodies, full.surfaces, strict=True)
+    ]
+    bare = replace(compact, bodies=tuple(replace(b, F=None) for b in compact.bodies))
+    description = Path(machine_path) / "machine.toml" if Path(machine_path).is_dir() else Path(machine_path)
+    provenance = {
+        "machine": str(description.resolve()),
+        "machine_hash": machine_hash(machine),
+        "source_hash": source_hash(),
+        "twin": __version__,
+        **{f"package_{name}": importlib.metadata.version(name) for name in PACKAGES},
+        "command": f"twin build --method {options.method} --states {options.states} --samples {options.rich.samples} "
+        f"--training {options.training}",
+        "full_states": str(full.thermal.n),
+        "rich_states": str(rich.n),
+        "options_hash": hashlib.sha256(repr(options).encode()).hexdigest(),
+    }
+    write_artefact(target, bare, description.read_text(encoding="utf-8"), result.to_json(), provenance, fields)
+    return result
+
+
+def verify_artefact(
+    path: Path,
+    machine_path: Path | None = None,
+    options: BuildOptions = BuildOptions(),
+    full_scenarios: int = 2,
+    progress: Progress = silent,
+) -> Certificate:
+    """Certify an artefact on scenarios it has never seen, with the full model in the chain, and store the result in it.
+
+    The machine is read from where the artefact was built, or from `machine_path`; it must be the one the artefact was
+    built from. Raises ArtefactError otherwise.
+    """
+    artefact: Artefact = read_artefact(path)
+    origin = Path(machine_path or artefact.provenance.get("machine", ""))
+    if not origin.exists():
+        raise ArtefactError(f"its machine description is not at {origin}", str(path), "name it with --machine")
+    machine = load_machine(origin)
+    if machine_hash(machine) != artefact.provenance.get("machine_hash"):
+        raise ArtefactError(
+            f"{origin} is not the machine this artefact was built from (description or meshes differ)",
+            str(path),
+            "build again, or name the right description with --machine",
+        )
+    full = full_model(machine, progress)
+    rich = rich_model(machine, full, options.rich, progress)
+    result = certificate(
+        machine, rich, artefact.model, full.thermal, options, VERIFY_SEED, full_scenarios, progress=progress
+    )
+    write_artefact(
+        path, artefact.model, artefact.description, result.to_json(), artefact.provenance, artefact.fields
+    )
+    return result

@@ -1,0 +1,175 @@
+"""The springs between bodies and to the ground, and the TCP, as rows over port displacements at an axis position.
+
+A moving contact's pad sits at station s on its rail; with the weights w_i(s) of eq (1) of paper 000 the rail moves there
+by sum w_i u_i, as if it were a point at c = sum w_i c_i. The gap compares it with the pad's rigid motion at that same
+point, so a linear displacement field common to both opens no gap, and a force on the pad and its opposite on the segments
+have no resultant and no moment, at every position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.build.elastic_ports import MeanPort, PortTable, RailPort, RigidPort
+from twin.errors import DescriptionError
+from twin.machine.bodies import Body
+from twin.machine.description import Contact, Machine, StiffnessOfPair
+from twin.machine.kinematics import direction, displacement, linear_axes
+from twin.rom.contact import station_weights
+
+Positions = Mapping[str, float] | np.ndarray  # m, by axis name (others at zero) or in the order of the linear axes
+PLANE = 0.5  # a mean normal shorter than this is no plane's but a cylinder's
+
+
+@dataclass(frozen=True)
+class Guide:
+    """A pad on a rail: one spring per direction."""
+
+    rail: RailPort
+    pad: RigidPort
+    along: np.ndarray  # (3,) unit vector of the axis
+    directions: np.ndarray  # (s, 3) unit vectors
+    first: int  # its first spring
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A supported surface: springs along x, y, z where stiff."""
+
+    port: MeanPort
+    directions: np.ndarray  # (s, 3)
+    first: int
+
+
+@dataclass(frozen=True)
+class SpringSystem:
+    """All springs and the TCP; P ports of all bodies one after the other."""
+
+    axes: tuple[str, ...]
+    shifts: np.ndarray  # (n_bodies, n_axes, 3) m/m: rigid translation of a body per axis position
+    offsets: np.ndarray  # (n_bodies + 1,) first port of each body
+    names: tuple[str, ...]  # of the springs: "contacts.x_guide.pairs[0].normal", "supports.foot.z"
+    stiffness: np.ndarray  # (s,) N/m
+    guides: tuple[Guide, ...]
+    grounds: tuple[Ground, ...]
+    tool: RigidPort
+    tool_point: np.ndarray  # (3,) m at axis positions zero
+    work: RigidPort
+
+    def vector(self, positions: Positions) -> np.ndarray:
+        """Positions (n_axes,) [m] in the order of `axes`. Raises ValueError for unknown axes or a wrong number."""
+        if isinstance(positions, Mapping):
+            unknown = set(positions) - set(self.axes)
+            if unknown:
+                raise ValueError(f"no linear axis {sorted(unknown)}; axes are {self.axes}")
+            return np.array([float(positions.get(a, 0.0)) for a in self.axes])
+        vector = np.asarray(positions, dtype=float)
+        if vector.shape != (len(self.axes),):
+            raise ValueError(f"positions of shape {vector.shape} for axes {self.axes}")
+        return vector
+
+    def gap_rows(self, positions: Positions) -> np.ndarray:
+        """J (s, P): gaps of the springs [m] per port displacement; -J^T f are the forces on the ports."""
+        shift = np.einsum("bak,a->bk", self.shifts, self.vector(positions))
+        J = np.zeros((len(self.stiffness), int(self.offsets[-1])))
+        for g in self.guides:
+            rows = slice(g.first, g.first + len(g.directions))
+            rail_to_pad = shift[g.pad.body] - shift[g.rail.body]
+            i, right = station_weights(g.rail.stations, (g.pad.centroid + rail_to_pad) @ g.along)
+            at = np.zeros(3)  # where the rail faces the pad, in the rail's mesh coordinates
+            for segment, weight in ((int(i), 1.0 - right), (int(i) + 1, right)):
+                column = self.offsets[g.rail.body] + g.rail.first + 3 * segment
+                J[rows, column : column + 3] -= weight * g.directions
+                at += weight * g.rail.centroids[segment]
+            column = self.offsets[g.pad.body] + g.pad.first
+            J[rows, column : column + 6] += g.directions @ g.pad.motion_at(at - rail_to_pad)
+        for ground in self.grounds:
+            column = self.offsets[ground.port.body] + ground.port.first
+            J[ground.first : ground.first + len(ground.directions), column : column + 3] = ground.directions
+        return J
+
+    def tcp_rows(self, positions: Positions) -> np.ndarray:
+        """t (3, P): displacement [m] of the tool minus the work side at the tool centre point of this pose."""
+        shift = np.einsum("bak,a->bk", self.shifts, self.vector(positions))
+        t = np.zeros((3, int(self.offsets[-1])))
+        for port, sign in ((self.tool, 1.0), (self.work, -1.0)):
+            point = self.tool_point + shift[self.tool.body] - shift[port.body]  # in the body's mesh coordinates
+            column = self.offsets[port.body] + port.first
+            t[:, column : column + 6] += sign * port.motion_at(point)
+        return t
+
+
+def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) -> SpringSystem:
+    """Collect the springs and the TCP of a machine; adds the ports they need to `ports`.
+
+    Raises DescriptionError: a pad whose normal is along the axis, radial stiffnesses of a cylinder that differ,
+    a tool without a point.
+    """
+    names: list[str] = []
+    stiffness: list[float] = []
+    guides, grounds = [], []
+    for name, contact in machine.contacts.items():
+        if contact.kind != "moving":
+            continue
+        for i, pair in enumerate(contact.pairs):
+            where = f"contacts.{name}.pairs[{i}]"
+            guide, labels, values = _guide(machine, contact, pair, ports, len(names), where)
+            guides.append(guide)
+            names += [f"{where}.{label}" for label in labels]
+            stiffness += values
+    for name, support in machine.supports.items():
+        stiff = [a for a in range(3) if support.stiffness[a] > 0]
+        grounds.append(Ground(ports.mean(support.surface), np.eye(3)[stiff], len(names)))
+        names += [f"supports.{name}.{'xyz'[a]}" for a in stiff]
+        stiffness += [support.stiffness[a] for a in stiff]
+    if machine.tcp.tool.point is None:
+        raise DescriptionError("the tool has no point", "tcp.tool.point", "give the tool centre point at axis positions zero")
+    tool, work = ports.rigid(machine.tcp.tool.surface), ports.rigid(machine.tcp.work.surface)
+    axes = linear_axes(machine)
+    shifts = np.array([[displacement(machine, b.name, {a: 1.0}) for a in axes] for b in bodies])
+    return SpringSystem(
+        axes=axes,
+        shifts=shifts.reshape(len(bodies), len(axes), 3),
+        offsets=np.cumsum([0] + [len(n) for n in ports.names]),
+        names=tuple(names),
+        stiffness=np.array(stiffness),
+        guides=tuple(guides),
+        grounds=tuple(grounds),
+        tool=tool,
+        tool_point=np.array(machine.tcp.tool.point),
+        work=work,
+    )
+
+
+def _guide(
+    machine: Machine, contact: Contact, pair: tuple[str, str], ports: PortTable, first: int, where: str
+) -> tuple[Guide, list[str], list[float]]:
+    assert contact.axis is not None, "the description was not checked"
+    along = direction(machine, contact.axis)
+    rail, pad = ports.rail(pair[0], along, contact.segments), ports.rigid(pair[1])
+    vectors = _directions(along, pad.normal, contact.stiffness, where)
+    stiff = [(label, getattr(contact.stiffness, label)) for label in vectors if getattr(contact.stiffness, label) > 0]
+    directions = np.array([vectors[label] for label, _ in stiff]).reshape(len(stiff), 3)
+    return Guide(rail, pad, along, directions, first), [s[0] for s in stiff], [s[1] for s in stiff]
+
+
+def _directions(along: np.ndarray, normal: np.ndarray, k: StiffnessOfPair, where: str) -> dict[str, np.ndarray]:
+    """Unit vectors axial, normal and lateral of a pair. A nut around its screw has no normal: any radial pair will do."""
+    across = normal - (normal @ along) * along
+    if np.linalg.norm(across) < PLANE * max(np.linalg.norm(normal), PLANE):
+        if np.linalg.norm(normal) > PLANE and (k.normal > 0 or k.lateral > 0):
+            raise DescriptionError(
+                "the pad's normal points along the axis", where, "name the face that slides, or correct the axis direction"
+            )
+        if k.normal != k.lateral:
+            raise DescriptionError(
+                "the pad has no normal (a cylinder?), but its normal and lateral stiffness differ",
+                where,
+                "give both the same, radial stiffness, or zero",
+            )
+        across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    across = across / np.linalg.norm(across)
+    return {"axial": along, "normal": across, "lateral": np.cross(across, along)}

@@ -1,0 +1,200 @@
+"""The thermal model of a machine on quadratic tetrahedra, body by body, in the affine form of `twin.rom.model`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from skfem import BilinearForm
+from skfem.helpers import dot, grad
+
+from twin.build.interface import interface
+from twin.build.mesh import BodyMesh, PartMesh
+from twin.build.ports import ContactPorts, contact_ports, port_averages
+from twin.build.probe import probe
+from twin.build.surface import mass, patch
+from twin.build.wiring import load_model
+from twin.errors import DescriptionError, Problem, TwinError
+from twin.machine.bodies import split_surface
+from twin.machine.description import Machine, Material
+from twin.machine.kinematics import linear_axes
+from twin.machine.references import reference_problems
+from twin.machine.surfaces import film_surfaces
+from twin.rom.load_model import LoadModel
+from twin.rom.model import AffineBody, MachineModel
+
+DEFAULT_POSES = 5  # positions per linear axis
+
+FilmSurfaces = Mapping[str, tuple[tuple[str, str], ...]]
+
+
+@BilinearForm
+def _conduction(u: Any, v: Any, _: Any) -> Any:
+    return dot(grad(u), grad(v))
+
+
+@BilinearForm
+def _capacity(u: Any, v: Any, _: Any) -> Any:
+    return u * v
+
+
+def assemble_thermal(machine: Machine, bodies: tuple[BodyMesh, ...]) -> MachineModel:
+    """The full thermal model: sparse bodies (`load_body_meshes`), load wiring, sensors, pose grid; G stays empty.
+
+    Raises DescriptionError with the problems of surfaces, contacts, laws, sensors and poses.
+    """
+    wrong = [p for p in reference_problems(machine) if not p.warning]  # none after load_machine
+    if wrong:
+        raise DescriptionError.collect(wrong)
+    films = film_surfaces(machine, {part.name: tuple(part.surfaces) for body in bodies for part in body.parts})
+    ports = contact_ports(machine, bodies)
+    load = load_model(machine, ports)
+    rows = _sensor_rows(machine, bodies)
+    environments = [name for name, _, _ in load.environments]
+    grid = pose_grid(machine)
+    axes = np.meshgrid(*grid, indexing="ij")
+    return MachineModel(
+        name=machine.machine.name,
+        bodies=tuple(_body(machine, body, films, ports, load, rows[body.name]) for body in bodies),
+        load_model=load,
+        reference_temperature=machine.machine.reference_temperature,
+        sensors=_structural(machine),
+        ambient_sensors=tuple(
+            (name, environments.index(sensor.environment))
+            for name, sensor in machine.sensors.items()
+            if sensor.environment is not None
+        ),
+        pose_axes=linear_axes(machine),
+        pose_grid=grid,
+        poses=np.stack([a.ravel() for a in axes], axis=1) if grid else np.zeros((1, 0)),
+    )
+
+
+def part_matrices(part: PartMesh, material: Material) -> tuple[sp.csr_array, sp.csr_array]:
+    """Capacity int rho c N N^T dV [J/K] and conduction int lambda grad N . grad N^T dV [W/K], both (n, n).
+
+    In chunks of elements: scikit-fem keeps all shape functions at all points of a basis.
+    """
+    E, A0 = sp.csr_array((part.n, part.n)), sp.csr_array((part.n, part.n))
+    for basis in part.chunks():
+        E = E + sp.csr_array(_capacity.assemble(basis))
+        A0 = A0 + sp.csr_array(_conduction.assemble(basis))
+    return E * (material.density * material.heat_capacity), A0 * material.conductivity
+
+
+def pose_grid(machine: Machine) -> tuple[np.ndarray, ...]:
+    """Positions [m] per linear axis: the description's list, or so many over the stroke, ends included (5 by default).
+
+    A single one lies in the middle of the stroke.
+    """
+    grid = []
+    for name in linear_axes(machine):
+        wanted, (low, high) = machine.poses.get(name, DEFAULT_POSES), machine.axes[name].stroke
+        if wanted == 1:
+            grid.append(np.array([(low + high) / 2]))
+        elif isinstance(wanted, int):
+            grid.append(np.linspace(low, high, wanted))
+        else:
+            grid.append(np.asarray(wanted, dtype=float))
+    return tuple(grid)
+
+
+def _body(
+    machine: Machine,
+    body: BodyMesh,
+    films: FilmSurfaces,
+    ports: ContactPorts,
+    load: LoadModel,
+    rows: Mapping[str, np.ndarray],
+) -> AffineBody:
+    parts = [part_matrices(part, machine.materials[machine.parts[part.name].material]) for part in body.parts]
+    E = sp.csr_array(sp.block_diag([e for e, _ in parts], format="csr"))
+    A0 = sp.csr_array(sp.block_diag([a for _, a in parts], format="csr"))
+    one = np.ones(body.n)
+    own = {part.name for part in body.parts}
+
+    A, theta, M = [], [], []
+    for k, film in enumerate(load.films):
+        surfaces = [(p, s) for p, s in films[film.name] if p in own]
+        if surfaces:
+            A.append(_film_matrix(body, surfaces))
+            theta.append(k)
+            M.append(A[-1] @ one)
+    for j, joint in enumerate(load.joints):
+        pair = machine.contacts[joint.name].surfaces
+        if pair is not None and split_surface(pair[0])[0] in own:
+            A.append(interface(body, *pair, where=f"contacts.{joint.name}").matrix)
+            theta.append(len(load.films) + j)
+            M.append(np.zeros(body.n))
+
+    B, sources = [], []
+    for i, source in enumerate(load.sources):
+        surface = machine.sources[source.name].surface
+        if surface is not None and split_surface(surface)[0] in own:
+            B.append(_spread(body, surface))
+            sources.append(i)
+    P, port_numbers = port_averages(body, ports)
+    sensors = _structural(machine)
+    return AffineBody(
+        name=body.name,
+        E=E,
+        A0=A0,
+        A=tuple(A),
+        theta=tuple(theta),
+        M=np.column_stack(M) if M else np.zeros((body.n, 0)),
+        B=np.column_stack(B) if B else np.zeros((body.n, 0)),
+        sources=tuple(sources),
+        P=P,
+        ports=port_numbers,
+        C=np.array(list(rows.values())) if rows else np.zeros((0, body.n)),
+        sensors=tuple(sensors.index(name) for name in rows),
+        G=np.zeros((0, 3, body.n)),
+        one=one,
+        energy=E @ one,
+    )
+
+
+def _structural(machine: Machine) -> tuple[str, ...]:
+    """Sensors on parts, not in the air."""
+    return tuple(name for name, s in machine.sensors.items() if s.environment is None)
+
+
+def _film_matrix(body: BodyMesh, surfaces: list[tuple[str, str]]) -> sp.csr_array:
+    blocks = []
+    for part in body.parts:
+        facets = [part.facets(s) for p, s in surfaces if p == part.name]
+        blocks.append(mass(part, np.concatenate(facets)) if facets else sp.csr_array((part.n, part.n)))
+    return sp.csr_array(sp.block_diag(blocks, format="csr"))
+
+
+def _spread(body: BodyMesh, surface: str) -> np.ndarray:
+    """1 W spread evenly over "part.surface": (n,), sums to 1."""
+    part_name, name = split_surface(surface)
+    part, offset = body.part(part_name)
+    found = patch(part, part.facets(name))
+    spread = np.zeros(body.n)
+    spread[offset + found.nodes] = found.mean
+    return spread
+
+
+def _sensor_rows(machine: Machine, bodies: tuple[BodyMesh, ...]) -> dict[str, dict[str, np.ndarray]]:
+    """Per body, the interpolation row (n,) of each of its sensors; DescriptionError lists all that are misplaced."""
+    rows: dict[str, dict[str, np.ndarray]] = {body.name: {} for body in bodies}
+    problems: list[Problem] = []
+    for name, sensor in machine.sensors.items():
+        if sensor.part is None or sensor.position is None:
+            continue
+        body = next(b for b in bodies if any(p.name == sensor.part for p in b.parts))
+        part, offset = body.part(sensor.part)
+        try:
+            nodes, weights = probe(part, np.array(sensor.position), f"sensors.{name}.position")
+        except TwinError as e:
+            problems += e.problems
+            continue
+        rows[body.name][name] = np.zeros(body.n)
+        rows[body.name][name][offset + nodes] = weights
+    if problems:
+        raise DescriptionError.collect(problems)
+    return rows

@@ -1,0 +1,155 @@
+"""`twin check`: everything that is wrong with a description or a run folder, before hours are spent on it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from twin.errors import LogError, Problem, TwinError
+
+if TYPE_CHECKING:
+    from twin.machine.description import Machine
+
+
+@dataclass
+class Findings:
+    """What is printed at the end."""
+
+    kind: str  # "machine" or "run"
+    path: Path
+    problems: list[Problem] = field(default_factory=list)
+    facts: dict[str, object] = field(default_factory=dict)
+
+    @property
+    def errors(self) -> int:
+        return sum(not p.warning for p in self.problems)
+
+
+@click.command(epilog="Example: twin check models/five_axis/runs/experiment_a")
+@click.argument("path", required=False, type=click.Path(path_type=Path))
+@click.option("--machine", "machine_path", type=click.Path(path_type=Path), help="Description whose signals a run must hold.")
+@click.option("--no-meshes", is_flag=True, help="Check the description only.")
+@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
+@click.option("--schema", is_flag=True, help="Print the JSON schema of machine.toml for editors, and end.")
+def command(path: Path | None, machine_path: Path | None, no_meshes: bool, as_json: bool, schema: bool) -> int:
+    """Find mistakes in PATH: a machine.toml, the folder it lies in, or a run folder.
+
+    All mistakes are shown at once, with file, key and remedy. Exit status 2 if there are errors, 0 if only warnings.
+    A run is checked against the signals of --machine, else of the machine that its run.toml names, else of the
+    machine.toml two folders up (models/NAME/runs/RUN).
+    """
+    if schema:
+        from twin.machine.load import json_schema
+
+        click.echo(json.dumps(json_schema(), indent=1))
+        return 0
+    if path is None:
+        raise click.UsageError("give the PATH of a machine.toml, its folder, or a run folder")
+    findings = _check_run(path, machine_path) if _is_run(path) else _check_machine(path, not no_meshes)
+    click.echo(_as_json(findings) if as_json else _as_text(findings))
+    return 2 if findings.errors else 0
+
+
+def _is_run(path: Path) -> bool:
+    if not path.exists():
+        raise TwinError("no such file or folder", str(path), "give a machine.toml, its folder, or a run folder")
+    if path.is_file() or (path / "machine.toml").exists():
+        return False
+    if any((path / name).exists() for name in ("run.toml", "loads.csv")):
+        return True
+    raise TwinError("neither a machine nor a run", str(path), "a machine folder holds machine.toml, a run folder run.toml and loads.csv")
+
+
+def _check_machine(path: Path, meshes: bool) -> Findings:
+    from twin.machine.check import check_machine
+    from twin.machine.load import load_machine
+
+    findings = Findings("machine", path)
+    try:
+        machine = load_machine(path)
+    except TwinError as e:
+        findings.problems += e.problems
+        return findings
+    findings.facts = {"name": machine.machine.name, "parts": len(machine.parts), "signals": len(machine.signals)}
+    findings.problems += check_machine(machine)
+    if meshes:
+        from twin.build.check_meshes import check_meshes
+
+        report = check_meshes(machine)
+        findings.problems += report.problems
+        findings.facts |= {"bodies": report.bodies, "nodes": report.nodes, "kg": round(report.mass, 1)}
+    return findings
+
+
+def _check_run(path: Path, machine_path: Path | None) -> Findings:
+    from twin.logs.check import check_run
+    from twin.logs.read import read_run
+
+    findings = Findings("run", path)
+    try:
+        run = read_run(path)
+    except LogError as e:
+        findings.problems += e.problems
+        return findings
+    time = run.loads.time
+    findings.facts = {"rows": len(time), "hours": round(float(time[-1] - time[0]) / 3600, 3), "columns": len(run.loads.columns)}
+    try:
+        machine = _machine_of(path, run.machine, machine_path)
+    except TwinError as e:
+        findings.problems += [*e.problems, *check_run(run)]
+        return findings
+    if machine is None:
+        what = "no machine is known, so its signals were not looked for"
+        findings.problems.append(Problem(what, str(path), "name it: twin check RUN --machine models/NAME", warning=True))
+        findings.problems += check_run(run)
+        return findings
+    from twin.machine.kinematics import linear_axes
+    from twin.machine.wiring import signal
+
+    findings.facts["machine"] = machine.machine.name
+    signals = tuple(signal(name, entry) for name, entry in machine.signals.items())
+    findings.problems += check_run(run, signals, linear_axes(machine), tuple(machine.sensors))
+    return findings
+
+
+def _machine_of(run: Path, named: str | None, given: Path | None) -> Machine | None:
+    from twin.machine.load import load_machine
+
+    if given is not None:
+        return load_machine(given)
+    if named is not None:
+        return load_machine(run / named)
+    beside = run.resolve().parent.parent / "machine.toml"
+    return load_machine(beside) if beside.exists() else None
+
+
+def _as_text(findings: Findings) -> str:
+    lines = [str(p) for p in findings.problems]
+    facts = ", ".join(f"{v} {k}" if not isinstance(v, str) else f"{k} {v}" for k, v in findings.facts.items())
+    warnings = len(findings.problems) - findings.errors
+    verdict = f"{_count(findings.errors, 'error')}, {_count(warnings, 'warning')}" if findings.problems else "no problems found"
+    lines.append(f"{findings.kind} {findings.path}: {verdict}" + (f" ({facts})" if facts else ""))
+    return "\n".join(lines)
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}" + ("" if n == 1 else "s")
+
+
+def _as_json(findings: Findings) -> str:
+    return json.dumps(
+        {
+            "kind": findings.kind,
+            "path": str(findings.path),
+            "ok": findings.errors == 0,
+            "facts": findings.facts,
+            "problems": [
+                {"what": p.what, "where": p.where, "remedy": p.remedy, "warning": p.warning} for p in findings.problems
+            ],
+        },
+        indent=1,
+    )

@@ -1,0 +1,123 @@
+"""The command `twin`: finds the command asked for, imports only that, and turns errors into one block and a status.
+
+Exit status: 0 done, 1 the check that the command makes has failed, 2 bad input, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import os
+import sys
+import traceback
+
+import click
+
+from twin import __version__
+from twin.errors import TwinError
+
+# name -> what `twin --help` says about it; the command object is twin.cli.NAME.command
+COMMANDS = {
+    "check": "Find mistakes in a machine description or a run folder.",
+    "simulate": "Step the full model through a run and write a run folder.",
+    "build": "Reduce a machine to an artefact with a certificate.",
+    "verify": "Test an artefact against the full model on held-out scenarios.",
+    "run": "Run an artefact on a run folder: temperatures, TCP error.",
+    "info": "Show what is in an artefact.",
+    "report": "Draw the pictures of a result.",
+    "demo": "Build, verify and run the shipped five-axis machine.",
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when called: `twin run` must not wait for the assembly of matrices."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        if name == "run":
+            # JAX calls SciPy's OpenBLAS; with its threads small factorisations take 9 to 22 ms instead of 0.1.
+            # It reads this once, when numpy is imported.
+            os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        return importlib.import_module(f"twin.cli.{name}").command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            from twin.nearest import did_you_mean
+
+            ctx.fail(f"no command '{args[0]}': {did_you_mean(args[0], COMMANDS, 'commands')}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Example: twin check models/five_axis",
+)
+@click.version_option(__version__, prog_name="twin")
+@click.option("--traceback", is_flag=True, help="Show where in the program an error arose.")
+def cli(traceback: bool) -> None:
+    """Compile a machine-tool description into a reduced thermo-elastic model and run it beside the machine.
+
+    Exit status: 0 done, 1 the check that a command makes has failed, 2 bad input.
+    """
+
+
+def main() -> None:
+    """Run the command line and exit."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command line with `arguments`; returns the exit status."""
+    try:
+        status = cli.main(args=arguments, prog_name="twin", standalone_mode=False)
+        return status if isinstance(status, int) else 0
+    except click.exceptions.Exit as e:
+        return e.exit_code
+    except click.ClickException as e:
+        e.show()
+        return 2
+    except (click.Abort, KeyboardInterrupt):
+        message, status = "interrupted, nothing half-written", 130
+    except TwinError as e:
+        message, status = str(e), 2
+    except BrokenPipeError:
+        # the reader of a pipe has gone (`twin info A.h5 | head`): nothing to complain about, nor to flush at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as e:
+        message, status = f"{e.filename or 'file system'}: {e.strerror or e}\n    remedy: {_remedy(e)}", 2
+    except ModuleNotFoundError as e:
+        if (e.name or "").partition(".")[0] == "twin":
+            raise
+        message, status = f"the package '{e.name}' is missing\n    remedy: python -m pip install 'twin[build]'", 2
+    except MemoryError:
+        message, status = "out of memory\n    remedy: use a coarser mesh, fewer states, or a machine with more memory", 2
+    if "--traceback" in arguments:
+        traceback.print_exc()
+    click.echo(message if status == 130 else f"error: {message}", err=True)
+    return status
+
+
+def _remedy(e: OSError) -> str:
+    return {
+        errno.ENOSPC: "free disk space or choose another folder; nothing half-written was left",
+        errno.EDQUOT: "your disk quota is used up: free space or choose another folder",
+        errno.EACCES: "check the permissions of the file and its folder",
+        errno.EROFS: "the file system is read-only: choose another folder",
+        errno.ENOENT: "check the path",
+    }.get(e.errno or 0, "check the file and the disk; --traceback shows where it happened")
+
+
+if __name__ == "__main__":
+    main()

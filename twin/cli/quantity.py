@@ -1,0 +1,17 @@
+"""Quantities on the command line: '60 s', '1 um'."""
+
+from __future__ import annotations
+
+from twin.errors import TwinError
+from twin.units import to_si
+
+
+def option(name: str, text: str, unit: str) -> float:
+    """The value in SI. Raises TwinError naming the option."""
+    try:
+        try:
+            return to_si(float(text), unit)
+        except ValueError:
+            return to_si(text, unit)
+    except ValueError as e:
+        raise TwinError(str(e), name, f"write a number with a unit of {unit}, for example {name} '1 {unit}'") from e

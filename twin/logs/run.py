@@ -1,0 +1,49 @@
+"""A run folder in memory: what was logged, in SI. Measured and simulated runs have one shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Table:
+    """One CSV file: a common time and named columns. SI, temperatures degC; empty cells are NaN."""
+
+    time: np.ndarray  # (n,) s since the start of the run, as logged: `check_run` tells whether it increases
+    columns: Mapping[str, np.ndarray]  # (n,) each
+    units: Mapping[str, str]  # SI unit of each column: "m", "m/s", "degC", "A", "1"
+    naive: bool = False  # ISO times without a zone, read in the zone of run.toml
+
+
+@dataclass(frozen=True)
+class Tcp:
+    """Measured or simulated deviations of the tool centre point; one row per measurement."""
+
+    time: np.ndarray  # (n,) s since the start of the run
+    axes: tuple[str, ...]  # names of the linear-axis columns
+    position: np.ndarray  # (n, n_axes) m
+    displacement: np.ndarray  # (n, 3) m, machine x, y, z
+    sigma: np.ndarray | None = None  # (n,) m, standard deviation of each component
+    naive: bool = False
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run: loads, and what was measured (or simulated) meanwhile."""
+
+    loads: Table
+    temperatures: Table | None = None
+    tcp: Tcp | None = None
+    start: datetime | None = None  # with a zone; time zero of every table. None where unknown
+    zone: str | None = None  # IANA name, "Europe/Berlin"
+    sampling: float | None = None  # s, of the loads, as stated
+    provenance: str = ""
+    synthetic: tuple[str, ...] = ()  # the tables that were computed, not measured: "loads", "temperatures", "tcp"
+    initial_temperature: float | None = None  # degC of the whole machine at the start, where known
+    machine: str | None = None  # path of the machine description, relative to the run folder
+    folder: Path = field(default=Path("."))

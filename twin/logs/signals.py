@@ -1,0 +1,61 @@
+"""The load channels a model reads, taken out of a run: by column, with the dimension checked, peaks as rms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from twin.errors import LogError, Problem
+from twin.logs.run import Run
+from twin.nearest import did_you_mean
+
+
+class SignalLike(Protocol):
+    """What of a signal's declaration matters here; `twin.rom.load_model.Signal` is one."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def column(self) -> str: ...  # header in loads.csv
+    @property
+    def unit(self) -> str: ...  # SI
+    @property
+    def kind(self) -> str: ...  # "value", "rms" or "peak"
+    @property
+    def low(self) -> float: ...  # certified range, SI, as rms where the kind is "peak"
+    @property
+    def high(self) -> float: ...
+
+
+def signal_values(run: Run, signals: Sequence[SignalLike]) -> dict[str, np.ndarray]:
+    """Values (n,) of each signal at `run.loads.time`, by the signal's name; SI, temperatures degC, missing ones NaN.
+
+    Amplitudes of sine currents (kind "peak") are divided by sqrt(2), so that laws see rms values only.
+    Raises LogError for columns that are missing or of another dimension, all at once.
+    """
+    problems = signal_problems(run, signals)
+    if problems:
+        raise LogError.collect(problems)
+    return {s.name: run.loads.columns[s.column] / (math.sqrt(2.0) if s.kind == "peak" else 1.0) for s in signals}
+
+
+def signal_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
+    """Signals without a column, and columns of the wrong dimension."""
+    where = str(run.folder / "loads.csv")
+    problems = []
+    for s in signals:
+        found = run.loads.units.get(s.column)
+        if found is None:
+            remedy = did_you_mean(s.column, run.loads.columns, "columns")
+            if run.temperatures and s.column in run.temperatures.columns:
+                remedy = "it is in temperatures.csv: signals are read from loads.csv, so copy the column there"
+            called = "" if s.column == s.name else f" (signal '{s.name}')"
+            problems.append(Problem(f"no column '{s.column}'{called}", where, remedy))
+        elif found != s.unit:
+            problems.append(
+                Problem(f"column '{s.column}' is in {found}, signal '{s.name}' in {s.unit}", where, "mend the unit in the header")
+            )
+    return problems

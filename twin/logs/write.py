@@ -1,0 +1,82 @@
+"""Writing a run folder, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from twin.atomic import atomic_folder
+from twin.errors import LogError
+from twin.logs.run import Run, Table, Tcp
+
+_FILES = {"run.toml", "loads.csv", "temperatures.csv", "tcp.csv"}
+
+
+def write_run(folder: Path, run: Run) -> None:
+    """Write `run` to `folder` in the format that `read_run` reads: SI and degC, TCP displacements in um.
+
+    Numbers keep nine digits. A run folder that only holds computed tables is replaced; `run.folder` is not looked at.
+    Raises LogError where `folder` holds measured data or other files, TwinError where it cannot be written.
+    """
+    folder = Path(folder)
+    _refuse_to_destroy(folder)
+    with atomic_folder(folder) as new:
+        (new / "run.toml").write_text(_facts(run), encoding="utf-8")
+        write_table(new / "loads.csv", run.loads)
+        if run.temperatures is not None:
+            write_table(new / "temperatures.csv", run.temperatures)
+        if run.tcp is not None:
+            write_tcp(new / "tcp.csv", run.tcp)
+
+
+def _refuse_to_destroy(folder: Path) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise LogError("is a file, not a folder", str(folder), "choose another folder with -o")
+    others = sorted({p.name for p in folder.iterdir()} - _FILES)
+    if others:
+        raise LogError(f"holds other files: {', '.join(others[:5])}", str(folder), "choose another folder with -o")
+    try:
+        facts = tomllib.loads((folder / "run.toml").read_text(encoding="utf-8"))
+        computed = facts.get("synthetic")
+    except (OSError, ValueError):
+        computed = not any(folder.iterdir())  # an empty folder may be used
+    if not computed:
+        raise LogError("holds measured data", str(folder), "choose another folder with -o; measured runs are never replaced")
+
+
+def _facts(run: Run) -> str:
+    lines = [f"start = {run.start.isoformat()}" if run.start else 'start = "unknown"']
+    for key in ("zone", "provenance", "machine"):
+        if value := getattr(run, key):
+            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+    lines += [f"sampling = {run.sampling!r}"] if run.sampling else []
+    lines += [f"initial_temperature = {run.initial_temperature!r}"] if run.initial_temperature is not None else []
+    lines.append(f"synthetic = {json.dumps(list(run.synthetic))}")
+    return "\n".join(lines) + "\n"
+
+
+def write_table(path: Path, table: Table) -> None:
+    """One table of a run folder, not atomically: the caller owns `path`."""
+    headers = ["time [s]", *(f"{name} [{table.units[name]}]" for name in table.columns)]
+    _write(path, headers, np.column_stack([table.time, *table.columns.values()]))
+
+
+def write_tcp(path: Path, tcp: Tcp) -> None:
+    """The tcp.csv of a run folder, positions in mm and displacements in um; not atomically."""
+    headers = ["time [s]", *(f"{a} [mm]" for a in tcp.axes), "dx [um]", "dy [um]", "dz [um]"]
+    columns = [tcp.time[:, None], tcp.position * 1e3, tcp.displacement * 1e6]
+    if tcp.sigma is not None:
+        headers.append("sigma [um]")
+        columns.append(tcp.sigma[:, None] * 1e6)
+    _write(path, headers, np.hstack(columns))
+
+
+def _write(path: Path, headers: list[str], rows: np.ndarray) -> None:
+    with path.open("w", encoding="utf-8", newline="\n") as f:
+        f.write(",".join(headers) + "\n")
+        np.savetxt(f, rows, fmt="%.9g", delimiter=",")

@@ -1,0 +1,73 @@
+"""What looks wrong in a description although every value is allowed: materials off by powers of ten, unused names.
+
+Checks that need meshes are in `twin.build.check_meshes`; `twin check` makes both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from twin.errors import Problem
+from twin.machine.description import Machine, Material
+
+# From polymers and foams to copper, diamond tools and Invar: wide enough for what machines are made of, narrow enough
+# to catch a factor 1000 (W/(mm K) for W/(m K), t/mm^3, MPa for Pa). Metals are bounded more closely.
+_BANDS: dict[str, tuple[float, float, str]] = {
+    "conductivity": (0.02, 2500.0, "W/(m*K)"),
+    "density": (15.0, 23_000.0, "kg/m^3"),
+    "heat_capacity": (100.0, 5000.0, "J/(kg*K)"),
+    "youngs_modulus": (1e6, 1.3e12, "Pa"),
+    "expansion": (-2e-6, 3e-4, "1/K"),
+}
+_METAL = {  # density above 2600 kg/m^3: metals, ceramics, mineral casting is below
+    "conductivity": (1.0, 450.0, "W/(m*K)"),
+    "heat_capacity": (110.0, 1100.0, "J/(kg*K)"),
+    "youngs_modulus": (1e10, 8e11, "Pa"),
+    "expansion": (-1e-6, 4e-5, "1/K"),
+}
+_FACTORS = (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9, 1e12, 1e-12, 60.0, 1 / 60.0)
+
+
+def check_machine(machine: Machine) -> list[Problem]:
+    """Errors for values that a usual unit mistake explains, warnings for the merely unusual and for what nobody uses."""
+    problems: list[Problem] = []
+    for name, material in machine.materials.items():
+        problems += _material(name, material)
+    problems += _unused(machine)
+    return problems
+
+
+def _material(name: str, material: Material) -> Iterator[Problem]:
+    bands = _BANDS | (_METAL if material.density > 2600.0 else {})
+    for key, (low, high, unit) in bands.items():
+        value = getattr(material, key)
+        if low <= value <= high:
+            continue
+        where = f"machine.toml: materials.{name}.{key}"
+        what = f"{value:g} {unit} is outside {low:g} .. {high:g} of such materials"
+        factor = next((f for f in _FACTORS if low <= value * f <= high), None)
+        if factor is None:
+            yield Problem(what, where, "check the value and its unit", warning=True)
+        elif factor in (60.0, 1 / 60.0):
+            yield Problem(what, where, "check the value; if it is right, leave it", warning=True)
+        else:
+            off = f"{1 / factor:g}" if factor < 1 else f"1/{factor:g}"
+            remedy = f"off by a factor {off}? {value * factor:g} {unit} would fit; write the unit: {key} = \"... {unit}\""
+            yield Problem(what, where, remedy)
+
+
+def _unused(machine: Machine) -> Iterator[Problem]:
+    used_materials = {p.material for p in machine.parts.values()}
+    used_signals = {a.position for a in machine.axes.values()} | {e.signal for e in machine.environment.values()}
+    for entry in (*machine.sources.values(), *machine.films.values()):
+        used_signals |= set(entry.signals.values())
+    used_environments = {f.environment for f in machine.films.values()} | {s.environment for s in machine.sensors.values()}
+    for section, names, used in (
+        ("materials", machine.materials, used_materials),
+        ("signals", machine.signals, used_signals),
+        ("environment", machine.environment, used_environments),
+    ):
+        for name in names:
+            if name not in used:
+                where = f"machine.toml: {section}.{name}"
+                yield Problem("nothing uses it", where, "remove it, or wire it to what it drives", warning=True)

@@ -1,0 +1,167 @@
+"""machine.toml -> Machine, with everything that is wrong with it reported at once."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from twin.atomic import atomic_path
+from twin.errors import DescriptionError, Problem
+from twin.machine.description import Machine, MachineEntry
+from twin.machine.references import reference_problems
+from twin.machine.schema_errors import Keys, known_keys, schema_problem
+from twin.machine.toml_lines import key_lines, line_of
+from twin.nearest import nearest
+
+
+def load_machine(path: Path) -> Machine:
+    """The machine described by the file `path`, or by machine.toml in the folder `path`; meshes are not read.
+
+    Raises DescriptionError with one problem per mistake, each with file, key, line and remedy: TOML syntax, unknown or
+    missing keys, units, names that mean nothing, laws with wrong parameters or signals, values out of range.
+    """
+    path = Path(path)
+    path = path / "machine.toml" if path.is_dir() else path
+    text = _read(path)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as e:
+        raise DescriptionError(f"not valid TOML: {e}", str(path), _syntax_remedy(text, str(e))) from e
+    except RecursionError as e:
+        raise DescriptionError("not valid TOML: nested too deeply", str(path), "close the brackets") from e
+    lines = key_lines(text)
+    found, sound = _schema_problems(data)
+    partial = _partial(data, sound, path.parent)
+    if partial is not None:
+        reported = {keys for keys, _ in found}
+        mistyped = {(*keys[:-1], close) for keys, _ in found if (close := _meant(keys, data))}
+        for problem in reference_problems(partial):
+            keys = tuple(problem.where.split("."))
+            if keys not in reported | mistyped:  # what follows from a mistake is not another mistake
+                found.append((keys, problem))
+    problems = {
+        replace(problem, where=f"{path}: {'.'.join(keys)}" + (f" (line {line})" if line else "")): line or 0
+        for keys, problem in found
+        for line in [line_of(lines, keys)]
+    }
+    if any(not p.warning for p in problems):
+        raise DescriptionError.collect(sorted(problems, key=problems.__getitem__))
+    return Machine.model_validate({**data, "folder": path.parent})
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema of machine.toml: editors complete and check with it."""
+    schema = Machine.model_json_schema()
+    schema["properties"].pop("folder")
+    schema["title"] = "twin machine description"
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def write_schema(path: Path) -> None:
+    """Write `json_schema` to a file. Raises TwinError where it cannot be written."""
+    with atomic_path(Path(path)) as temporary:
+        temporary.write_text(json.dumps(json_schema(), indent=1) + "\n", encoding="utf-8")
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+    except FileNotFoundError as e:
+        raise DescriptionError("no such file", str(path), "give the path of a machine.toml, or of its folder") from e
+    except UnicodeDecodeError as e:
+        raise DescriptionError(f"not UTF-8 at byte {e.start}", str(path), "save the file as UTF-8") from e
+    except OSError as e:
+        raise DescriptionError(f"cannot read: {e.strerror or e}", str(path), "check the path and its permissions") from e
+
+
+def _syntax_remedy(text: str, message: str) -> str:
+    line = message.rpartition("line ")[2].partition(",")[0]
+    if line.isdigit() and 0 < int(line) <= len(text.splitlines()):
+        return f"mend this line or the one before it: {text.splitlines()[int(line) - 1].strip()[:80]}"
+    return "strings need quotes, arrays a closing bracket"
+
+
+def _schema_problems(data: dict[str, Any]) -> tuple[list[tuple[Keys, Problem]], dict[str, Any]]:
+    """What the types refuse, and the description without it: unknown keys left out, broken entries None."""
+    try:
+        Machine.model_validate({k: v for k, v in data.items() if k != "folder"})
+        found: dict[Keys, Problem] = {}
+    except ValidationError as error:
+        found = {}
+        for detail in error.errors(include_url=False, include_context=False):
+            keys, problem = schema_problem(detail, data)
+            found.setdefault(keys, problem)  # every branch of a union complains; the first will do
+    if "folder" in data:
+        found["folder",] = Problem("unknown key 'folder'", "folder", "remove it")
+    sound = deepcopy(data)
+    unknown = [keys for keys in found if _has(data, keys) and keys[-1] not in (known_keys(keys[:-1]) or [keys[-1]])]
+    for keys in unknown:
+        _get(sound, keys[:-1]).pop(keys[-1])
+    for keys in found:
+        if keys not in unknown:
+            _mark_broken(sound, keys)
+    mistyped = {(*keys[:-1], _meant(keys, data)) for keys in unknown}
+    return [(keys, p) for keys, p in found.items() if keys not in mistyped or keys in unknown], sound
+
+
+def _meant(keys: Keys, data: dict[str, Any]) -> str | None:
+    """The key that an unknown one probably stands for."""
+    known = known_keys(keys[:-1])
+    return nearest(keys[-1], known) if known and _has(data, keys) and keys[-1] not in known else None
+
+
+def _get(data: Any, keys: Keys) -> Any:  # noqa: ANN401
+    for key in keys:
+        data = data[int(key)] if isinstance(data, list) else data[key]
+    return data
+
+
+def _has(data: Any, keys: Keys) -> bool:  # noqa: ANN401
+    try:
+        _get(data, keys)
+    except (KeyError, TypeError, IndexError, ValueError):
+        return False
+    return True
+
+
+def _mark_broken(data: dict[str, Any], keys: Keys) -> None:
+    """Set the named entry, or the section without named entries, that `keys` lies in to None."""
+    section = data.get(keys[0])
+    if len(keys) > 1 and isinstance(section, dict) and not known_keys(keys[:1]):
+        section[keys[1]] = None
+    else:
+        data[keys[0]] = None
+
+
+def _partial(data: dict[str, Any], sound: dict[str, Any], folder: Path) -> Machine | None:
+    """A machine of the sound entries, the broken ones None; None where there is nothing to cross-check."""
+    values: dict[str, Any] = {"folder": folder}
+    for section, field in Machine.model_fields.items():
+        if section == "folder":
+            continue
+        kept = sound.get(section)
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            values[section] = field.annotation.model_validate(kept) if kept is not None else None
+            continue
+        given = data.get(section)
+        if section in data and not isinstance(kept, dict):
+            return None  # "parts = 3": everything would look unknown
+        entry_type = field.annotation.__args__[1] if field.annotation else None  # dict[str, entry]
+        values[section] = {
+            name: _entry(entry_type, (kept or {}).get(name)) for name in (given if isinstance(given, dict) else {})
+        }
+    if values["machine"] is None:
+        values["machine"] = MachineEntry(name="?")
+    return Machine.model_construct(**values)
+
+
+def _entry(kind: Any, value: Any) -> Any:  # noqa: ANN401
+    if value is None or not (isinstance(kind, type) and issubclass(kind, BaseModel)):
+        return value
+    return kind.model_validate(value)

@@ -1,0 +1,169 @@
+"""Signals, laws, sources and films of a description as the runtime knows them: SI numbers, defaults filled in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from twin.errors import DescriptionError, Problem, TwinError
+from twin.machine import description
+from twin.machine.description import Machine
+from twin.machine.kinematics import direction
+from twin.nearest import did_you_mean, nearest
+from twin.physics.laws import LAWS, Argument
+from twin.rom.load_model import AxisWiring, LawUse, Signal, Source
+from twin.units import parse_unit, to_si
+
+
+def signal(name: str, entry: description.SignalEntry) -> Signal:
+    """A signal with its certified range in SI; amplitudes of "peak" signals as rms, as laws and checks see them.
+
+    Raises DescriptionError for an unknown unit, or a range that is empty or of another dimension.
+    """
+    where = f"signals.{name}"
+    try:
+        unit = parse_unit(entry.unit)
+    except ValueError as e:
+        raise DescriptionError(str(e), f"{where}.unit", "write it like mm, m/min, A, degC, 1/min") from e
+    ends = []
+    for end in entry.range:
+        try:
+            ends.append(to_si(end if isinstance(end, str) else f"{float(end)!r} {entry.unit}", unit.si))
+        except ValueError as e:
+            raise DescriptionError(str(e), f"{where}.range", f"numbers in {entry.unit}, or strings with a unit") from e
+    if entry.kind == "peak":
+        ends = [e / math.sqrt(2.0) for e in ends]
+    low, high = ends
+    if not low < high:
+        raise DescriptionError(f"the range {list(entry.range)} is empty", f"{where}.range", "give [low, high] with low < high")
+    return Signal(name, entry.column or name, unit.si, entry.kind, low, high)
+
+
+def environment(name: str, entry: description.Environment, machine: Machine) -> tuple[str, str, float]:
+    """(name, signal or "", constant degC) of an environment. Raises DescriptionError unless exactly one is given."""
+    where = f"environment.{name}"
+    if (entry.signal is None) == (entry.temperature is None):
+        raise DescriptionError(
+            "give either a signal or a temperature", where, 'signal = "shop_air" or temperature = "20 degC"'
+        )
+    if entry.signal is None:
+        return name, "", float(entry.temperature or 0.0)
+    expect_signal(entry.signal, "degC", f"{where}.signal", machine)
+    return name, entry.signal, machine.machine.reference_temperature
+
+
+def axis(name: str, machine: Machine) -> AxisWiring:
+    """A linear axis. Raises DescriptionError for an empty stroke, a zero direction, or a position that is no length."""
+    entry = machine.axes[name]
+    expect_signal(entry.position, "m", f"axes.{name}.position", machine)
+    low, high = entry.stroke
+    if not low < high:
+        raise DescriptionError(
+            f"the stroke {list(entry.stroke)} m is empty", f"axes.{name}.stroke", "give [low, high] with low < high"
+        )
+    x, y, z = (float(d) for d in direction(machine, name))
+    return AxisWiring(name, (x, y, z), low, high, entry.position)
+
+
+def source(name: str, entry: description.Source, machine: Machine) -> Source:
+    """A source. Raises DescriptionError with all problems of its place and its law."""
+    where = f"sources.{name}"
+    if (entry.surface is None) == (entry.contact is None):
+        raise DescriptionError(
+            "give either a surface or a contact", where, 'surface = "part.surface" or contact = "x_guide"'
+        )
+    contact = machine.contacts.get(entry.contact) if entry.contact else None
+    if entry.contact is not None and (entry.contact not in machine.contacts or (contact and contact.kind != "moving")):
+        moving = [c for c, other in machine.contacts.items() if other and other.kind == "moving"]
+        remedy = did_you_mean(entry.contact, moving, "moving contacts")
+        raise DescriptionError(f"unknown moving contact '{entry.contact}'", f"{where}.contact", remedy)
+    use = law_use(entry.law, "loss", entry.parameters, entry.signals, where, machine)
+    return Source(name, use, entry.gain, entry.contact or "", entry.rail_share)
+
+
+def film_law(name: str, entry: description.Film, machine: Machine) -> LawUse:
+    """The law of a film. Raises DescriptionError with all problems of its environment and its law."""
+    where = f"films.{name}"
+    problems = []
+    if entry.environment not in machine.environment:
+        remedy = did_you_mean(entry.environment, machine.environment, "environments")
+        problems.append(Problem(f"unknown environment '{entry.environment}'", f"{where}.environment", remedy))
+    try:
+        use = law_use(entry.law, "film", entry.parameters, entry.signals, where, machine)
+    except TwinError as e:
+        raise DescriptionError.collect([*problems, *e.problems]) from e
+    if problems:
+        raise DescriptionError.collect(problems)
+    return use
+
+
+def law_use(
+    law_name: str,
+    kind: str,
+    parameters: Mapping[str, float | str],
+    signals: Mapping[str, str],
+    where: str,
+    machine: Machine,
+) -> LawUse:
+    """A law with parameters in SI, defaults filled in, and its signals. Raises DescriptionError with all problems."""
+    law = LAWS.get(law_name)
+    if law is None or law.kind != kind:
+        known = [n for n, row in LAWS.items() if row.kind == kind]
+        raise DescriptionError(f"'{law_name}' is no {kind} law", f"{where}.law", did_you_mean(law_name, known, f"{kind} laws"))
+    problems = _names(law_name, parameters, law.parameters, f"{where}.parameters", "parameters")
+    problems += _names(law_name, signals, law.signals, f"{where}.signals", "signals")
+    values: dict[str, float] = {}
+    for name, argument in law.parameters.items():
+        given = parameters.get(name, argument.default)
+        if given is None:
+            continue
+        at = f"{where}.parameters.{name}"
+        try:
+            values[name] = to_si(given, argument.unit)
+        except ValueError as e:
+            problems.append(Problem(str(e), at, f"{argument.meaning}, in {argument.unit}"))
+            continue
+        if not argument.low <= values[name] <= argument.high:
+            bounds = f"{argument.low:g} .. {argument.high:g} {argument.unit}"
+            problems.append(Problem(f"{values[name]:g} is outside {bounds}", at, f"{argument.meaning}: check the unit"))
+    for name, argument in law.signals.items():
+        if name in signals:
+            try:
+                expect_signal(signals[name], argument.unit, f"{where}.signals.{name}", machine)
+            except TwinError as e:
+                problems += e.problems
+    if problems:
+        raise DescriptionError.collect(problems)
+    return LawUse(law_name, values, {name: signals[name] for name in law.signals})
+
+
+def _names(
+    law: str, given: Iterable[str], arguments: Mapping[str, Argument], where: str, what: str
+) -> list[Problem]:
+    """Unknown names, and names without a default that are not given."""
+    given = list(given)
+    problems = [
+        Problem(f"law '{law}' has no '{name}'", f"{where}.{name}", did_you_mean(name, arguments, what))
+        for name in given
+        if name not in arguments
+    ]
+    mistyped = {nearest(name, arguments) for name in given if name not in arguments}
+    for name, argument in arguments.items():
+        if name not in given and name not in mistyped and argument.default is None:
+            problems.append(Problem(f"law '{law}' needs '{name}'", where, f"{argument.meaning}, in {argument.unit}"))
+    return problems
+
+
+def expect_signal(name: str, si: str, where: str, machine: Machine) -> None:
+    """Raise DescriptionError unless `name` is a signal whose unit has the dimension of `si`."""
+    if name not in machine.signals:
+        raise DescriptionError(f"unknown signal '{name}'", where, did_you_mean(name, machine.signals, "signals"))
+    entry = machine.signals[name]
+    try:
+        found = parse_unit(entry.unit).si if entry else si
+    except ValueError:
+        return  # reported with the signal itself
+    if found != si:
+        raise DescriptionError(
+            f"signal '{name}' is in {entry.unit}, expected a unit of {si}", where, "wire another signal, or mend its unit"
+        )

@@ -1,0 +1,1 @@
+"""Pictures of results: temperatures, TCP error, distorted workspace, coloured surface. Needs no display."""

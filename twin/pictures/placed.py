@@ -1,0 +1,49 @@
+"""The machine as it stands at given axis positions, and the poses of its grid as points in space."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from twin.machine.bodies import bodies_of, body_of, split_surface
+from twin.machine.description import Machine
+from twin.machine.kinematics import displacement
+from twin.pictures.surface import SurfaceMesh
+from twin.rom.artefact import Artefact, SurfaceField
+
+
+def described(artefact: Artefact) -> Machine:
+    """The description that the artefact was built from."""
+    return Machine.model_validate(tomllib.loads(artefact.description))
+
+
+def placed_surface(machine: Machine, fields: Sequence[SurfaceField], positions: Mapping[str, float]) -> SurfaceMesh:
+    """All bodies' surfaces with every linear axis at its position [m]; points in the order of `fields`."""
+    points = [f.nodes + displacement(machine, f.body, dict(positions)) for f in fields]
+    first = np.cumsum([0, *(len(p) for p in points)])
+    triangles = np.vstack([f.triangles + n for f, n in zip(fields, first, strict=False)])
+    return SurfaceMesh(np.vstack(points), triangles, parts_of(triangles, int(first[-1])))
+
+
+def parts_of(triangles: np.ndarray, n_points: int) -> np.ndarray:
+    """Connected piece (m,) of each triangle (m, 3): parts share no vertices, so this tells them apart."""
+    links = coo_array(
+        (
+            np.ones(2 * len(triangles)),
+            (np.r_[triangles[:, 0], triangles[:, 1]], np.r_[triangles[:, 1], triangles[:, 2]]),
+        ),
+        (n_points, n_points),
+    )
+    return connected_components(links, directed=False)[1][triangles[:, 0]]
+
+
+def poses_in_space(machine: Machine, axes: Sequence[str], poses: np.ndarray) -> np.ndarray:
+    """The tool's place as seen from the work (n_poses, 3) [m] at poses (n_poses, n_axes) [m]; zero at position zero."""
+    bodies = bodies_of(machine)
+    tool, work = (body_of(bodies, split_surface(side.surface)[0]).name for side in (machine.tcp.tool, machine.tcp.work))
+    per_metre = np.array([displacement(machine, tool, {a: 1.0}) - displacement(machine, work, {a: 1.0}) for a in axes])
+    return poses @ per_metre.reshape(len(axes), 3)

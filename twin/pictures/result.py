@@ -1,0 +1,64 @@
+"""What the pictures need of a result.h5, read with h5py alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from twin.errors import TwinError
+from twin.rom.artefact import Artefact
+from twin.rom.hdf5_file import strings
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A result, n + 1 step edges."""
+
+    hours: np.ndarray  # (n + 1,) h since the start
+    sensors: tuple[str, ...]
+    temperature: np.ndarray  # (n + 1, n_sensors) degC
+    axes: tuple[str, ...]
+    position: np.ndarray  # (n + 1, n_axes) m
+    pose_axes: tuple[str, ...]
+    poses: np.ndarray  # (n_poses, n_pose_axes) m
+    tcp: np.ndarray  # (n + 1, n_poses, 3) m
+    tcp_actual: np.ndarray  # (n + 1, 3) m
+    outside: np.ndarray  # (n + 1,) bool: the step that ends here was flagged
+    states: np.ndarray  # (n + 1, N) artefact coordinates
+
+    def at(self, hours: float) -> int:
+        """The edge nearest to a time [h]."""
+        return int(np.abs(self.hours - hours).argmin())
+
+    def position_at(self, edge: int) -> dict[str, float]:
+        return dict(zip(self.axes, self.position[edge].tolist(), strict=True))
+
+
+def read_result(folder: Path, artefact: Artefact) -> Drawn:
+    """The result in `folder`. Raises TwinError where there is none, or none of this artefact."""
+    path = Path(folder) / "result.h5"
+    remedy = "make it with: twin run ARTEFACT RUN -o OUT"
+    if not path.is_file():
+        raise TwinError("no result here", str(path), remedy)
+    try:
+        with h5py.File(path, "r") as f:
+            if f.attrs.get("artefact") != artefact.digest:
+                raise TwinError("a result of another artefact", str(path), remedy)
+            return Drawn(
+                hours=(f["time"][...] - f["time"][0]) / 3600.0,
+                sensors=strings(f["sensor"]),
+                temperature=f["temperature"][...],
+                axes=strings(f["axis"]),
+                position=f["position"][...],
+                pose_axes=strings(f["pose_axis"]),
+                poses=f["pose_position"][...],
+                tcp=f["tcp"][...],
+                tcp_actual=f["tcp_actual"][...],
+                outside=np.concatenate([[False], f["flags"][...].any(axis=1)]),
+                states=f["states"][...],
+            )
+    except (OSError, KeyError) as e:
+        raise TwinError("not a readable result of `twin run`", str(path), remedy) from e

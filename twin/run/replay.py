@@ -1,0 +1,185 @@
+"""A run replayed on the reduced machine: loads in, temperatures, TCP error and heat balance out."""
+
+from __future__ import annotations
+
+import twin.run.jax_setup  # noqa: F401  isort: skip
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+
+from twin.errors import TwinError
+from twin.logs.run import Run
+from twin.logs.signals import signal_values
+from twin.progress import Progress, silent
+from twin.rom.artefact import Artefact
+from twin.rom.drive import Drive, evaluate
+from twin.rom.poses import Kind, pose_weights
+from twin.run.checkpoint import CheckpointFolder, Steps, chain
+from twin.run.results import Result
+from twin.run.stepping import Inputs, advance, inputs_of, observe
+from twin.run.system import Prepared, prepare
+
+# Steps go through in blocks of one size, the last one padded: one compiled function for runs of any length, and the
+# same arithmetic, bit by bit, wherever a run is taken up again.
+BLOCK = 64
+
+
+def replay(
+    artefact: Artefact,
+    run: Run,
+    dt: float = 60.0,
+    substeps: int = 4,
+    initial: float | np.ndarray | None = None,
+    checkpoints: CheckpointFolder | None = None,
+    progress: Progress = silent,
+    interpolation: Kind = "cubic",
+) -> Result:
+    """Step the artefact's model through the loads of a run.
+
+    dt [s] and substeps: implicit Euler with dt/substeps, outputs every dt. initial: temperature of the whole machine
+    [degC], or a state (N,) in artefact coordinates (`Result.state`, `twin.run.results.read_final_state`); by default
+    the run's own initial temperature, else the first mean of the first environment. interpolation: between poses, for
+    the TCP error at the actual position.
+
+    Raises LogError for missing signals and bad times, TwinError for checkpoints of another run.
+    """
+    model = artefact.model
+    signals = signal_values(run, model.load_model.signals)
+    drive = evaluate(model.load_model, run.loads.time, signals, dt)
+    if initial is None:
+        initial = run.initial_temperature if run.initial_temperature is not None else float(drive.environment[0, 0])
+    first = [signals[axis.position] for axis in model.load_model.axes]
+    position = np.array([values[np.argmax(np.isfinite(values))] for values in first])
+    return replay_drive(artefact, drive, position, substeps, initial, checkpoints, progress, interpolation)
+
+
+def replay_drive(
+    artefact: Artefact,
+    drive: Drive,
+    position: np.ndarray,
+    substeps: int,
+    initial: float | np.ndarray,
+    checkpoints: CheckpointFolder | None = None,
+    progress: Progress = silent,
+    interpolation: Kind = "cubic",
+) -> Result:
+    """The same for loads that are evaluated already; position (n_axes,) [m] at the start. See `replay`."""
+    model = artefact.model
+    prepared = prepare(model)
+    start = prepared.uniform(initial) if isinstance(initial, float | int) else prepared.from_artefact(initial)
+    steps = march(prepared, inputs_of(model.load_model, drive, substeps), start, artefact.digest, checkpoints, progress)
+    states = np.concatenate([start[None], steps.z])
+    temperature, tcp = _observe(prepared, states)
+    air = drive.environment[:, [i for _, i in model.ambient_sensors]]
+    positions = np.concatenate([position[None], drive.position])
+    axes = [a.name for a in model.load_model.axes]
+    weights, outside = pose_weights(
+        model.pose_grid, positions[:, [axes.index(a) for a in model.pose_axes]], interpolation
+    )
+    flags = {"position outside the pose grid, TCP error of its border": outside[1:] | outside[:-1]}
+    certified = artefact.certificate.get("step")
+    if certified is not None:
+        flags[f"step shorter than the certified {certified:g} s"] = np.diff(drive.time) < 0.999 * float(certified)
+    throughput = np.diff(drive.time) * (np.abs(drive.power).sum(axis=1) + np.abs(steps.film).sum(axis=1))
+    residual = steps.stored - np.diff(drive.time) * (drive.power.sum(axis=1) + steps.film.sum(axis=1))
+    return Result(
+        time=drive.time,
+        sensors=(*model.sensors, *(name for name, _ in model.ambient_sensors)),
+        temperature=np.hstack([temperature, np.concatenate([air[:1], air])]),
+        pose_axes=model.pose_axes,
+        poses=model.poses,
+        tcp=tcp,
+        axes=tuple(axes),
+        position=positions,
+        tcp_actual=np.einsum("np,npc->nc", weights, tcp),
+        sources=tuple(s.name for s in model.load_model.sources),
+        power=drive.power,
+        films=tuple(f.name for f in model.load_model.films),
+        film_heat=steps.film,
+        stored=steps.stored,
+        balance_error=np.abs(residual) / np.maximum(throughput, 1e-6 * prepared.heat_capacity),
+        flags=np.column_stack([drive.flags, *flags.values()]),
+        flag_names=(*drive.flag_names, *flags),
+        states=prepared.to_artefact(states),
+        artefact=artefact.digest,
+        substeps=substeps,
+    )
+
+
+def march(
+    prepared: Prepared,
+    inputs: Inputs,
+    start: np.ndarray,
+    identity: str = "",
+    checkpoints: CheckpointFolder | None = None,
+    progress: Progress = silent,
+) -> Steps:
+    """All steps of `inputs` from state `start` (N,); `identity` names the model in checkpoints.
+
+    Raises TwinError for checkpoints of another run and for checkpoints that cannot be read or written.
+    """
+    n_steps = len(inputs.changed)
+    key = chain(identity, start, np.array(BLOCK), np.array(inputs.substeps))
+    done: list[Steps] = []
+    first, z = 0, start
+    if checkpoints is not None and checkpoints.resume:
+        for begin, steps, saved in checkpoints.load():
+            end = begin + len(steps.stored)
+            expected = chain(key, *jax.tree.leaves(_part(inputs, begin, end))) if end <= n_steps else ""
+            if begin != first or saved != expected or end % BLOCK:
+                break
+            done.append(steps)
+            first, z, key = end, steps.z[-1], saved
+        if first == 0 and checkpoints.load():
+            raise TwinError(
+                "the checkpoints are of another run, artefact or step",
+                str(checkpoints.folder),
+                "run without --resume to start afresh, or with the options of the interrupted run",
+            )
+    elif checkpoints is not None:
+        checkpoints.clear()
+    fresh: list[Steps] = []
+    with progress("time steps", -(-(n_steps - first) // BLOCK)) as advanced:
+        for begin in range(first, n_steps, BLOCK):
+            end = min(begin + BLOCK, n_steps)
+            states, heat = advance(prepared.layout, prepared.system, z, _block(inputs, begin, end))
+            steps = Steps(*(np.asarray(a)[: end - begin] for a in (states, heat.film, heat.stored)))
+            done.append(steps)
+            fresh.append(steps)
+            z = steps.z[-1]
+            if checkpoints is not None and end - first >= checkpoints.every and end - begin == BLOCK:
+                key = chain(key, *jax.tree.leaves(_part(inputs, first, end)))
+                checkpoints.save(first, Steps.join(fresh), key)
+                first, fresh = end, []
+            advanced(f"{end} of {n_steps}")
+    return Steps.join(done)
+
+
+def _part(inputs: Inputs, begin: int, end: int) -> Inputs:
+    """Some of the stacked steps; the first one factorises."""
+    part = jax.tree.map(lambda a: a[begin:end], inputs)
+    return replace(part, changed=np.concatenate([[True], part.changed[1:]]))
+
+
+def _block(inputs: Inputs, begin: int, end: int) -> Inputs:
+    """The steps padded to BLOCK with copies of the last one, which change no factor."""
+    part = _part(inputs, begin, end)
+    missing = BLOCK - (end - begin)
+    if missing == 0:
+        return part
+    padded = jax.tree.map(lambda a: np.concatenate([a, np.repeat(a[-1:], missing, axis=0)]), part)
+    return replace(padded, changed=np.concatenate([part.changed, np.zeros(missing, dtype=bool)]))
+
+
+def _observe(prepared: Prepared, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Structural sensors (n, n_sensors) degC and TCP displacements (n, n_poses, 3) m, in blocks of one size."""
+    results = []
+    for begin in range(0, len(states), BLOCK):
+        block = states[begin : begin + BLOCK]
+        padded = np.concatenate([block, np.zeros((BLOCK - len(block), states.shape[1]))])
+        temperature, tcp = observe(prepared.system, padded)
+        results.append((np.asarray(temperature)[: len(block)], np.asarray(tcp)[: len(block)]))
+    temperatures, tcps = zip(*results, strict=True)
+    return np.concatenate(temperatures), np.concatenate(tcps)

@@ -1,0 +1,195 @@
+"""A reduced machine prepared for stepping: coordinates with E = 1 and contacts by body.
+
+A change of coordinates z = L^T x with E = L L^T (Cholesky) makes the capacity matrix the identity, so that a step needs
+no product with it and the row that reads off the stored heat is also the test vector of the heat balance:
+1^T E = energy^T. Oblique bodies are multiplied by E^-1 from the left instead. Outputs do not change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import twin.run.jax_setup  # noqa: F401  isort: skip
+
+import jax
+import numpy as np
+
+from twin.rom.model import AffineBody, MachineModel
+from twin.run.block_factor import Elimination, plan
+
+Array = jax.Array | np.ndarray
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Pairs whose rail and pad are on the same two bodies."""
+
+    rail_body: int
+    pad_body: int
+    pairs: tuple[int, ...]  # index in LoadModel.pairs
+    rail_first: tuple[int, ...]  # per pair: first local port of its rail on the rail body
+    rail_count: tuple[int, ...]  # per pair: segments of its rail
+    pad_ports: tuple[int, ...]  # per pair: local port on the pad body
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the compiled step is specialised on: sizes and places, no numbers. Hashable."""
+
+    symmetric: bool
+    sizes: tuple[int, ...]  # states per body
+    ports: tuple[tuple[int, ...], ...]  # per body: its ports (global index), increasing
+    terms: tuple[tuple[int, ...], ...]  # per body: index into theta of its affine terms
+    couplings: tuple[Coupling, ...]
+    elimination: Elimination  # of the coupled matrix, body by body
+    n_films: int
+
+    @property
+    def offsets(self) -> tuple[int, ...]:
+        """First state of each body, and the number of all states."""
+        return (0, *np.cumsum(self.sizes).tolist())
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class System:
+    """Numbers of a machine in coordinates with E = 1; N states of all bodies one after the other."""
+
+    A0: tuple[Array, ...]  # per body (n, n) 1/s
+    A: tuple[Array, ...]  # per body (n_terms, n, n)
+    P: tuple[Array, ...]  # per body (n, n_ports): port heat in
+    port_rows: tuple[Array, ...]  # per body (n_ports, n): port temperatures out
+    M: Array  # (N, n_theta): heat of 1 K of environment temperature; zero columns for joints
+    B: Array  # (N, n_sources)
+    film_environment: Array  # (n_theta,) int: environment of each film; 0 for joints, whose M is zero
+    film_area: Array  # (n_theta,) m^2
+    film_rows: Array  # (n_theta, N) m^2: film_rows @ z = area times mean surface temperature rise
+    energy: Array  # (N,) stored heat [J] = energy @ z
+    C: Array  # (n_sensors, N)
+    G: Array  # (n_poses * 3, N)
+    one: Array  # (N,) the field that is 1 K everywhere
+    reference_temperature: Array  # () degC
+
+
+def _normalised(body: AffineBody) -> tuple[AffineBody, np.ndarray]:
+    """The body in coordinates z with E = 1, and X with x = X z."""
+    if body.symmetric:
+        L = np.linalg.cholesky(body.E)
+        X = np.linalg.inv(L).T
+        left = X.T
+    else:
+        X = np.eye(body.n)
+        left = np.linalg.inv(body.E)
+    return (
+        AffineBody(
+            name=body.name,
+            E=np.eye(body.n),
+            A0=left @ body.A0 @ X,
+            A=tuple(left @ a @ X for a in body.A),
+            theta=body.theta,
+            M=left @ body.M,
+            B=left @ body.B,
+            sources=body.sources,
+            P=left @ body.P,
+            ports=body.ports,
+            C=body.C @ X,
+            sensors=body.sensors,
+            G=body.G @ X,
+            one=np.linalg.solve(X, body.one),
+            energy=X.T @ body.energy,
+            P_out=None if body.symmetric else X.T @ body.port_rows.T,
+        ),
+        X,
+    )
+
+
+def _couplings(model: MachineModel, ports: tuple[tuple[int, ...], ...]) -> tuple[Coupling, ...]:
+    load = model.load_model
+    owner = {port: b for b, of_body in enumerate(ports) for port in of_body}
+    groups: dict[tuple[int, int], list[int]] = {}
+    for k, pair in enumerate(load.pairs):
+        groups.setdefault((owner[load.rails[pair.rail].first_port], owner[pair.pad_port]), []).append(k)
+    couplings = []
+    for (r, p), pairs in groups.items():
+        rails = [load.rails[load.pairs[k].rail] for k in pairs]
+        first = tuple(ports[r].index(rail.first_port) for rail in rails)
+        count = tuple(len(rail.stations) for rail in rails)
+        pads = tuple(ports[p].index(load.pairs[k].pad_port) for k in pairs)
+        couplings.append(Coupling(r, p, tuple(pairs), first, count, pads))
+    return tuple(couplings)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A machine ready to be stepped."""
+
+    layout: Layout
+    system: System  # on the device
+    back: tuple[np.ndarray, ...]  # per body X (n, n): artefact coordinates x = X z
+    heat_capacity: float  # J/K of the whole machine
+
+    def to_artefact(self, z: np.ndarray) -> np.ndarray:
+        """States (..., N) in the coordinates of the artefact, bodies one after the other."""
+        parts = np.split(z, self.layout.offsets[1:-1], axis=-1)
+        return np.concatenate([part @ X.T for part, X in zip(parts, self.back, strict=True)], axis=-1)
+
+    def from_artefact(self, x: np.ndarray) -> np.ndarray:
+        """The inverse of `to_artefact` for one state (N,)."""
+        parts = np.split(x, self.layout.offsets[1:-1])
+        return np.concatenate([np.linalg.solve(X, part) for part, X in zip(parts, self.back, strict=True)])
+
+    def uniform(self, temperature: float) -> np.ndarray:
+        """The state (N,) of a machine at one temperature [degC]."""
+        return (temperature - float(self.system.reference_temperature)) * np.asarray(self.system.one)
+
+
+def prepare(model: MachineModel) -> Prepared:
+    """Change a dense machine to coordinates with E = 1 and put it on the device."""
+    bodies, back = zip(*(_normalised(b) for b in model.bodies), strict=True)
+    load = model.load_model
+    order = [np.argsort(b.ports, kind="stable") for b in bodies]
+    ports = tuple(tuple(int(b.ports[i]) for i in o) for b, o in zip(bodies, order, strict=True))
+    couplings = _couplings(model, ports)
+    layout = Layout(
+        symmetric=all(b.symmetric for b in bodies),
+        sizes=tuple(b.n for b in bodies),
+        ports=ports,
+        terms=tuple(tuple(int(k) for k in b.theta) for b in bodies),
+        couplings=couplings,
+        elimination=plan(len(bodies), {(c.rail_body, c.pad_body) for c in couplings}),
+        n_films=len(load.films),
+    )
+    N, n_theta, offsets = model.n, len(load.theta_names), layout.offsets
+    M, B, film_rows = np.zeros((N, n_theta)), np.zeros((N, len(load.sources))), np.zeros((n_theta, N))
+    C, G = np.zeros((len(model.sensors), N)), np.zeros((3 * len(model.poses), N))
+    film_area = np.zeros(n_theta)
+    for b, body in enumerate(bodies):
+        rows = slice(offsets[b], offsets[b + 1])
+        for column, k in enumerate(body.theta):
+            if k >= len(load.films):
+                continue
+            M[rows, k] = body.M[:, column]
+            film_rows[k, rows] = body.energy @ body.A[column]
+            film_area[k] += body.energy @ body.M[:, column]
+        B[rows, list(body.sources)] = body.B
+        C[list(body.sensors), rows] = body.C
+        G[:, rows] = body.G.reshape(-1, body.n)
+    environment = [f.environment for f in load.films] + [0] * len(load.joints)
+    system = System(
+        A0=tuple(b.A0 for b in bodies),
+        A=tuple(np.array(b.A).reshape(-1, b.n, b.n) for b in bodies),
+        P=tuple(b.P[:, o] for b, o in zip(bodies, order, strict=True)),
+        port_rows=tuple(b.port_rows[o] for b, o in zip(bodies, order, strict=True)),
+        M=M,
+        B=B,
+        film_environment=np.array(environment, dtype=np.int64),
+        film_area=film_area,
+        film_rows=film_rows,
+        energy=np.concatenate([b.energy for b in bodies]),
+        C=C,
+        G=G,
+        one=np.concatenate([b.one for b in bodies]),
+        reference_temperature=np.array(model.reference_temperature),
+    )
+    capacity = float(np.asarray(system.energy) @ np.asarray(system.one))
+    return Prepared(layout, jax.device_put(system), back, capacity)
