@@ -22,9 +22,9 @@ $(READY): requirements.lock pyproject.toml
 	    echo "$(PYTHON) is not Python 3.11 or 3.12; name one: make PYTHON=/path/to/python3.11 ..."; exit 2; }
 	@[ -x $(BIN)/python ] || "$(PYTHON)" -m venv $(VENV) || { \
 	    rm -rf $(VENV); echo "cannot make .venv (Debian: apt-get install python3-venv)"; exit 2; }
-	@echo "installing the pinned dependencies into $(VENV) (about 350 MB of downloads the first time)"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@echo "installing the pinned dependencies into $(VENV) (some hundred MB of downloads the first time)"
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
 .PHONY: setup

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.five_axis import full, machine
-from twin.build.coupled_direct import coupled_rows
+from twin.build.coupled_direct import assemble_coupled
 from twin.build.pipeline import VERIFY_SEED
 from twin.build.scenario import draw
 from twin.build.stepper import CoupledStepper, tcp_at_poses
@@ -18,8 +18,9 @@ def main() -> None:
     low = np.array([g[0] for g in model.pose_grid])
     high = np.array([g[-1] for g in model.pose_grid])
     worst = 0.0
+    coupled = assemble_coupled(machine(), full().bodies)
     for position in rng.uniform(low, high, (5, len(low))):
-        direct = coupled_rows(machine(), full().bodies, dict(zip(model.pose_axes, position, strict=True)))
+        direct = coupled.rows(position)
         ours = [G[0] for G in structure.pose_rows(position[None, :])]
         error = max(np.abs(a - b).max() for a, b in zip(ours, direct, strict=True))
         worst = max(worst, error / max(np.abs(b).max() for b in direct))
@@ -31,7 +32,7 @@ def main() -> None:
         fields.append(CoupledStepper(model).steady_state(scenario.drive, scenario.drive.n_steps // 2))
     positions = rng.uniform(low, high, (200, len(low)))
     exact = [
-        np.array([structure.displacement(dict(zip(model.pose_axes, p, strict=True)), tuple(x)) for p in positions])
+        np.array([structure.displacement(p, tuple(x)) for p in positions])
         for x in fields
     ]
     grids = [tcp_at_poses(model, x) for x in fields]

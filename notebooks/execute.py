@@ -12,6 +12,7 @@ from pathlib import Path
 
 import jupytext
 import nbformat
+from jupyter_client.manager import AsyncKernelManager
 from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError
 
@@ -22,8 +23,9 @@ def execute(text: Path) -> None:
     """Run `text` in a fresh kernel in the repository's root and write the outputs to the paired notebook."""
     notebook = jupytext.read(text)
     notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3", "language": "python"}
-    client = NotebookClient(notebook, timeout=1200, kernel_name="python3", resources={"metadata": {"path": HERE.parent}})
-    client.execute()
+    root = {"metadata": {"path": HERE.parent}}
+    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")  # no ports: nothing to open or to clash
+    NotebookClient(notebook, km=kernel, timeout=1200, resources=root).execute()
     for number, cell in enumerate(notebook.cells):  # nothing that differs from one execution to the next
         cell.id = f"cell-{number}"
         cell.metadata.pop("execution", None)
@@ -41,7 +43,8 @@ def main(names: list[str]) -> int:
         except CellExecutionError as e:
             print(f"{text.name}: a cell failed\n{e}", file=sys.stderr)
             return 1
-        print(f"{text.name}: executed in {time.perf_counter() - start:.0f} s, written to {text.with_suffix('.ipynb').name}")
+        seconds = time.perf_counter() - start
+        print(f"{text.name}: executed in {seconds:.0f} s, written to {text.with_suffix('.ipynb').name}")
     return 0
 
 

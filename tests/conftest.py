@@ -12,3 +12,32 @@ for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 ROOT = Path(__file__).parents[1]
 # Builds are keyed by their inputs and by the code that makes them: a second test run finds them here.
 os.environ.setdefault("TWIN_CACHE", str(ROOT / ".cache" / "tests"))
+
+import pytest  # noqa: E402 - after the threads are set
+
+
+@pytest.fixture(scope="session")
+def slide_artefact(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A.h5 of the small machine, built with few scenarios; do not write to it."""
+    from twin.build.pipeline import BuildOptions
+    from twin.build.product import build_artefact
+    from twin.build.rich_basis import RichOptions
+
+    path = tmp_path_factory.mktemp("slide") / "slide.h5"
+    options = BuildOptions(states=120, training=4, held_out=2, hours=1.0, rich=RichOptions(samples=6))
+    build_artefact(ROOT / "tests" / "machines" / "slide", path, options)
+    return path
+
+
+@pytest.fixture(scope="session")
+def slide_result(slide_artefact: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that `twin run` leaves for the small machine's short run; do not write to it."""
+    from twin.logs.read import read_run
+    from twin.rom.artefact import read_artefact
+    from twin.run.replay import replay
+    from twin.run.results import write_results
+
+    folder = tmp_path_factory.mktemp("slide_result")
+    run = read_run(ROOT / "tests" / "machines" / "slide" / "runs" / "short")
+    write_results(folder, replay(read_artefact(slide_artefact), run), {})
+    return folder

@@ -49,11 +49,11 @@ def atomic_folder(target: Path) -> Iterator[Path]:
             os.replace(target, old)
         os.replace(temporary, target)
     except OSError as e:
-        if old.exists() and not target.exists():
-            os.replace(old, target)
         raise TwinError(
             f"cannot write: {e.strerror or e}", str(target), "free disk space or choose another folder with -o"
         ) from e
     finally:
+        if old.exists() and not target.exists():  # interrupted between the two renames
+            os.replace(old, target)
         shutil.rmtree(temporary, ignore_errors=True)
         shutil.rmtree(old, ignore_errors=True)

@@ -20,4 +20,6 @@ def did_you_mean(name: str, known: Iterable[str], what: str) -> str:
     known = list(known)
     close = nearest(name, known)
     listed = ", ".join(known[:_LISTED]) + (f" and {len(known) - _LISTED} more" if len(known) > _LISTED else "")
-    return (f"did you mean '{close}'? " if close else "") + (f"{what} are: {listed}" if known else f"there are no {what}")
+    return (f"did you mean '{close}'? " if close else "") + (
+        f"{what} are: {listed}" if known else f"there are no {what}"
+    )

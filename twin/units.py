@@ -18,7 +18,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pint
 
-_ANGLES = {"radian", "degree", "revolution", "turn", "revolutions_per_minute", "revolutions_per_second", "arcminute", "arcsecond"}
+_ANGLES = {
+    "radian",
+    "degree",
+    "revolution",
+    "turn",
+    "revolutions_per_minute",
+    "revolutions_per_second",
+    "arcminute",
+    "arcsecond",
+}
 
 
 @dataclass(frozen=True)
@@ -38,7 +47,16 @@ _TABLE: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254},
     "m/s": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "m/min": 1 / 60, "mm/min": 1e-3 / 60, "in/min": 0.0254 / 60},
     "m/s^2": {"m/s^2": 1.0, "mm/s^2": 1e-3},
-    "1/s": {"1/s": 1.0, "Hz": 1.0, "rps": 1.0, "rev/s": 1.0, "1/min": 1 / 60, "rpm": 1 / 60, "rev/min": 1 / 60, "1/h": 1 / 3600},
+    "1/s": {
+        "1/s": 1.0,
+        "Hz": 1.0,
+        "rps": 1.0,
+        "rev/s": 1.0,
+        "1/min": 1 / 60,
+        "rpm": 1 / 60,
+        "rev/min": 1 / 60,
+        "1/h": 1 / 3600,
+    },
     "rad": {"rad": 1.0, "deg": math.pi / 180, "mrad": 1e-3, "urad": 1e-6, "arcsec": math.pi / 648000},
     "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180, "rad/min": 1 / 60, "deg/min": math.pi / 10800},
     "A": {"A": 1.0, "mA": 1e-3},
@@ -68,9 +86,9 @@ _KNOWN = {text: Unit(text, si, factor) for si, row in _TABLE.items() for text, f
     "degF": Unit("degF", "degC", 5 / 9, -160 / 9),
 }
 _SPELLING = {
-    "°C": "degC", "°F": "degF", "℃": "degC", "°/": "deg/", "°": "deg", "µ": "u", "μ": "u", "Ω": "ohm", "·": "*", "⋅": "*",
-    "×": "*", "²": "^2", "³": "^3", "⁻¹": "^-1", "**": "^", "‰": "permille", " ": "", "U/min": "1/min", "min-1": "1/min",
-    "min^-1": "1/min", "s-1": "1/s",
+    "°C": "degC", "°F": "degF", "℃": "degC", "°/": "deg/", "°": "deg", "µ": "u", "μ": "u", "Ω": "ohm",
+    "·": "*", "⋅": "*", "×": "*", "²": "^2", "³": "^3", "⁻¹": "^-1", "**": "^", "‰": "permille", " ": "",
+    "U/min": "1/min", "min-1": "1/min", "min^-1": "1/min", "s-1": "1/s",
 }  # fmt: skip
 
 
@@ -123,7 +141,7 @@ def _ask_pint(text: str) -> Unit:
     return Unit(text, _si_name(one), float(one.magnitude))
 
 
-def _si_name(one: Any) -> str:  # noqa: ANN401 - a pint quantity
+def _si_name(one: Any) -> str:
     """The table's name of the dimension of a pint quantity, else its base units."""
     return _dimensions().get(one.dimensionality) or f"{one.units:~C}" or "1"
 
@@ -141,7 +159,7 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re
 
 
 def to_si(value: float | int | str, unit: str) -> float:
-    """`value` as a number in `unit` ("m", "W/(m^2*K)"; "degC" for points on the temperature scale, "K" for differences).
+    """`value` as a number in `unit` ("m", "W/(m^2*K)"; "degC" for points on the scale, "K" for differences).
 
     A bare number is taken to be in `unit` already. Raises ValueError naming the expected unit.
     """

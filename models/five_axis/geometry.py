@@ -52,17 +52,15 @@ def build(solid: Solid, size: float) -> int:
     return volumes[0][1]
 
 
-def _as_region(named: Patch | Region) -> Region:
-    if isinstance(named, Region):
-        return named
-    columns = list(zip(*named.polygon, strict=True))
-    return Region(named.name, tuple(map(min, columns)), tuple(map(max, columns)))
+def _as_region(patch: Patch) -> Region:
+    x, y, z = zip(*patch.polygon, strict=True)
+    return Region(patch.name, (min(x), min(y), min(z)), (max(x), max(y), max(z)))
 
 
 def name_faces(solid: Solid, volume: int) -> dict[str, list[int]]:
     """Face tags under each surface name. Raises RuntimeError for a name without a face."""
-    regions = [_as_region(n) for n in (*solid.patches, *solid.regions)]
-    faces: dict[str, list[int]] = {r.name: [] for r in regions} | {solid.rest: []}
+    regions = [*map(_as_region, solid.patches), *solid.regions]
+    faces: dict[str, list[int]] = {name: [] for name in (*(r.name for r in regions), solid.rest)}
     for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False):
         box = gmsh.model.getBoundingBox(2, tag)
         inside = (

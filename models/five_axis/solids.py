@@ -97,17 +97,17 @@ def bed() -> Solid:
 
 def column() -> Solid:
     """Hollow box with two horizontal ribs, tapered behind, open at the back through three windows."""
-    half, back, top_back, knee, wall = 0.45, -0.95, -0.70, 0.95, 0.06
+    half, back, top_back, knee, wall = 0.45, -0.95, -0.70, 0.95, 0.07
     slope = (top_back - back) / (COLUMN_TOP - knee)
 
     def back_at(y: float) -> float:
         return back + max(0.0, y - knee) * slope
 
-    inner_front = COLUMN_FRONT - 0.07
+    inner_front = COLUMN_FRONT - 0.09
     floors = (COLUMN_BOTTOM, knee + 0.03, 1.53, COLUMN_TOP)
     cells, windows = [], []
     for low, high in pairwise(floors):
-        y0, y1 = low + wall, high - (wall if high == COLUMN_TOP else 0.0)
+        y0, y1 = low + wall, high - (0.09 if high == COLUMN_TOP else 0.0)
         side = [(inner_front, y0), (inner_front, y1), (back_at(y1) + wall, y1), (back_at(y0) + wall, y0)]
         if y0 < knee < y1:
             side.insert(3, (back + wall, knee))
@@ -134,7 +134,7 @@ def column() -> Solid:
             *(Patch(f"y_rail_{i}_seat", rectangle(around(x, RAIL_WIDTH), Y_SPAN, COLUMN_FRONT))
               for i, x in enumerate(Y_RAILS, 1)),
             Patch("y_screw_seat", rectangle(around(0, SCREW), Y_SCREW_SPAN[1], around(Y_SCREW_Z, SCREW))),
-            Patch("y_motor", rectangle(around(0, MOTOR), COLUMN_TOP, (COLUMN_FRONT - 0.14, -0.27))),
+            Patch("y_motor", rectangle(around(0, 0.44), COLUMN_TOP, (-0.66, -0.42))),  # drives the screw by a belt
         ),
         regions=(
             *(region(f"pad_{i}", x, COLUMN_BOTTOM - PAD_HEIGHT, z) for i, (x, z) in enumerate(pads, 1)),

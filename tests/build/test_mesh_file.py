@@ -34,7 +34,9 @@ def cylinder(rings: int = 8, layers: int = 3, quadratic: bool = True) -> meshio.
     which[middle[2] < 1e-9], which[middle[2] > 2 - 1e-9], which[middle[0] > 1 - 1e-9] = 1, 2, 3
     triangles = corners.T
     if quadratic:
-        triangles = np.hstack([triangles, np.stack([_middle(mesh, triangles[:, [i, (i + 1) % 3]]) for i in range(3)], 1)])
+        triangles = np.hstack(
+            [triangles, np.stack([_middle(mesh, triangles[:, [i, (i + 1) % 3]]) for i in range(3)], 1)]
+        )
     kind = ("tetra10", "triangle6") if quadratic else ("tetra", "triangle")
     return meshio.Mesh(
         bent,
@@ -207,7 +209,9 @@ def test_surface_meshes_and_hexahedra_are_refused(tmp_path: Path):
     assert "other solids: hexahedron" in fault(cube, tmp_path / "c.msh")
 
 
-@pytest.mark.parametrize(("name", "content"), [("c.msh", b"$MeshFormat\n4.1 0"), ("c.xyz", b""), ("c.vtu", b"<VTKFile")])
+@pytest.mark.parametrize(
+    ("name", "content"), [("c.msh", b"$MeshFormat\n4.1 0"), ("c.xyz", b""), ("c.vtu", b"<VTKFile")]
+)
 def test_files_that_cannot_be_read_are_refused(tmp_path: Path, name: str, content: bytes):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(DescriptionError, match="cannot be read as a mesh"):

@@ -48,7 +48,7 @@ def test_film_ranges_look_at_every_corner():
     use = LawUse("forced_film", {"natural": 5.0, "forced": 10.0, "exponent": 1.0}, {"speed": "v"})
     assert film_range(use, {"v": Signal("v", "v", "m/s", "value", 1.0, 3.0)}, "films.a") == (7.5, 70.0)
     assert film_range(use, {"v": Signal("v", "v", "m/s", "value", -3.0, 1.0)}, "films.a") == (2.5, 70.0)
-    with pytest.raises(DescriptionError, match="gives 5 .. inf") as e:
+    with pytest.raises(DescriptionError, match=r"gives 5 \.\. inf") as e:
         film_range(use, {"v": Signal("v", "v", "m/s", "value", 0.0, np.inf)}, "films.a")
     assert e.value.problems[0].where == "films.a"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.machine.test_load import SLIDE, edited
+from tests.support.descriptions import SLIDE, edited
 from twin.machine.check import check_machine
 from twin.machine.load import load_machine
 
@@ -18,7 +18,12 @@ def test_the_slide_has_nothing_odd():
 @pytest.mark.parametrize(
     ("old", "new", "place", "right"),
     [
-        ('conductivity = "45 W/(m*K)"', 'conductivity = "45 W/(mm*K)"', "materials.steel.conductivity", "45 W/(m*K) would fit"),
+        (
+            'conductivity = "45 W/(m*K)"',
+            'conductivity = "45 W/(mm*K)"',
+            "materials.steel.conductivity",
+            "45 W/(m*K) would fit",
+        ),
         ('conductivity = "45 W/(m*K)"', "conductivity = 0.045", "materials.steel.conductivity", "45 W/(m*K) would fit"),
         ('density = "7850 kg/m^3"', "density = 7.85", "materials.steel.density", "7850 kg/m^3 would fit"),
         ('youngs_modulus = "210 GPa"', "youngs_modulus = 210e3", "materials.steel.youngs_modulus", "would fit"),

@@ -24,7 +24,7 @@ def five_axis() -> Machine:
 
     return SLIDE.model_copy(
         update={
-            "parts": {name: block for name in ("bed", "column", "head", "table", "cover")},
+            "parts": dict.fromkeys(("bed", "column", "head", "table", "cover"), block),
             "axes": {
                 "X": Axis(direction=(2, 0, 0), stroke=(-0.4, 0.4), carries=("column",), position="x_position"),
                 "Y": Axis(direction=(0, 0, 1), stroke=(-0.4, 0.4), carries=("head",), position="x_position"),

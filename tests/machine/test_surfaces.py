@@ -12,7 +12,7 @@ from twin.machine.load import load_machine
 from twin.machine.surfaces import film_surfaces
 
 SLIDE = load_machine(Path(__file__).parents[1] / "machines" / "slide")
-NAMES = {part: BOX_SURFACES for part in SLIDE.parts}
+NAMES = dict.fromkeys(SLIDE.parts, BOX_SURFACES)
 
 
 def with_film(name: str, *surfaces: str) -> Machine:

@@ -58,14 +58,34 @@ def test_table_agrees_with_pint():
     from twin.units import _TABLE
 
     pint_units = pint.UnitRegistry()
-    ours = {"%", "permille", "-", "", "rps", "Nm", "W/mK", "W/m^2K", "J/kgK", "mohm", "delta_degF", "ppm/K", "h", "d", "1", "t", "C"}
+    ours = {
+        "%",
+        "permille",
+        "-",
+        "",
+        "rps",
+        "Nm",
+        "W/mK",
+        "W/m^2K",
+        "J/kgK",
+        "mohm",
+        "delta_degF",
+        "ppm/K",
+        "h",
+        "d",
+        "1",
+        "t",
+        "C",
+    }
     for si, row in _TABLE.items():
         if si.startswith("rad"):
             continue
         for text, factor in row.items():
             if text in ours or "rev" in text or text == "rpm":
                 continue
-            expected = pint_units.Quantity(1, text).to(pint_units.parse_units(si if si != "K" else "delta_degC")).magnitude
+            expected = (
+                pint_units.Quantity(1, text).to(pint_units.parse_units(si if si != "K" else "delta_degC")).magnitude
+            )
             assert factor == pytest.approx(expected, rel=1e-12), text
 
 
@@ -78,5 +98,6 @@ def test_si_names():
 
 
 def test_common_units_do_not_import_pint():
-    code = "import sys; from twin.units import to_si, parse_unit; to_si('3 m/min', 'm/s'); parse_unit('°C'); sys.exit('pint' in sys.modules)"
+    use = "from twin.units import to_si, parse_unit; to_si('3 m/min', 'm/s'); parse_unit('°C')"
+    code = f"import sys; {use}; sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

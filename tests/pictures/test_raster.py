@@ -72,11 +72,19 @@ def test_outlines_run_between_groups_and_not_through_a_plane():
     triangles = np.vstack([TRIANGLES, TRIANGLES[:, ::-1] + 4])  # opposite winding: still one plane
     raster = rasterise(points, triangles, FRONT, 200)
     n = normals(points, triangles)
-    silhouette = outline(raster, n, np.zeros(4, dtype=int))
-    parted = outline(raster, n, np.array([0, 0, 1, 1]))
+    silhouette = outline(raster, n, np.zeros(4, dtype=int), FRONT)
+    parted = outline(raster, n, np.array([0, 0, 1, 1]), FRONT)
     inner = slice(20, -20)
     assert not silhouette[inner, 60:140].any()
     assert parted[inner, 60:140].any(axis=1).all()
+
+
+def test_a_plane_seen_at_a_grazing_angle_has_no_inner_outline():
+    tilted = np.array([[0, 0, 0], [40, 1, 0], [40, 1, 1], [0, 0, 1]], dtype=float)  # 40 pixels deep per pixel
+    raster = rasterise(tilted, TRIANGLES, FRONT, 200)
+    edge = outline(raster, normals(tilted, TRIANGLES), np.zeros(2, dtype=int), FRONT)
+    assert raster.covered[100, 60:140].all()
+    assert not edge[20:-20, 20:-20].any()
 
 
 def test_shading_does_not_depend_on_the_winding():

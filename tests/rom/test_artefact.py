@@ -102,6 +102,16 @@ def test_opens_in_xarray(path):
     assert body["G"].attrs["units"] == "m/K"
 
 
+def test_the_digest_is_that_of_the_model(path, tmp_path):
+    digest = read_artefact(path).digest
+    write_artefact(tmp_path / "b.h5", MODEL, certificate={"step": 60.0}, created=datetime(2030, 1, 1, tzinfo=UTC))
+    assert read_artefact(tmp_path / "b.h5").digest == digest
+    bodies = (dataclasses.replace(MODEL.bodies[0], A0=MODEL.bodies[0].A0 * (1 + 1e-15)), *MODEL.bodies[1:])
+    gains = dataclasses.replace(MODEL.load_model, joints=())
+    for other in (dataclasses.replace(MODEL, bodies=bodies), dataclasses.replace(MODEL, load_model=gains)):
+        assert read_artefact(write(tmp_path / "c.h5", other)).digest != digest
+
+
 def test_bodies_keep_their_order(tmp_path):
     names = ("slide", "bed", "table")
     bodies = tuple(dataclasses.replace(b, name=n) for b, n in zip(MODEL.bodies, names, strict=True))

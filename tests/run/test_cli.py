@@ -92,7 +92,7 @@ def test_info(inputs):
         assert word in told.output
     facts = json.loads(call(info, inputs[0], "--json").output)
     assert facts["states"] == MODEL.n
-    assert facts["sha256"] == read_artefact(inputs[0]).digest
+    assert facts["model_sha256"] == read_artefact(inputs[0]).digest
     assert facts["certified_ranges"]["signals"]["x_current"] == {
         "low": 0.0,
         "high": 20.0,

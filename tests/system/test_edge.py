@@ -46,6 +46,7 @@ def test_edge_commands_show_their_help_without_the_workshop(command):
 def test_the_list_of_commands_needs_neither_numpy_nor_jax():
     done = python(
         "import sys\nfrom twin.cli.main import run\nstatus = run(['--help'])\n"
-        "heavy = {'numpy', 'jax', 'scipy', 'pint', 'h5py'} & set(sys.modules)\nprint(heavy)\nsys.exit(status or len(heavy))"
+        "heavy = {'numpy', 'jax', 'scipy', 'pint', 'h5py'} & set(sys.modules)\nprint(heavy)\n"
+        "sys.exit(status or len(heavy))"
     )
     assert done.returncode == 0, done.stdout + done.stderr

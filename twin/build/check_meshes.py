@@ -58,7 +58,8 @@ def check_meshes(machine: Machine) -> MeshReport:
 
 
 def _load(machine: Machine) -> tuple[dict[str, PartMesh], list[Problem]]:
-    parts, problems = {}, []
+    parts: dict[str, PartMesh] = {}
+    problems: list[Problem] = []
     for name, part in machine.parts.items():
         try:
             parts[name] = load_part_mesh(name, part, machine.folder)
@@ -82,7 +83,9 @@ def _size(machine: Machine, part: PartMesh) -> Iterator[Problem]:
     shown = f"{' x '.join(f'{e:.4g}' for e in extent)} m and {mass:.3g} kg"
     where = f"parts.{part.name}"
     if extent.max() > LARGEST or mass > HEAVIEST:
-        remedy = "box sizes are in m: write \"800 mm\"" if entry.box else 'the mesh is in millimetres: write mesh_unit = "mm"'
+        remedy = (
+            'box sizes are in m: write "800 mm"' if entry.box else 'the mesh is in millimetres: write mesh_unit = "mm"'
+        )
         yield Problem(f"part '{part.name}' measures {shown}", where, remedy)
     elif extent.max() < SMALLEST:
         remedy = f'is the mesh already in m? mesh_unit is "{entry.mesh_unit}"' if entry.mesh else "box sizes are in m"
@@ -154,8 +157,8 @@ def _travel(machine: Machine, ports: ContactPorts) -> Iterator[Problem]:
         beyond = max(first - min(ends), max(ends) - last)
         if beyond > tolerance:
             yield Problem(
-                f"pad '{ports.names[pair.pad_port]}' runs {beyond * 1e3:.3g} mm beyond the end stations of rail '{rail.name}'"
-                f" ({first:.4g} .. {last:.4g} m along axis '{axis}') within the stroke",
+                f"pad '{ports.names[pair.pad_port]}' runs {beyond * 1e3:.3g} mm beyond the end stations of rail"
+                f" '{rail.name}' ({first:.4g} .. {last:.4g} m along axis '{axis}') within the stroke",
                 f"contacts.{pair.contact}",
                 "stations are the centres of the segments: use more segments, a longer rail, or a shorter stroke",
             )
@@ -167,22 +170,38 @@ def _plane(rail: str, pad: str, along: np.ndarray, where: str, parts: dict[str, 
     size_r, size_p = float(np.linalg.norm(r.normal)), float(np.linalg.norm(p.normal))
     if size_r < 0.9 or size_p < 0.9:
         curved = rail if size_r < 0.9 else pad
-        yield Problem(f"'{curved}' is not flat, so its normal is not defined", where, "set stiffness.normal = 0, or name a flat face")
+        yield Problem(
+            f"'{curved}' is not flat, so its normal is not defined",
+            where,
+            "set stiffness.normal = 0, or name a flat face",
+        )
         return
     normal = r.normal / size_r
     if abs(normal @ along) > 0.02:
         yield Problem(f"'{rail}' is not parallel to the axis", where, "check axes.*.direction and the surface's name")
     if normal @ p.normal > -0.95 * size_p:
-        yield Problem(f"'{pad}' does not face '{rail}'", where, "name the pad's face that looks at the rail, and the rail's towards the pad")
+        yield Problem(
+            f"'{pad}' does not face '{rail}'",
+            where,
+            "name the pad's face that looks at the rail, and the rail's towards the pad",
+        )
         return
     offset = p.centroid - r.centroid
     gap = float(offset @ normal)
     if abs(gap) > PLANE_GAP:
-        yield Problem(f"'{pad}' lies {gap * 1e3:.3g} mm off the plane of '{rail}'", where, "move one of the parts: pads lie on their rails")
+        yield Problem(
+            f"'{pad}' lies {gap * 1e3:.3g} mm off the plane of '{rail}'",
+            where,
+            "move one of the parts: pads lie on their rails",
+        )
     across = np.cross(normal, along)
     reach = np.sqrt(3.0 * (across @ r.second_moment @ across)) + np.sqrt(3.0 * (across @ p.second_moment @ across))
     if abs(offset @ across) > reach:
-        yield Problem(f"'{pad}' lies {abs(offset @ across) * 1e3:.3g} mm beside '{rail}'", where, "pair the pad with the rail below it")
+        yield Problem(
+            f"'{pad}' lies {abs(offset @ across) * 1e3:.3g} mm beside '{rail}'",
+            where,
+            "pair the pad with the rail below it",
+        )
 
 
 def _patch(surface: str, parts: dict[str, PartMesh]) -> Patch:
@@ -195,7 +214,9 @@ def _grounded(machine: Machine, bodies: tuple[Body, ...]) -> Iterator[Problem]:
     stiffness = np.sum([s.stiffness for s in machine.supports.values()], axis=0)
     for component, k in zip("xyz", np.atleast_1d(stiffness), strict=False):
         if not k > 0:
-            yield Problem(f"no support holds the machine along {component}", "supports", f"give a stiffness along {component}")
+            yield Problem(
+                f"no support holds the machine along {component}", "supports", f"give a stiffness along {component}"
+            )
     reached = {body_of(bodies, split_surface(s.surface)[0]).name for s in machine.supports.values()}
     joined = [(a, b) for _, a, b in moving_contacts(machine, bodies)]
     while new := {y for a, b in joined for x, y in ((a, b), (b, a)) if x in reached} - reached:
@@ -210,9 +231,17 @@ def _grounded(machine: Machine, bodies: tuple[Body, ...]) -> Iterator[Problem]:
 def _driven(machine: Machine) -> Iterator[Problem]:
     for axis in linear_axes(machine):
         pairs = [c.stiffness for c in machine.contacts.values() if c.kind == "moving" and c.axis == axis]
-        for key, what in (("axial", "drives it (screw and nut)"), ("normal", "carries it"), ("lateral", "guides it sideways")):
+        for key, what in (
+            ("axial", "drives it (screw and nut)"),
+            ("normal", "carries it"),
+            ("lateral", "guides it sideways"),
+        ):
             if pairs and not any(getattr(s, key) > 0 for s in pairs):
-                yield Problem(f"axis '{axis}': no contact {what}", f"axes.{axis}", f'give a contact of the axis stiffness = {{ {key} = "200 N/um" }}')
+                yield Problem(
+                    f"axis '{axis}': no contact {what}",
+                    f"axes.{axis}",
+                    f'give a contact of the axis stiffness = {{ {key} = "200 N/um" }}',
+                )
 
 
 def _sensors(machine: Machine, parts: dict[str, PartMesh]) -> Iterator[Problem]:
@@ -264,12 +293,23 @@ def _tcp(machine: Machine, bodies: tuple[Body, ...], parts: dict[str, PartMesh])
     sides = {side: getattr(machine.tcp, side).surface for side in ("tool", "work")}
     tool, work = (body_of(bodies, split_surface(s)[0]) for s in sides.values())
     if tool == work and len(bodies) > 1:
-        yield Problem(f"tool and work are both on body '{tool.name}'", "tcp", "one side holds the tool, the other the workpiece", warning=True)
+        yield Problem(
+            f"tool and work are both on body '{tool.name}'",
+            "tcp",
+            "one side holds the tool, the other the workpiece",
+            warning=True,
+        )
     for side, surface in sides.items():
         p = _patch(surface, parts)
-        distance = float(np.linalg.norm(np.asarray(machine.tcp.tool.point) - p.centroid)) if machine.tcp.tool.point else 0.0
+        distance = (
+            float(np.linalg.norm(np.asarray(machine.tcp.tool.point) - p.centroid)) if machine.tcp.tool.point else 0.0
+        )
         if side == "tool" and distance > 1.0:
             yield Problem(f"the tool centre point is {distance:.3g} m away from '{surface}'", "tcp.tool.point",
                           "it is given in machine coordinates, all axes at zero", warning=True)  # fmt: skip
         if np.linalg.eigvalsh(p.second_moment)[1] < 1e-8:
-            yield Problem(f"'{surface}' is too narrow to read a tilt from", f"tcp.{side}.surface", "name a face of some millimetres")
+            yield Problem(
+                f"'{surface}' is too narrow to read a tilt from",
+                f"tcp.{side}.surface",
+                "name a face of some millimetres",
+            )

@@ -13,8 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from twin.build.mesh import BodyMesh
+from twin.build.mesh import BodyMesh, PartMesh
 from twin.build.surface import Patch, patch, segments
+from twin.errors import DescriptionError
+from twin.machine.bodies import split_surface
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
@@ -54,7 +56,10 @@ class RailPort:
 
 @dataclass
 class PortTable:
-    """Collects the ports of all bodies; asking twice for the same port gives the same columns."""
+    """Collects the ports of all bodies; asking twice for the same port gives the same columns.
+
+    Its methods raise DescriptionError for surfaces that do not exist.
+    """
 
     bodies: tuple[BodyMesh, ...]
     names: list[list[str]] = field(default_factory=list)
@@ -110,13 +115,15 @@ class PortTable:
             result.append(coo_array((values, (dofs, port)), shape=(3 * body.n, len(rows))).tocsr())
         return tuple(result)
 
-    def _surface(self, surface: str):  # noqa: ANN202 - (body index, node offset, PartMesh, facets)
-        name, _, face = surface.partition(".")
+    def _surface(self, surface: str) -> tuple[int, int, PartMesh, np.ndarray]:
+        """Body, first node of the part within it, part and facets of a "part.surface"."""
+        name, face = split_surface(surface)
         for i, body in enumerate(self.bodies):
             if any(part.name == name for part in body.parts):
                 part, offset = body.part(name)
                 return i, offset, part, part.facets(face)
-        raise AssertionError(f"no body has part '{name}'; the description was not checked")
+        known = ", ".join(part.name for body in self.bodies for part in body.parts)
+        raise DescriptionError(f"unknown part in '{surface}'", "machine.toml", f"parts are: {known}")
 
     def _patch(self, surface: str) -> tuple[int, int, Patch]:
         body, offset, part, facets = self._surface(surface)

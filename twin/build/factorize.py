@@ -224,7 +224,7 @@ class _Amg(Factor):
         import pyamg
 
         self.n = A.shape[0]
-        self._A = sp.csr_matrix(A)
+        self._A = sp.csr_matrix(A, copy=True)
         elastic = null_space is not None and null_space.shape[1] >= 3 and self.n % 3 == 0
         sweep: tuple[str, dict[str, Any]] = ("gauss_seidel", {"sweep": "symmetric"})
         if elastic:

@@ -1,7 +1,7 @@
 """One body seen from its elastic ports: factored once, then a few dense numbers per port.
 
-A body floats: its stiffness is singular. Six statically determinate node supports (3-2-1) make it regular, and since all
-loads of a body together are in equilibrium (heat pushes nothing, springs balance), these supports carry no force: the
+A body floats: its stiffness is singular. Six statically determinate node supports (3-2-1) make it regular. All loads of
+a body together are in equilibrium (heat pushes nothing, springs balance), so these supports carry no force, and the
 displacement is the supported one plus a rigid motion,
 
     u = K_s^-1 (K_uT T + U p) + modes a,      w = U^T u = H T + F p + R a
@@ -32,7 +32,7 @@ class BodyFlexibility:
     name: str
     ports: tuple[str, ...]
     F: np.ndarray  # (p, p) m/N (or rad/(N m) ...): port displacement of the supported body per port force
-    R: np.ndarray  # (p, 6) port displacement per rigid motion (translation [m], rotation about the machine origin [rad])
+    R: np.ndarray  # (p, 6) port displacement per translation [m] and rotation about the machine origin [rad]
     H: np.ndarray  # (p, n) m/K: port displacement of the supported body per nodal temperature
 
 

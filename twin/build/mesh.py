@@ -155,9 +155,8 @@ def load_body_meshes(machine: Machine) -> tuple[BodyMesh, ...]:
 
 def skfem_mesh(file: TetraFile) -> Mesh:
     """MeshTet1 or MeshTet2 of a file whose points are all used; vertex numbers keep the order of the points."""
-    if file.tetra.shape[1] == 4:
-        return MeshTet1(file.points.T, file.tetra.T)
-    return MeshTet2(file.points.T, file.tetra.T)  # scikit-fem's edge order is VTK's and meshio's
+    points, tetra = np.ascontiguousarray(file.points.T), np.ascontiguousarray(file.tetra.T)
+    return MeshTet1(points, tetra) if len(tetra) == 4 else MeshTet2(points, tetra)  # edges in the order of VTK, meshio
 
 
 def _order(mesh: Mesh) -> int:

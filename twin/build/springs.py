@@ -1,9 +1,9 @@
 """The springs between bodies and to the ground, and the TCP, as rows over port displacements at an axis position.
 
-A moving contact's pad sits at station s on its rail; with the weights w_i(s) of eq (1) of paper 000 the rail moves there
-by sum w_i u_i, as if it were a point at c = sum w_i c_i. The gap compares it with the pad's rigid motion at that same
-point, so a linear displacement field common to both opens no gap, and a force on the pad and its opposite on the segments
-have no resultant and no moment, at every position.
+A moving contact's pad sits at coordinate s on its rail. With the weights w_i(s) of eq (1) of paper 000 the rail moves
+there by sum w_i u_i, like a point at c = sum w_i c_i. The gap compares this with the pad's rigid motion at that point:
+a motion common to both opens no gap, and a force on the pad and its opposite on the segments have neither resultant
+nor moment, at every position.
 """
 
 from __future__ import annotations
@@ -126,7 +126,8 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
         names += [f"supports.{name}.{'xyz'[a]}" for a in stiff]
         stiffness += [support.stiffness[a] for a in stiff]
     if machine.tcp.tool.point is None:
-        raise DescriptionError("the tool has no point", "tcp.tool.point", "give the tool centre point at axis positions zero")
+        remedy = "give the tool centre point at axis positions zero"
+        raise DescriptionError("the tool has no point", "tcp.tool.point", remedy)
     tool, work = ports.rigid(machine.tcp.tool.surface), ports.rigid(machine.tcp.work.surface)
     axes = linear_axes(machine)
     shifts = np.array([[displacement(machine, b.name, {a: 1.0}) for a in axes] for b in bodies])
@@ -157,13 +158,12 @@ def _guide(
 
 
 def _directions(along: np.ndarray, normal: np.ndarray, k: StiffnessOfPair, where: str) -> dict[str, np.ndarray]:
-    """Unit vectors axial, normal and lateral of a pair. A nut around its screw has no normal: any radial pair will do."""
+    """Unit vectors axial, normal and lateral of a pair. A nut around its screw has no normal: any will do."""
     across = normal - (normal @ along) * along
-    if np.linalg.norm(across) < PLANE * max(np.linalg.norm(normal), PLANE):
-        if np.linalg.norm(normal) > PLANE and (k.normal > 0 or k.lateral > 0):
-            raise DescriptionError(
-                "the pad's normal points along the axis", where, "name the face that slides, or correct the axis direction"
-            )
+    if float(np.linalg.norm(across)) < PLANE:
+        if float(np.linalg.norm(normal)) > PLANE and (k.normal > 0 or k.lateral > 0):
+            remedy = "name the face that slides, or correct the axis direction"
+            raise DescriptionError("the pad's normal points along the axis", where, remedy)
         if k.normal != k.lateral:
             raise DescriptionError(
                 "the pad has no normal (a cylinder?), but its normal and lateral stiffness differ",

@@ -58,7 +58,10 @@ class Structure:
         return tuple(part for part, _ in self._split(t + f.T @ J))
 
     def pose_rows(self, poses: np.ndarray) -> tuple[np.ndarray, ...]:
-        """G per body (n_poses, 3, n_nodes_b) [m/K]: the TCP displacement is sum_b G_b T_b; poses (n_poses, n_axes) [m]."""
+        """G per body (n_poses, 3, n_nodes_b) [m/K], the TCP displacement being sum_b G_b T_b.
+
+        poses (n_poses, n_axes) [m].
+        """
         stacked = [np.array(z) for z in zip(*(self.rows(p) for p in poses), strict=True)]
         return tuple(
             (z.reshape(-1, z.shape[2]) @ body.H).reshape(len(poses), 3, -1)

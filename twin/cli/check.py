@@ -12,7 +12,17 @@ import click
 from twin.errors import LogError, Problem, TwinError
 
 if TYPE_CHECKING:
-    from twin.machine.description import Machine
+    from twin.rom.load_model import Signal
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What a machine wants of its runs."""
+
+    machine: str
+    signals: tuple[Signal, ...]
+    axes: tuple[str, ...]  # linear
+    sensors: tuple[str, ...]
 
 
 @dataclass
@@ -31,7 +41,12 @@ class Findings:
 
 @click.command(epilog="Example: twin check models/five_axis/runs/experiment_a")
 @click.argument("path", required=False, type=click.Path(path_type=Path))
-@click.option("--machine", "machine_path", type=click.Path(path_type=Path), help="Description whose signals a run must hold.")
+@click.option(
+    "--machine",
+    "machine_path",
+    type=click.Path(path_type=Path),
+    help="Description or artefact to check a run against.",
+)
 @click.option("--no-meshes", is_flag=True, help="Check the description only.")
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
 @click.option("--schema", is_flag=True, help="Print the JSON schema of machine.toml for editors, and end.")
@@ -61,7 +76,11 @@ def _is_run(path: Path) -> bool:
         return False
     if any((path / name).exists() for name in ("run.toml", "loads.csv")):
         return True
-    raise TwinError("neither a machine nor a run", str(path), "a machine folder holds machine.toml, a run folder run.toml and loads.csv")
+    raise TwinError(
+        "neither a machine nor a run",
+        str(path),
+        "a machine folder holds machine.toml, a run folder run.toml and loads.csv",
+    )
 
 
 def _check_machine(path: Path, meshes: bool) -> Findings:
@@ -96,42 +115,68 @@ def _check_run(path: Path, machine_path: Path | None) -> Findings:
         findings.problems += e.problems
         return findings
     time = run.loads.time
-    findings.facts = {"rows": len(time), "hours": round(float(time[-1] - time[0]) / 3600, 3), "columns": len(run.loads.columns)}
+    findings.facts = {
+        "rows": len(time),
+        "hours": round(float(time[-1] - time[0]) / 3600, 3),
+        "columns": len(run.loads.columns),
+    }
     try:
-        machine = _machine_of(path, run.machine, machine_path)
+        expected = _expected(path, run.machine, machine_path)
     except TwinError as e:
         findings.problems += [*e.problems, *check_run(run)]
         return findings
-    if machine is None:
+    if expected is None:
         what = "no machine is known, so its signals were not looked for"
-        findings.problems.append(Problem(what, str(path), "name it: twin check RUN --machine models/NAME", warning=True))
-        findings.problems += check_run(run)
+        remedy = "name it: twin check RUN --machine models/NAME, or --machine A.h5"
+        findings.problems += [Problem(what, str(path), remedy, warning=True), *check_run(run)]
         return findings
-    from twin.machine.kinematics import linear_axes
-    from twin.machine.wiring import signal
-
-    findings.facts["machine"] = machine.machine.name
-    signals = tuple(signal(name, entry) for name, entry in machine.signals.items())
-    findings.problems += check_run(run, signals, linear_axes(machine), tuple(machine.sensors))
+    findings.facts["machine"] = expected.machine
+    findings.problems += check_run(run, expected.signals, expected.axes, expected.sensors)
     return findings
 
 
-def _machine_of(run: Path, named: str | None, given: Path | None) -> Machine | None:
-    from twin.machine.load import load_machine
-
+def _expected(run: Path, named: str | None, given: Path | None) -> Expected | None:
     if given is not None:
-        return load_machine(given)
+        return _of_artefact(given) if given.suffix == ".h5" else _of_description(given)
     if named is not None:
-        return load_machine(run / named)
+        return _of_description(run / named)
     beside = run.resolve().parent.parent / "machine.toml"
-    return load_machine(beside) if beside.exists() else None
+    if not beside.exists():
+        return None
+    try:
+        return _of_description(beside)
+    except ModuleNotFoundError:  # an edge computer reads no descriptions, and was not asked to
+        return None
+
+
+def _of_description(path: Path) -> Expected:
+    from twin.machine.kinematics import linear_axes
+    from twin.machine.load import load_machine
+    from twin.machine.wiring import signal
+
+    machine = load_machine(path)
+    signals = tuple(signal(name, entry) for name, entry in machine.signals.items())
+    return Expected(machine.machine.name, signals, linear_axes(machine), tuple(machine.sensors))
+
+
+def _of_artefact(path: Path) -> Expected:
+    from twin.rom.artefact import read_artefact
+
+    model = read_artefact(path).model
+    axes = tuple(axis.name for axis in model.load_model.axes)
+    sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
+    return Expected(model.name, model.load_model.signals, axes, sensors)
 
 
 def _as_text(findings: Findings) -> str:
     lines = [str(p) for p in findings.problems]
     facts = ", ".join(f"{v} {k}" if not isinstance(v, str) else f"{k} {v}" for k, v in findings.facts.items())
     warnings = len(findings.problems) - findings.errors
-    verdict = f"{_count(findings.errors, 'error')}, {_count(warnings, 'warning')}" if findings.problems else "no problems found"
+    verdict = (
+        f"{_count(findings.errors, 'error')}, {_count(warnings, 'warning')}"
+        if findings.problems
+        else "no problems found"
+    )
     lines.append(f"{findings.kind} {findings.path}: {verdict}" + (f" ({facts})" if facts else ""))
     return "\n".join(lines)
 

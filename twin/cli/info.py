@@ -46,7 +46,7 @@ def facts(artefact: Artefact) -> dict[str, Any]:
     return {
         "name": model.name,
         "created": artefact.created,
-        "sha256": artefact.digest,
+        "model_sha256": artefact.digest,
         "reference_temperature_degC": model.reference_temperature,
         "states": model.n,
         "bodies": [
@@ -82,7 +82,7 @@ def facts(artefact: Artefact) -> dict[str, Any]:
 def text(told: dict[str, Any]) -> str:
     """The facts as lines for a reader."""
     lines = [f"{told['name']}: {told['states']} states, {told['poses']} poses, {len(told['sensors'])} sensors"]
-    lines.append(f"created {told['created']}, sha256 {told['sha256'][:16]}…")
+    lines.append(f"created {told['created']}, model sha256 {told['model_sha256'][:16]}…")
     lines += ["", "bodies"]
     for b in told["bodies"]:
         lines.append(

@@ -78,7 +78,7 @@ def main() -> None:
 
 
 def run(arguments: list[str]) -> int:
-    """Run the command line with `arguments`; returns the exit status."""
+    """Run the command line with `arguments`; returns the exit status. Mistakes of the program itself are raised."""
     try:
         status = cli.main(args=arguments, prog_name="twin", standalone_mode=False)
         return status if isinstance(status, int) else 0
@@ -87,26 +87,33 @@ def run(arguments: list[str]) -> int:
     except click.ClickException as e:
         e.show()
         return 2
-    except (click.Abort, KeyboardInterrupt):
-        message, status = "interrupted, nothing half-written", 130
-    except TwinError as e:
-        message, status = str(e), 2
     except BrokenPipeError:
         # the reader of a pipe has gone (`twin info A.h5 | head`): nothing to complain about, nor to flush at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except OSError as e:
-        message, status = f"{e.filename or 'file system'}: {e.strerror or e}\n    remedy: {_remedy(e)}", 2
-    except ModuleNotFoundError as e:
-        if (e.name or "").partition(".")[0] == "twin":
+    except BaseException as e:
+        message = _message(e)
+        if message is None:
             raise
-        message, status = f"the package '{e.name}' is missing\n    remedy: python -m pip install 'twin[build]'", 2
-    except MemoryError:
-        message, status = "out of memory\n    remedy: use a coarser mesh, fewer states, or a machine with more memory", 2
-    if "--traceback" in arguments:
-        traceback.print_exc()
-    click.echo(message if status == 130 else f"error: {message}", err=True)
-    return status
+        if "--traceback" in arguments:
+            traceback.print_exc()
+        click.echo(message, err=True)
+        return 130 if isinstance(e, KeyboardInterrupt | click.Abort) else 2
+
+
+def _message(e: BaseException) -> str | None:
+    """What to tell about an error that the user can do something about; None for mistakes of the program."""
+    if isinstance(e, KeyboardInterrupt | click.Abort):
+        return "interrupted, nothing half-written"
+    if isinstance(e, TwinError):
+        return f"error: {e}"
+    if isinstance(e, OSError):
+        return f"error: {e.filename or 'file system'}: {e.strerror or e}\n    remedy: {_remedy(e)}"
+    if isinstance(e, ModuleNotFoundError) and (e.name or "").partition(".")[0] != "twin":
+        return f"error: the package '{e.name}' is missing\n    remedy: python -m pip install 'twin[build]'"
+    if isinstance(e, MemoryError):
+        return "error: out of memory\n    remedy: use a coarser mesh, fewer states, or a machine with more memory"
+    return None
 
 
 def _remedy(e: OSError) -> str:

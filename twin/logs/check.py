@@ -51,7 +51,9 @@ def check_run(
         ]  # fmt: skip
     if run.tcp is not None:
         problems += [
-            Problem(f"no position of axis '{a}'", str(run.folder / "tcp.csv"), did_you_mean(a, run.tcp.axes, "axis columns"))
+            Problem(
+                f"no position of axis '{a}'", str(run.folder / "tcp.csv"), did_you_mean(a, run.tcp.axes, "axis columns")
+            )
             for a in axes
             if a not in run.tcp.axes
         ]
@@ -61,10 +63,8 @@ def check_run(
 def _time(table: Table, where: str, name: str, sampling: float | None) -> list[Problem]:
     problems = []
     if table.naive:
-        problems.append(
-            Problem("times without a zone", where, "read in the zone of run.toml; log the offset, for clocks change twice a year",
-                    warning=True)
-        )  # fmt: skip
+        remedy = "they are read in the zone of run.toml; log the offset, for clocks change twice a year"
+        problems.append(Problem("times without a zone", where, remedy, warning=True))
     step = np.diff(table.time)
     for odd, what, remedy in (
         (step < 0.0, "time runs backwards", "sort the rows, or split the log where its clock was set"),
@@ -80,11 +80,9 @@ def _time(table: Table, where: str, name: str, sampling: float | None) -> list[P
     gaps = np.flatnonzero(step > _GAP * usual)
     if len(gaps) and name != "tcp":  # measurements come when they come
         longest = gaps[np.argmax(step[gaps])]
-        problems.append(
-            Problem(f"{_times(len(gaps))} a gap, the longest {step[longest]:g} s where {usual:g} s are usual",
-                    f"{where} (line {longest + 3})", "loads are held over a gap and the result is flagged; fill it if you can",
-                    warning=True)
-        )  # fmt: skip
+        what = f"{_times(len(gaps))} a gap, the longest {step[longest]:g} s where {usual:g} s are usual"
+        remedy = "loads are held over a gap and the result is flagged; fill it if you can"
+        problems.append(Problem(what, f"{where} (line {longest + 3})", remedy, warning=True))
     if sampling and not 0.9 < usual / sampling < 1.1:
         problems.append(
             Problem(f"rows are {usual:g} s apart, run.toml says {sampling:g} s", where,
@@ -107,7 +105,9 @@ def _values(table: Table, where: str, name: str) -> list[Problem]:
         finite = np.isfinite(values)
         good = values[finite]
         if not len(good):
-            problems.append(Problem(f"column '{column}' has no value at all", where, "check the channel, or remove the column"))
+            problems.append(
+                Problem(f"column '{column}' has no value at all", where, "check the channel, or remove the column")
+            )
             continue
         if not finite.all():
             line = int(np.argmin(finite)) + 2
@@ -116,7 +116,9 @@ def _values(table: Table, where: str, name: str) -> list[Problem]:
         if len(values) >= 10 and not good.any() and name != "tcp":
             warn(f"column '{column}' is zero throughout", "is the channel connected and the header right?")
         elif name == "temperatures" and len(values) >= 100 and np.ptp(good) == 0.0:
-            warn(f"column '{column}' never changes ({good[0]:g} degC)", "a stuck or detached sensor? leave it out if so")
+            warn(
+                f"column '{column}' never changes ({good[0]:g} degC)", "a stuck or detached sensor? leave it out if so"
+            )
         if table.units[column] == "degC" and (good.min() < _PLAUSIBLE[0] or good.max() > _PLAUSIBLE[1]):
             warn(f"column '{column}' spans {good.min():g} .. {good.max():g} degC", "check the unit: degC, degF or K?")
     return problems
@@ -127,7 +129,8 @@ def _overlap(table: Table, loads: Table, where: str) -> list[Problem]:
         return []
     return [
         Problem(
-            f"times {table.time[0]:g} .. {table.time[-1]:g} s lie outside the loads' {loads.time[0]:g} .. {loads.time[-1]:g} s",
+            f"times {table.time[0]:g} .. {table.time[-1]:g} s lie outside the loads'"
+            f" {loads.time[0]:g} .. {loads.time[-1]:g} s",
             where,
             "check start and zone in run.toml: all tables count from there",
         )
@@ -146,10 +149,10 @@ def _ranges(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
         if outside:
             problems.append(
                 Problem(
-                    f"'{s.column}' spans {np.nanmin(values):g} .. {np.nanmax(values):g} {s.unit}, {outside} rows outside"
-                    f" {s.low:g} .. {s.high:g}",
+                    f"'{s.column}' spans {np.nanmin(values):g} .. {np.nanmax(values):g} {s.unit},"
+                    f" {outside} rows outside {s.low:g} .. {s.high:g}",
                     str(run.folder / "loads.csv"),
-                    "results there are flagged; widen the signal's range in machine.toml and build again, or check the unit",
+                    "results there are flagged: check the unit, or widen the signal's range and build again",
                     warning=True,
                 )
             )

@@ -40,27 +40,26 @@ def read_csv(path: Path, zone: tzinfo | None = None) -> CsvTable:
     """
     lines = _lines(path)
     delimiter = ";" if ";" in lines[0] else "\t" if "\t" in lines[0] else ","
-    names, units = _header(lines[0], delimiter, path)
-    if len(lines) == 1:
-        raise LogError("no rows under the header", str(path), "log at least one row, or remove the file")
-    absolute = units[0] is None
+    names, clock, units = _header(lines[0], delimiter, path)
     body = lines[1:]
+    if not body:
+        raise LogError("no rows under the header", str(path), "log at least one row, or remove the file")
     naive = False
-    time = np.empty(0)
-    if absolute:
+    if clock is None:
         cells = [line.partition(delimiter) for line in body]
         time, naive = parse_iso([c[0] for c in cells], zone, str(path))
-        body = [c[2] for c in cells]
-    values = _values(body, delimiter, names[1:] if absolute else names, path)
-    if not absolute:
-        time, values = values[:, 0] * units[0].factor, values[:, 1:]
+        values = _values([c[2] for c in cells], delimiter, names[1:], path)
+    else:
+        table = _values(body, delimiter, names, path)
+        time, values = table[:, 0] * clock.factor, table[:, 1:]
         if not np.isfinite(time).all():
-            raise LogError("a time is missing", f"{path} (line {int(np.argmin(np.isfinite(time))) + 2})", "mend the row")
-    columns, si = {}, {}
-    for k, (name, unit) in enumerate(zip(names[1:], units[1:], strict=True)):
-        columns[name] = values[:, k] * unit.factor + unit.offset
-        si[name] = unit.si
-    return CsvTable(time, absolute, naive, columns, si)
+            line = int(np.argmin(np.isfinite(time))) + 2
+            raise LogError("a time is missing", f"{path} (line {line})", "mend the row")
+    columns = {
+        name: values[:, k] * u.factor + u.offset for k, (name, u) in enumerate(zip(names[1:], units, strict=True))
+    }
+    si = {name: unit.si for name, unit in zip(names[1:], units, strict=True)}
+    return CsvTable(time, clock is None, naive, columns, si)
 
 
 def _lines(path: Path) -> list[str]:
@@ -80,29 +79,33 @@ def _lines(path: Path) -> list[str]:
     return lines
 
 
-def _header(line: str, delimiter: str, path: Path) -> tuple[list[str], list[Unit | None]]:
-    """Names and units of the columns; the unit of the time column is None for ISO 8601 times."""
+def _header(line: str, delimiter: str, path: Path) -> tuple[list[str], Unit | None, list[Unit]]:
+    """Names of the columns, the unit of the time (None for ISO 8601) and those of the other columns."""
     cells = [c.strip().strip('"').strip() for c in line.split(delimiter)]
     while len(cells) > 1 and not cells[-1]:
         cells.pop()  # a delimiter at the end of the line
     problems: list[Problem] = []
     names: list[str] = []
-    units: list[Unit | None] = []
+    clock: Unit | None = None
+    units: list[Unit] = []
     for k, cell in enumerate(cells):
         where = f"{path} (header, column {k + 1})"
         match = _HEADER.fullmatch(cell)
         name, unit = (match["name"].strip(), match["unit"]) if match else (cell, None)
         try:
-            units.append(_time_unit(name, unit) if k == 0 else _column_unit(name, unit, bool(match)))
+            if k == 0:
+                clock = _time_unit(name, unit)
+            else:
+                units.append(_column_unit(name, unit, bool(match)))
         except ValueError as e:
-            units.append(None)
-            problems.append(Problem(str(e), where, "headers are 'name [unit]', for example 'x_speed [m/min]' or 'duty [1]'"))
+            remedy = "headers are 'name [unit]', for example 'x_speed [m/min]' or 'duty [1]'"
+            problems.append(Problem(str(e), where, remedy))
         if name in names:
             problems.append(Problem(f"column '{name}' appears twice", where, "rename or remove one of them"))
         names.append(name)
     if problems:
         raise LogError.collect(problems[:_SHOWN])
-    return names, units
+    return names, clock, units
 
 
 def _time_unit(name: str, unit: str | None) -> Unit | None:
@@ -162,18 +165,19 @@ def _cell_by_cell(body: list[str], delimiter: str, names: list[str], path: Path)
                 try:
                     table[i, k] = float(cell.replace("_", "no digit"))  # Python reads 1_000 as a number
                 except ValueError:
-                    problems.append(
-                        Problem(
-                            f"'{cell[:40]}' in column '{names[k]}' is not a number",
-                            f"{path} (line {i + 2})",
-                            "leave a missing value empty; write no thousands separators",
-                        )
-                    )
+                    problems.append(_no_number(cell, names[k], k == 0, f"{path} (line {i + 2})"))
         if len(problems) >= _SHOWN:
             break
     if problems:
         raise LogError.collect(problems)
     return table
+
+
+def _no_number(cell: str, column: str, first: bool, where: str) -> Problem:
+    remedy = "leave a missing value empty; write no thousands separators"
+    if first and ":" in cell:
+        remedy = "ISO times stand under 'time', without a unit"
+    return Problem(f"'{cell[:40]}' in column '{column}' is not a number", where, remedy)
 
 
 def _ragged(found: int, expected: int, delimiter: str, where: str) -> Problem:

@@ -29,7 +29,12 @@ def motion_problems(loads: Table, where: str) -> list[Problem]:
         if lag not in _HONEST:
             late = f"{lag - 1} sample(s) late" if lag > 0 else f"{-lag} sample(s) early"
             problems.append(
-                Problem(f"'{speed}' is {late} against '{position}'", where, "shift the column back in the logger", warning=True)
+                Problem(
+                    f"'{speed}' is {late} against '{position}'",
+                    where,
+                    "shift the column back in the logger",
+                    warning=True,
+                )
             )
         if not 0.8 < factor < 1.25:
             problems.append(
@@ -44,7 +49,7 @@ def motion_problems(loads: Table, where: str) -> list[Problem]:
 
 
 def _best_lag(loads: Table, position: str, speed: str) -> tuple[float, int, float]:
-    """Correlation, lag and slope of the speed column against the derivative of the position; (0, 0, 1) without motion."""
+    """Correlation, lag and slope of the speed against the derivative of the position; (0, 0, 1) without motion."""
     moved = np.diff(loads.columns[position]) / np.diff(loads.time)
     logged = loads.columns[speed][:-1]
     if not np.nanmin(logged, initial=0.0) < 0.0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime, tzinfo
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,9 @@ import numpy as np
 
 from twin.errors import LogError
 from twin.logs.csv_table import CsvTable, read_csv
-from twin.nearest import did_you_mean
 from twin.logs.run import Run, Table, Tcp
 from twin.logs.times import zone_of
+from twin.nearest import did_you_mean
 from twin.units import to_si
 
 TABLES = ("loads", "temperatures", "tcp")
@@ -47,7 +48,7 @@ def read_run(folder: Path) -> Run:
         raise LogError("no loads.csv", str(folder), "a run folder needs run.toml and loads.csv")
     tables = {"temperatures": _read(folder, "temperatures", tz), "tcp": _read(folder, "tcp", tz)}
     if start is None and loads.absolute:
-        start = datetime.fromtimestamp(float(loads.time[0]), tz or UTC)
+        start = _first_time(loads, tz or UTC, folder / "loads.csv")
     zero = start.timestamp() if start else None
     temperatures = tables["temperatures"]
     tcp = tables["tcp"]
@@ -72,7 +73,9 @@ def _facts(folder: Path) -> dict[str, Any]:
         facts = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except (FileNotFoundError, NotADirectoryError) as e:
         raise LogError(
-            "no run.toml", str(folder), 'make one with: start = 2026-03-01T08:00:00+01:00, sampling = "5 s", synthetic = false'
+            "no run.toml",
+            str(folder),
+            'make one with: start = 2026-03-01T08:00:00+01:00, sampling = "5 s", synthetic = false',
         ) from e
     except OSError as e:
         raise LogError(f"cannot read: {e.strerror or e}", str(path), "check the path and its permissions") from e
@@ -81,7 +84,9 @@ def _facts(folder: Path) -> dict[str, Any]:
     unknown = [key for key in facts if key not in _KEYS]
     if unknown:
         raise LogError(
-            f"unknown keys: {', '.join(unknown)}", str(path), " ".join(did_you_mean(key, _KEYS, "keys") for key in unknown)
+            f"unknown keys: {', '.join(unknown)}",
+            str(path),
+            " ".join(did_you_mean(key, _KEYS, "keys") for key in unknown),
         )
     return facts
 
@@ -90,10 +95,8 @@ def _start(value: Any, zone: tzinfo | None, where: Path) -> datetime | None:
     if value is None or value == "unknown":
         return None
     if isinstance(value, str):
-        try:
+        with suppress(ValueError):
             value = datetime.fromisoformat(value)
-        except ValueError:
-            pass
     if not isinstance(value, datetime):
         raise LogError(f"start '{value}' is not a date and time", str(where), "write start = 2026-03-01T08:00:00+01:00")
     if value.tzinfo is None:
@@ -105,6 +108,13 @@ def _start(value: Any, zone: tzinfo | None, where: Path) -> datetime | None:
     except (OverflowError, ValueError, OSError) as e:
         raise LogError(f"start '{value}' is out of range", str(where), "write start = 2026-03-01T08:00:00+01:00") from e
     return value
+
+
+def _first_time(loads: CsvTable, zone: tzinfo, where: Path) -> datetime:
+    try:
+        return datetime.fromtimestamp(float(loads.time[0]), zone)
+    except (OverflowError, ValueError, OSError) as e:
+        raise LogError("the first time is out of range", str(where), "check the year") from e
 
 
 def _quantity(facts: Mapping[str, Any], key: str, unit: str, where: Path, also: str = "") -> float | None:
@@ -127,9 +137,8 @@ def _text(facts: Mapping[str, Any], key: str, where: Path) -> str | None:
 def _synthetic(value: Any, where: Path) -> tuple[str, ...]:
     if isinstance(value, bool):
         return TABLES if value else ()
-    if isinstance(value, list) and all(v in TABLES for v in value if isinstance(v, str)):
-        if all(isinstance(v, str) for v in value):
-            return tuple(value)
+    if isinstance(value, list) and all(isinstance(v, str) and v in TABLES for v in value):
+        return tuple(value)
     raise LogError(
         f"synthetic = {value!r}"[:80], str(where), 'write true, false, or the computed tables: ["loads", "tcp"]'
     )
@@ -146,7 +155,9 @@ def _relative(table: CsvTable, zero: float | None, path: Path) -> np.ndarray:
         return table.time
     if zero is None:
         raise LogError(
-            "ISO times, but the start of the run is unknown", str(path), "give start in run.toml, or ISO times in loads.csv too"
+            "ISO times, but the start of the run is unknown",
+            str(path),
+            "give start in run.toml, or ISO times in loads.csv too",
         )
     return table.time - zero
 
@@ -162,13 +173,17 @@ def _tcp(table: CsvTable, zero: float | None, path: Path) -> Tcp:
     missing = [name for name in _DISPLACEMENT if name not in table.columns]
     if missing:
         raise LogError(
-            f"missing columns: {', '.join(missing)}", str(path), "columns are: time, the axis positions, dx, dy, dz, sigma"
+            f"missing columns: {', '.join(missing)}",
+            str(path),
+            "columns are: time, the axis positions, dx, dy, dz, sigma",
         )
     columns = [name for name, si in table.units.items() if si != "rad"]  # rotary axes: the structure is at angle zero
     axes = tuple(name for name in columns if name not in (*_DISPLACEMENT, "sigma"))
     for name in columns:
         if table.units[name] != "m":
-            raise LogError(f"'{name}' is in {table.units[name]}", str(path), "lengths are in um, mm or m: 'x [mm]', 'dx [um]'")
+            raise LogError(
+                f"'{name}' is in {table.units[name]}", str(path), "lengths are in um, mm or m: 'x [mm]', 'dx [um]'"
+            )
     n = len(table.time)
     return Tcp(
         time=_relative(table, zero, path),

@@ -56,6 +56,10 @@ def signal_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
             problems.append(Problem(f"no column '{s.column}'{called}", where, remedy))
         elif found != s.unit:
             problems.append(
-                Problem(f"column '{s.column}' is in {found}, signal '{s.name}' in {s.unit}", where, "mend the unit in the header")
+                Problem(
+                    f"column '{s.column}' is in {found}, signal '{s.name}' in {s.unit}",
+                    where,
+                    "mend the unit in the header",
+                )
             )
     return problems

@@ -36,7 +36,7 @@ def parse_iso(cells: Sequence[str], zone: tzinfo | None, where: str) -> tuple[np
                     raise LogError(
                         f"time '{cell.strip()}' has no zone",
                         f"{where} (line {i + 2})",
-                        "write 2026-03-01T08:00:00+01:00, or name the zone in run.toml: zone = \"Europe/Berlin\"",
+                        'write 2026-03-01T08:00:00+01:00, or name the zone in run.toml: zone = "Europe/Berlin"',
                     )
                 moment = moment.replace(tzinfo=zone)
             seconds[i] = moment.timestamp()

@@ -46,7 +46,9 @@ def _refuse_to_destroy(folder: Path) -> None:
     except (OSError, ValueError):
         computed = not any(folder.iterdir())  # an empty folder may be used
     if not computed:
-        raise LogError("holds measured data", str(folder), "choose another folder with -o; measured runs are never replaced")
+        raise LogError(
+            "holds measured data", str(folder), "choose another folder with -o; measured runs are never replaced"
+        )
 
 
 def _facts(run: Run) -> str:

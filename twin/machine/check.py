@@ -25,11 +25,11 @@ _METAL = {  # density above 2600 kg/m^3: metals, ceramics, mineral casting is be
     "youngs_modulus": (1e10, 8e11, "Pa"),
     "expansion": (-1e-6, 4e-5, "1/K"),
 }
-_FACTORS = (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9, 1e12, 1e-12, 60.0, 1 / 60.0)
+_FACTORS = (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9, 1e12, 1e-12)
 
 
 def check_machine(machine: Machine) -> list[Problem]:
-    """Errors for values that a usual unit mistake explains, warnings for the merely unusual and for what nobody uses."""
+    """Errors for values that a mistaken unit explains, warnings for the merely unusual and for what nobody uses."""
     problems: list[Problem] = []
     for name, material in machine.materials.items():
         problems += _material(name, material)
@@ -47,21 +47,21 @@ def _material(name: str, material: Material) -> Iterator[Problem]:
         what = f"{value:g} {unit} is outside {low:g} .. {high:g} of such materials"
         factor = next((f for f in _FACTORS if low <= value * f <= high), None)
         if factor is None:
-            yield Problem(what, where, "check the value and its unit", warning=True)
-        elif factor in (60.0, 1 / 60.0):
-            yield Problem(what, where, "check the value; if it is right, leave it", warning=True)
+            yield Problem(what, where, "check the value and its unit; leave it if it is right", warning=True)
         else:
             off = f"{1 / factor:g}" if factor < 1 else f"1/{factor:g}"
-            remedy = f"off by a factor {off}? {value * factor:g} {unit} would fit; write the unit: {key} = \"... {unit}\""
+            remedy = f'off by a factor {off}? {value * factor:g} {unit} would fit; write the unit: {key} = "... {unit}"'
             yield Problem(what, where, remedy)
 
 
 def _unused(machine: Machine) -> Iterator[Problem]:
     used_materials = {p.material for p in machine.parts.values()}
     used_signals = {a.position for a in machine.axes.values()} | {e.signal for e in machine.environment.values()}
-    for entry in (*machine.sources.values(), *machine.films.values()):
-        used_signals |= set(entry.signals.values())
-    used_environments = {f.environment for f in machine.films.values()} | {s.environment for s in machine.sensors.values()}
+    used_signals |= {s for source in machine.sources.values() for s in source.signals.values()}
+    used_signals |= {s for film in machine.films.values() for s in film.signals.values()}
+    used_environments = {f.environment for f in machine.films.values()} | {
+        s.environment for s in machine.sensors.values()
+    }
     for section, names, used in (
         ("materials", machine.materials, used_materials),
         ("signals", machine.signals, used_signals),

@@ -77,7 +77,9 @@ def _read(path: Path) -> str:
     except UnicodeDecodeError as e:
         raise DescriptionError(f"not UTF-8 at byte {e.start}", str(path), "save the file as UTF-8") from e
     except OSError as e:
-        raise DescriptionError(f"cannot read: {e.strerror or e}", str(path), "check the path and its permissions") from e
+        raise DescriptionError(
+            f"cannot read: {e.strerror or e}", str(path), "check the path and its permissions"
+        ) from e
 
 
 def _syntax_remedy(text: str, message: str) -> str:
@@ -116,13 +118,13 @@ def _meant(keys: Keys, data: dict[str, Any]) -> str | None:
     return nearest(keys[-1], known) if known and _has(data, keys) and keys[-1] not in known else None
 
 
-def _get(data: Any, keys: Keys) -> Any:  # noqa: ANN401
+def _get(data: Any, keys: Keys) -> Any:
     for key in keys:
         data = data[int(key)] if isinstance(data, list) else data[key]
     return data
 
 
-def _has(data: Any, keys: Keys) -> bool:  # noqa: ANN401
+def _has(data: Any, keys: Keys) -> bool:
     try:
         _get(data, keys)
     except (KeyError, TypeError, IndexError, ValueError):
@@ -161,7 +163,7 @@ def _partial(data: dict[str, Any], sound: dict[str, Any], folder: Path) -> Machi
     return Machine.model_construct(**values)
 
 
-def _entry(kind: Any, value: Any) -> Any:  # noqa: ANN401
+def _entry(kind: Any, value: Any) -> Any:
     if value is None or not (isinstance(kind, type) and issubclass(kind, BaseModel)):
         return value
     return kind.model_validate(value)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 
 from twin.errors import Problem, TwinError
@@ -127,7 +128,11 @@ def _fixed(entry: description.Contact, where: str, machine: Machine) -> Iterator
         yield Problem("a fixed contact without surfaces", where, "give surfaces = ['part.surface', 'part.surface']")
     for key in ("axis", "pairs", "segments", "stiffness"):
         if key in entry.model_fields_set:
-            yield Problem(f"'{key}' in a fixed contact", f"{where}.{key}", "remove it: fixed contacts are glued; or kind = 'moving'")
+            yield Problem(
+                f"'{key}' in a fixed contact",
+                f"{where}.{key}",
+                "remove it: fixed contacts are glued; or kind = 'moving'",
+            )
     for surface in entry.surfaces or ():
         yield from _surface(surface, f"{where}.surfaces", machine)
     if entry.surfaces and entry.surfaces[0].split(".")[0] == entry.surfaces[1].split(".")[0]:
@@ -140,9 +145,15 @@ def _moving(entry: description.Contact, where: str, machine: Machine) -> Iterato
         what = f"'{entry.axis}' is not a linear axis" if entry.axis else "a moving contact without an axis"
         yield Problem(what, f"{where}.axis", did_you_mean(entry.axis or "", linear, "linear axes"))
     if "surfaces" in entry.model_fields_set:
-        yield Problem("'surfaces' in a moving contact", f"{where}.surfaces", "write pairs = [['rail part.surface', 'pad part.surface']]")
+        yield Problem(
+            "'surfaces' in a moving contact",
+            f"{where}.surfaces",
+            "write pairs = [['rail part.surface', 'pad part.surface']]",
+        )
     if not entry.pairs:
-        yield Problem("a moving contact without pairs", where, "give pairs = [['rail part.surface', 'pad part.surface']]")
+        yield Problem(
+            "a moving contact without pairs", where, "give pairs = [['rail part.surface', 'pad part.surface']]"
+        )
     for pair in entry.pairs:
         for surface in pair:
             yield from _surface(surface, f"{where}.pairs", machine)
@@ -178,12 +189,22 @@ def _sensors(machine: Machine) -> Iterator[Problem]:
             continue
         where = f"sensors.{name}"
         if (sensor.environment is None) == (sensor.part is None):
-            yield Problem("give either a part or an environment", where, 'part = "bed" and position = [...], or environment = "shop"')
+            yield Problem(
+                "give either a part or an environment",
+                where,
+                'part = "bed" and position = [...], or environment = "shop"',
+            )
         elif sensor.part is not None:
             if sensor.part not in machine.parts:
-                yield Problem(f"unknown part '{sensor.part}'", f"{where}.part", did_you_mean(sensor.part, machine.parts, "parts"))
+                yield Problem(
+                    f"unknown part '{sensor.part}'", f"{where}.part", did_you_mean(sensor.part, machine.parts, "parts")
+                )
             if sensor.position is None:
-                yield Problem("a sensor on a part without a position", where, "write position = [0.1, 0.2, 0.3], at axis positions zero")
+                yield Problem(
+                    "a sensor on a part without a position",
+                    where,
+                    "write position = [0.1, 0.2, 0.3], at axis positions zero",
+                )
         elif sensor.environment not in machine.environment:
             remedy = did_you_mean(str(sensor.environment), machine.environment, "environments")
             yield Problem(f"unknown environment '{sensor.environment}'", f"{where}.environment", remedy)
@@ -195,9 +216,15 @@ def _tcp(machine: Machine) -> Iterator[Problem]:
     yield from _surface(machine.tcp.tool.surface, "tcp.tool.surface", machine)
     yield from _surface(machine.tcp.work.surface, "tcp.work.surface", machine)
     if machine.tcp.tool.point is None:
-        yield Problem("no tool centre point", "tcp.tool", "write point = [0, 0, 0.3], in machine coordinates at axis positions zero")
+        yield Problem(
+            "no tool centre point",
+            "tcp.tool",
+            "write point = [0, 0, 0.3], in machine coordinates at axis positions zero",
+        )
     if machine.tcp.work.point is not None:
-        yield Problem("a point on the work side", "tcp.work.point", "remove it: the work side is read at the tool centre point")
+        yield Problem(
+            "a point on the work side", "tcp.work.point", "remove it: the work side is read at the tool centre point"
+        )
 
 
 def _supports(machine: Machine) -> Iterator[Problem]:
@@ -207,7 +234,9 @@ def _supports(machine: Machine) -> Iterator[Problem]:
         if support is not None:
             yield from _surface(support.surface, f"supports.{name}.surface", machine)
             if min(support.stiffness) < 0 or not max(support.stiffness) > 0:
-                yield Problem("stiffness must be >= 0 and not all zero", f"supports.{name}.stiffness", 'e.g. "200 N/um"')
+                yield Problem(
+                    "stiffness must be >= 0 and not all zero", f"supports.{name}.stiffness", 'e.g. "200 N/um"'
+                )
 
 
 def _poses(machine: Machine) -> Iterator[Problem]:
@@ -224,7 +253,7 @@ def _poses(machine: Machine) -> Iterator[Problem]:
             if grid < 1:
                 yield Problem(f"{grid} positions", where, "at least 1; 5 is usual")
             continue
-        if not grid or any(b <= a for a, b in zip(grid, grid[1:], strict=False)):
+        if not grid or any(b <= a for a, b in pairwise(grid)):
             yield Problem("positions do not increase", where, "list each position once, in order")
         elif axes[name] is not None and not (axes[name].stroke[0] <= grid[0] and grid[-1] <= axes[name].stroke[1]):
             low, high = axes[name].stroke
@@ -233,7 +262,7 @@ def _poses(machine: Machine) -> Iterator[Problem]:
 
 def _motion(machine: Machine) -> Iterator[Problem]:
     """Does every axis carry exactly one side of its contacts? Asked only of a description without other mistakes."""
-    for name, contact in machine.contacts.items():
+    for contact in machine.contacts.values():
         for rail, pad in contact.pairs:
             try:
                 rail_moves(machine, str(contact.axis), rail, pad)
@@ -242,4 +271,9 @@ def _motion(machine: Machine) -> Iterator[Problem]:
     used = {c.axis for c in machine.contacts.values()}
     for name in linear_axes(machine):
         if name not in used:
-            yield Problem("no moving contact has this axis", f"axes.{name}", "join its two sides by guides and a screw", warning=True)
+            yield Problem(
+                "no moving contact has this axis",
+                f"axes.{name}",
+                "join its two sides by guides and a screw",
+                warning=True,
+            )

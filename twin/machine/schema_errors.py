@@ -43,14 +43,18 @@ def known_keys(path: Keys) -> list[str]:
     return []
 
 
-def _existing(loc: tuple[int | str, ...], data: Any, absent: bool) -> tuple[Keys, Any]:  # noqa: ANN401
+def _existing(loc: tuple[int | str, ...], data: Any, absent: bool) -> tuple[Keys, Any]:
     """`loc` without the names of union branches that pydantic appends, and the value there.
 
     absent: the last item is a key that is missing or not allowed.
     """
     keys: list[str] = []
     for item in loc:
-        inside = item in data if isinstance(data, dict) else isinstance(data, list) and isinstance(item, int) and item < len(data)
+        inside = (
+            item in data
+            if isinstance(data, dict)
+            else isinstance(data, list) and isinstance(item, int) and item < len(data)
+        )
         if not inside:
             return (*keys, str(item)) if absent else tuple(keys), data
         keys.append(str(item))
@@ -58,7 +62,7 @@ def _existing(loc: tuple[int | str, ...], data: Any, absent: bool) -> tuple[Keys
     return tuple(keys), data
 
 
-def _annotation(path: Keys) -> Any:  # noqa: ANN401
+def _annotation(path: Keys) -> Any:
     """The type that the description gives to the value at `path`."""
     kind: Any = Machine
     for item in path:
@@ -77,7 +81,7 @@ def _annotation(path: Keys) -> Any:  # noqa: ANN401
     return _strip(kind)
 
 
-def _strip(kind: Any) -> Any:  # noqa: ANN401
+def _strip(kind: Any) -> Any:
     """The type without `| None` and annotations."""
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
         rest = [a for a in typing.get_args(kind) if a is not type(None)]
@@ -119,4 +123,6 @@ def _example(path: Keys) -> str:
         return 'write stiffness = { normal = "300 N/um" }'
     if path and path[0] == "poses":
         return "write x = 5 for five equidistant positions, or a list of positions"
-    return f"write {name} = {_EXAMPLES[name]}" if name in _EXAMPLES else "`twin check --schema` prints what may stand here"
+    return (
+        f"write {name} = {_EXAMPLES[name]}" if name in _EXAMPLES else "`twin check --schema` prints what may stand here"
+    )

@@ -35,7 +35,9 @@ def signal(name: str, entry: description.SignalEntry) -> Signal:
         ends = [e / math.sqrt(2.0) for e in ends]
     low, high = ends
     if not low < high:
-        raise DescriptionError(f"the range {list(entry.range)} is empty", f"{where}.range", "give [low, high] with low < high")
+        raise DescriptionError(
+            f"the range {list(entry.range)} is empty", f"{where}.range", "give [low, high] with low < high"
+        )
     return Signal(name, entry.column or name, unit.si, entry.kind, low, high)
 
 
@@ -109,7 +111,9 @@ def law_use(
     law = LAWS.get(law_name)
     if law is None or law.kind != kind:
         known = [n for n, row in LAWS.items() if row.kind == kind]
-        raise DescriptionError(f"'{law_name}' is no {kind} law", f"{where}.law", did_you_mean(law_name, known, f"{kind} laws"))
+        raise DescriptionError(
+            f"'{law_name}' is no {kind} law", f"{where}.law", did_you_mean(law_name, known, f"{kind} laws")
+        )
     problems = _names(law_name, parameters, law.parameters, f"{where}.parameters", "parameters")
     problems += _names(law_name, signals, law.signals, f"{where}.signals", "signals")
     values: dict[str, float] = {}
@@ -137,9 +141,7 @@ def law_use(
     return LawUse(law_name, values, {name: signals[name] for name in law.signals})
 
 
-def _names(
-    law: str, given: Iterable[str], arguments: Mapping[str, Argument], where: str, what: str
-) -> list[Problem]:
+def _names(law: str, given: Iterable[str], arguments: Mapping[str, Argument], where: str, what: str) -> list[Problem]:
     """Unknown names, and names without a default that are not given."""
     given = list(given)
     problems = [
@@ -165,5 +167,7 @@ def expect_signal(name: str, si: str, where: str, machine: Machine) -> None:
         return  # reported with the signal itself
     if found != si:
         raise DescriptionError(
-            f"signal '{name}' is in {entry.unit}, expected a unit of {si}", where, "wire another signal, or mend its unit"
+            f"signal '{name}' is in {entry.unit}, expected a unit of {si}",
+            where,
+            "wire another signal, or mend its unit",
         )

@@ -141,22 +141,18 @@ def shading(raster: Raster, triangle_normals: np.ndarray, camera: Camera) -> np.
     return light
 
 
-def outline(raster: Raster, triangle_normals: np.ndarray, group: np.ndarray) -> np.ndarray:
+def outline(raster: Raster, triangle_normals: np.ndarray, group: np.ndarray, camera: Camera) -> np.ndarray:
     """Pixels (height, width) bool where neighbours differ in group (m,), in plane or by a jump in depth."""
     t = raster.triangle
     edge = np.zeros(t.shape, dtype=bool)
-    for a, b in (
-        ((slice(None), slice(1, None)), (slice(None), slice(None, -1))),
-        ((slice(1, None),), (slice(None, -1),)),
-    ):
+    towards = np.abs(triangle_normals @ camera.axes()[2])
+    slope = np.sqrt(1.0 - np.minimum(towards, 1.0) ** 2) / np.maximum(towards, 1e-6)  # depth per pixel in the triangle
+    right, left = (slice(None), slice(1, None)), (slice(None), slice(None, -1))
+    for a, b in ((right, left), ((slice(1, None),), (slice(None, -1),))):
         ta, tb = t[a], t[b]
         both = (ta >= 0) & (tb >= 0)
-        differs = (ta >= 0) != (tb >= 0)
         bend = np.abs(np.einsum("...k,...k->...", triangle_normals[ta], triangle_normals[tb])) < 0.85
-        jump = (
-            np.abs(np.subtract(raster.depth[a], raster.depth[b], where=both, out=np.zeros(ta.shape)))
-            > 12 * raster.pixel
-        )
-        differs |= both & ((group[ta] != group[tb]) | bend | jump)
-        edge[a] |= differs
+        step = np.abs(np.subtract(raster.depth[a], raster.depth[b], where=both, out=np.zeros(ta.shape)))
+        jump = step > raster.pixel * (12.0 + 2.0 * np.maximum(slope[ta], slope[tb]))
+        edge[a] |= ((ta >= 0) != (tb >= 0)) | (both & ((group[ta] != group[tb]) | bend | jump))
     return edge

@@ -36,7 +36,7 @@ def write_report(artefact: Artefact, folder: Path, progress: Progress = silent) 
         "temperatures": ("Temperatures at the sensors", lambda: _temperatures(artefact, result)),
         "tcp": (
             "TCP displacement over time",
-            lambda: tcp_figure(result.hours, result.tcp_actual, result.tcp, result.outside),
+            lambda: tcp_figure(result.hours, result.tcp_actual, result.tcp, result.middle, result.outside),
         ),
     }
     if len(result.poses) > 1:

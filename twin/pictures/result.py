@@ -33,6 +33,11 @@ class Drawn:
         """The edge nearest to a time [h]."""
         return int(np.abs(self.hours - hours).argmin())
 
+    @property
+    def middle(self) -> int:
+        """The pose nearest to the middle of the grid."""
+        return int(np.linalg.norm(self.poses - self.poses.mean(axis=0), axis=1).argmin())
+
     def position_at(self, edge: int) -> dict[str, float]:
         return dict(zip(self.axes, self.position[edge].tolist(), strict=True))
 

@@ -20,6 +20,10 @@ TEMPERATURE_MAP = LinearSegmentedColormap.from_list(
     "heat", ["#e6ecf2", "#cfdbe2", "#fbe6a6", "#f8b04f", "#e4602e", "#a81e36", "#5c0f3a"]
 )
 
+DISPLACEMENT_MAP = LinearSegmentedColormap.from_list(  # for lines on white: never pale
+    "displacement", ["#7f93a6", "#cf9f3f", "#dd5a2b", "#a81e36", "#5c0f3a"]
+)
+
 RC: dict[Any, Any] = {
     "font.size": 9.5,
     "axes.titlesize": 11,

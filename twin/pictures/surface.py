@@ -85,7 +85,7 @@ class _View:
     def of(cls, mesh: SurfaceMesh, camera: Camera, width: int, corners: np.ndarray) -> _View:
         raster = rasterise(mesh.points, mesh.triangles, camera, width, corners)
         n = normals(mesh.points, mesh.triangles)
-        return cls(mesh, raster, shading(raster, n, camera), outline(raster, n, mesh.group))
+        return cls(mesh, raster, shading(raster, n, camera), outline(raster, n, mesh.group, camera))
 
     def paint(self, temperature: np.ndarray, norm: Normalize, colours: Colormap) -> np.ndarray:
         """(height, width, 3) in 0 .. 1, at the picture's own resolution."""

@@ -9,10 +9,13 @@ from matplotlib.figure import Figure
 from twin.pictures.style import AXIS_COLOURS, INK, RC, figure
 
 
-def tcp_figure(hours: np.ndarray, actual: np.ndarray, poses: np.ndarray, outside: np.ndarray | None = None) -> Figure:
-    """The band of all poses and the line at the actual axis position, one panel per direction.
+def tcp_figure(
+    hours: np.ndarray, actual: np.ndarray, poses: np.ndarray, middle: int, outside: np.ndarray | None = None
+) -> Figure:
+    """One panel per direction: a band over all poses, a line at the pose `middle`, a thin one at the actual position.
 
     hours (n,) h; actual (n, 3) m; poses (n, n_poses, 3) m; outside (n,) bool: steps outside the certified box, shaded.
+    While an axis moves to and fro the actual position is met wherever it is at the steps' ends.
     """
     with matplotlib.rc_context(RC):
         fig = figure(9.5, 6.6)
@@ -20,7 +23,8 @@ def tcp_figure(hours: np.ndarray, actual: np.ndarray, poses: np.ndarray, outside
         for k, (axes, (name, colour)) in enumerate(zip(panels, AXIS_COLOURS.items(), strict=True)):
             values = 1e6 * poses[:, :, k]
             axes.fill_between(hours, values.min(axis=1), values.max(axis=1), color=colour, alpha=0.18, lw=0)
-            axes.plot(hours, 1e6 * actual[:, k], color=colour)
+            axes.plot(hours, 1e6 * actual[:, k], color=colour, lw=0.6, alpha=0.6)
+            axes.plot(hours, values[:, middle], color=colour)
             axes.axhline(0.0, color=INK, lw=0.6)
             axes.set_ylabel(f"{name} in µm")
             if outside is not None and outside.any():
@@ -38,7 +42,8 @@ def tcp_figure(hours: np.ndarray, actual: np.ndarray, poses: np.ndarray, outside
         panels[0].set_title("TCP displacement, tool side minus work side")
         shaded = "; grey: outside the certified box" if outside is not None and outside.any() else ""
         panels[-1].set_xlabel(
-            f"time in h   (line: at the actual axis position; band: all {poses.shape[1]} poses{shaded})"
+            f"time in h   (line: middle of the workspace; band: all {poses.shape[1]} poses; "
+            f"thin: actual position{shaded})"
         )
         panels[-1].set_xlim(hours[0], hours[-1])
         fig.align_ylabels(panels)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-from twin.pictures.style import RC, TEMPERATURE_MAP, figure
+from twin.pictures.style import DISPLACEMENT_MAP, RC, figure
 
 
 def exaggeration(poses: np.ndarray, displacement: np.ndarray, share: float = 0.15) -> float:
@@ -84,7 +84,7 @@ def workspace_figure(
             Line3DCollection([1e3 * nominal[i][:, order] for i in edges], colors="#6a7078", lw=1.0, ls=(0, (4, 3)))
         )
         pieces = np.array([pair for line in faces for pair in pairwise(line)])
-        drawn = Line3DCollection(1e3 * moved[pieces][:, :, order], cmap=TEMPERATURE_MAP, lw=1.9)
+        drawn = Line3DCollection(1e3 * moved[pieces][:, :, order], cmap=DISPLACEMENT_MAP, lw=1.9)
         drawn.set_array(length[pieces].mean(axis=1))
         drawn.set_clim(0.0, max(length.max(), 1e-3))
         axes.add_collection3d(drawn)

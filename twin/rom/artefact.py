@@ -58,7 +58,7 @@ class Artefact:
     provenance: dict[str, str]  # hashes of inputs, versions, command
     fields: tuple[SurfaceField, ...]
     created: str  # ISO 8601, UTC
-    digest: str  # sha256 of the file
+    digest: str  # sha256 of the model: what results depend on, not its papers, pictures and date
 
 
 def write_artefact(
@@ -177,12 +177,13 @@ def read_artefact(path: Path) -> Artefact:
     rebuild = "build the artefact again with `twin build`"
     if not path.is_file():
         raise ArtefactError("no such file", str(path), rebuild)
-    content = path.read_bytes()
-    if not content.startswith(b"\x89HDF\r\n\x1a\n"):
+    with path.open("rb") as start:
+        signature = start.read(8)
+    if signature != b"\x89HDF\r\n\x1a\n":
         raise ArtefactError("not an HDF5 file", str(path), "give an artefact written by `twin build`")
     try:
         with h5py.File(path, "r") as f:
-            return _read(f, path, hashlib.sha256(content).hexdigest())
+            return _read(f, path)
     except KeyError as e:
         raise ArtefactError(f"damaged artefact: {_plain(e)}", str(path), rebuild) from e
     except (OSError, RuntimeError, ValueError, TypeError) as e:
@@ -193,7 +194,22 @@ def _plain(e: Exception) -> str:
     return str(e.args[0] if e.args else e).strip("\"'")
 
 
-def _read(f: h5py.File, path: Path, digest: str) -> Artefact:
+def _digest(f: h5py.File) -> str:
+    """Hash of all datasets the model consists of: certifying an artefact again does not make it another one."""
+    digest = hashlib.sha256()
+    names: list[str] = []
+    f.visit(names.append)
+    for name in sorted(names):
+        item = f[name]
+        if not isinstance(item, h5py.Dataset) or name.split("/")[0] in ("certificate", "fields", "description"):
+            continue
+        digest.update(f"{name} {item.shape}".encode())
+        text = h5py.check_string_dtype(item.dtype) is not None
+        digest.update(repr(np.asarray(item.asstr()[...]).tolist()).encode() if text else item[...].tobytes())
+    return digest.hexdigest()
+
+
+def _read(f: h5py.File, path: Path) -> Artefact:
     if f.attrs.get("format") != FORMAT:
         raise ArtefactError("an HDF5 file, but no artefact", str(path), "give an artefact written by `twin build`")
     version = int(f.attrs["schema_version"])
@@ -231,7 +247,7 @@ def _read(f: h5py.File, path: Path, digest: str) -> Artefact:
             for name in _dataset(f, "fields")
         ),
         created=f.attrs["created"].decode(),
-        digest=digest,
+        digest=_digest(f),
     )
 
 

@@ -42,7 +42,7 @@ class Result:
     flags: np.ndarray  # (n, n_flags) bool: outside what was certified
     flag_names: tuple[str, ...]
     states: np.ndarray  # (n + 1, N) artefact coordinates, bodies one after the other
-    artefact: str  # sha256
+    artefact: str  # sha256 of the model
     substeps: int
 
     @property
@@ -62,7 +62,7 @@ def summary(result: Result) -> dict[str, Any]:
         "step_s": float(dt[0]),
         "substeps": result.substeps,
         "duration_s": float(result.time[-1] - result.time[0]),
-        "artefact_sha256": result.artefact,
+        "model_sha256": result.artefact,
         "heat": {
             "sources_J": float((result.power * dt[:, None]).sum()),
             "by_source_J": dict(zip(result.sources, (result.power.T @ dt).tolist(), strict=True)),
@@ -136,7 +136,7 @@ def _write_hdf5(path: Path, result: Result) -> None:
 
 
 def read_final_state(path: Path, artefact: str) -> np.ndarray:
-    """The state (N,) at the end of a result.h5 of the artefact with this sha256, to go on from.
+    """The state (N,) at the end of a result.h5 of the model with this sha256, to go on from.
 
     Raises TwinError for other files and results of other artefacts.
     """

@@ -1,0 +1,136 @@
+"""`twin check` from the outside."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from tests.logs.test_read import write
+from tests.support import synthetic
+from tests.support.descriptions import SLIDE, edited
+from twin.cli.main import run
+from twin.rom.artefact import write_artefact
+
+RUN = SLIDE.parent / "runs" / "short"
+
+
+def check(capsys: pytest.CaptureFixture, *arguments: object) -> tuple[int, dict]:
+    status = run(["check", "--json", *map(str, arguments)])
+    return status, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("path", [SLIDE, SLIDE.parent])
+def test_sound_machine(capsys, path):
+    assert run(["check", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "no problems found" in out
+    assert "2121 nodes" in out
+
+
+def test_sound_run_against_the_machine_it_lies_under(capsys):
+    status, found = check(capsys, RUN)
+    assert (status, found["ok"], found["facts"]["machine"]) == (0, True, "slide")
+
+
+def test_three_typos_in_one_go(tmp_path, capsys):
+    edits = [
+        ('material = "aluminium"', 'material = "aluminum"'),
+        ("stroke = [", "strok = ["),
+        ('"x_current" }', '"x_curent" }'),
+    ]
+    status, found = check(capsys, edited(tmp_path, *edits))
+    assert status == 2
+    assert len(found["problems"]) == 3
+    assert all("did you mean" in p["remedy"] for p in found["problems"])
+
+
+def test_materials_and_meshes_are_both_reported(tmp_path, capsys):
+    path = edited(
+        tmp_path, ('"45 W/(m*K)"', '"45 W/(mm*K)"'), ("position = [0.07, 0.05, 0.2]", "position = [0.07, 0.05, 2]")
+    )
+    status, found = check(capsys, path)
+    assert status == 2
+    assert ["materials.steel.conductivity" in found["problems"][0]["where"], found["problems"][1]["where"]] == [
+        True,
+        "sensors.slide.position",
+    ]
+    status, found = check(capsys, "--no-meshes", path)
+    assert len(found["problems"]) == 1
+
+
+def test_warnings_alone_exit_with_zero(tmp_path, capsys):
+    path = edited(tmp_path, ("[environment.shop]", '[signals.spare]\nunit = "A"\nrange = [0, 1]\n\n[environment.shop]'))
+    assert run(["check", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("warning: ")
+    assert "0 errors, 1 warning" in out
+
+
+def test_run_with_a_missing_signal(tmp_path, capsys):
+    shutil.copytree(RUN, tmp_path / "run")
+    loads = tmp_path / "run" / "loads.csv"
+    loads.write_text(loads.read_text().replace("x_motor_current", "x_motor_curent"))
+    status, found = check(capsys, tmp_path / "run", "--machine", SLIDE)
+    (problem,) = found["problems"]
+    assert status == 2
+    assert "no column 'x_motor_current'" in problem["what"]
+    assert "did you mean 'x_motor_curent'?" in problem["remedy"]
+
+
+def test_run_that_names_its_machine(tmp_path, capsys):
+    shutil.copytree(RUN, tmp_path / "run")
+    with (tmp_path / "run" / "run.toml").open("a") as f:
+        f.write('machine = "../machine.toml"\n')
+    edited(tmp_path, ('unit = "m/min"', 'unit = "m^2"'))
+    status, found = check(capsys, tmp_path / "run")
+    assert status == 2  # a broken machine is reported along with the run
+    assert any("machine.toml" in p["where"] for p in found["problems"])
+    edited(tmp_path)
+    assert check(capsys, tmp_path / "run")[0] == 0
+
+
+def test_run_without_a_machine_is_checked_for_itself(tmp_path, capsys):
+    folder = write(tmp_path / "run", "time [s];x [mm]\n0;1,5\n5;2,5\n5;3\n")
+    status, found = check(capsys, folder)
+    assert status == 2
+    assert [p["warning"] for p in found["problems"]] == [True, False]
+
+
+@pytest.mark.parametrize("name", ["nothing", "."])
+def test_neither_machine_nor_run(tmp_path, capsys, name):
+    assert run(["check", str(tmp_path / name)]) == 2
+    assert "remedy" in capsys.readouterr().err
+
+
+def test_schema(capsys):
+    assert run(["check", "--schema"]) == 0
+    jsonschema.validate(tomllib.loads(Path(SLIDE).read_text()), json.loads(capsys.readouterr().out))
+
+
+def test_no_path(capsys):
+    assert run(["check"]) == 2
+    assert "PATH" in capsys.readouterr().err
+
+
+def test_run_against_an_artefact_needs_no_description(tmp_path, capsys):
+    write_artefact(tmp_path / "A.h5", synthetic.machine())
+    folder = write(tmp_path / "run", "time [s],ambient [degC],x_position [m]\n0,20,0.1\n5,20,0.2\n")
+    status, found = check(capsys, folder, "--machine", tmp_path / "A.h5")
+    assert status == 2
+    missing = [p["what"] for p in found["problems"] if not p["warning"]]
+    assert missing == [f"no column '{a}'" for a in ("x_speed", "x_current", "y_position", "y_speed", "y_current")]
+
+
+def test_run_is_checked_where_descriptions_cannot_be_read(tmp_path, capsys, monkeypatch):
+    edited(tmp_path)
+    shutil.copytree(RUN, tmp_path / "runs" / "short")
+    monkeypatch.setitem(sys.modules, "twin.machine.load", None)  # an edge computer without pydantic
+    status, found = check(capsys, tmp_path / "runs" / "short")
+    assert (status, len(found["problems"])) == (0, 1)
+    assert "no machine is known" in found["problems"][0]["what"]

@@ -1,0 +1,18 @@
+"""Edited copies of the small machine of the tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+SLIDE = Path(__file__).parents[1] / "machines" / "slide" / "machine.toml"
+
+
+def edited(folder: Path, *edits: tuple[str, str]) -> Path:
+    """A copy of the slide's description in `folder` with texts replaced."""
+    text = SLIDE.read_text(encoding="utf-8")
+    for old, new in edits:
+        assert old in text, old
+        text = text.replace(old, new)
+    path = folder / "machine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
