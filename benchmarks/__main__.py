@@ -19,7 +19,9 @@ def main() -> None:
         began = time.perf_counter()
         module.main()
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-        print(f"   ({time.perf_counter() - began:.0f} s, peak memory of this process so far {peak:.2f} GiB)", flush=True)
+        print(
+            f"   ({time.perf_counter() - began:.0f} s, peak memory of this process so far {peak:.2f} GiB)", flush=True
+        )
 
 
 if __name__ == "__main__":

@@ -22,5 +22,8 @@ def main() -> None:
         result = compare(rich(), model, moving)
         T, u = result.temperature_error.max(), result.displacement_error.max()
         share = (result.temperature_error.max(axis=0) / result.temperature_range).max()
-        print(f"   {label:>20}: {model.n} states, max {T:.4f} K, {1e6 * u:.3f} um, worst sensor {100 * share:.2f} % of its range")
+        print(
+            f"   {label:>20}: {model.n} states, max {T:.4f} K, {1e6 * u:.3f} um, "
+            f"worst sensor {100 * share:.2f} % of its range"
+        )
     np.testing.assert_equal(one_pose.n, compact().n)

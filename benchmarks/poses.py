@@ -27,17 +27,19 @@ def main() -> None:
     print(f"   flexibility against direct solve at 5 random poses: {worst:.1e} of the largest row entry")
 
     fields = []
-    for seed in range(3):  # fields as loads make them: steady states of held-out scenarios, the largest errors there are
+    for seed in range(
+        3
+    ):  # fields as loads make them: steady states of held-out scenarios, the largest errors there are
         scenario = draw(model.load_model, VERIFY_SEED + seed, 1.0, 60.0)
         fields.append(CoupledStepper(model).steady_state(scenario.drive, scenario.drive.n_steps // 2))
     positions = rng.uniform(low, high, (200, len(low)))
-    exact = [
-        np.array([structure.displacement(p, tuple(x)) for p in positions])
-        for x in fields
-    ]
+    exact = [np.array([structure.displacement(p, tuple(x)) for p in positions]) for x in fields]
     grids = [tcp_at_poses(model, x) for x in fields]
     span = max(np.abs(g).max() for g in grids)
     for kind in ("linear", "cubic", "lagrange"):
         weights, _ = pose_weights(model.pose_grid, positions, kind)
         error = max(np.abs(weights @ g - e).max() for g, e in zip(grids, exact, strict=True))
-        print(f"   {kind:>8} interpolation at 200 random poses: max {1e6 * error:.3f} um at TCP errors up to {1e6 * span:.1f} um")
+        print(
+            f"   {kind:>8} interpolation at 200 random poses: max {1e6 * error:.3f} um "
+            f"at TCP errors up to {1e6 * span:.1f} um"
+        )

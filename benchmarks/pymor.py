@@ -42,7 +42,8 @@ def main() -> None:
         H = (body.C @ V) @ np.linalg.solve(s * (V.T @ (body.E @ V)) - V.T @ (A @ V), mine)
         worst = max(worst, np.abs(H - reduced.transfer_function.eval_tf(s)).max() / np.abs(H).max())
     print(f"   {body.name}: {V.shape[1]} rich states; our projection and pyMOR's agree to {worst:.1e}; "
-          f"cached rich model has {ours.n}; basis {ours_build:.1f} s, pyMOR's projection alone {theirs_build:.1f} s")  # fmt: skip
+          f"cached rich model has {ours.n}; basis {ours_build:.1f} s, "
+          f"pyMOR's projection alone {theirs_build:.1f} s")  # fmt: skip
     dt, r = 60.0, V.shape[1]
     E, K = V.T @ (body.E @ V), -(V.T @ (A @ V))
     x = np.zeros(r)
@@ -58,4 +59,7 @@ def main() -> None:
     for _ in range(20):
         state = implicit.apply_inverse(mass.apply(state) + u * dt)
     theirs_step = (time.perf_counter() - began) / 20
-    print(f"   implicit Euler step at {r} states, refactorised: ours {1e3 * ours_step:.2f} ms, pyMOR {1e3 * theirs_step:.2f} ms")
+    print(
+        f"   implicit Euler step at {r} states, refactorised: ours {1e3 * ours_step:.2f} ms, "
+        f"pyMOR {1e3 * theirs_step:.2f} ms"
+    )

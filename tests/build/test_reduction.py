@@ -83,12 +83,12 @@ def test_galerkin_converges_to_the_full_model_on_unseen_scenarios(full, rich):
     unit = Tolerances(0.02, 0.2e-6)
     snapshots = trajectories(rich, [draw(full.load_model, 100 + i, hours=2.0) for i in range(6)])
     unseen = draw(full.load_model, 7, hours=2.0)
-    T, u = outputs(full, unseen)
+    T, _ = outputs(full, unseen)
     errors = []
     for states in (10, 20, 40):
         small = galerkin(rich, snapshots, states, unit)
         assert small.n == states
-        T_small, u_small = outputs(small, unseen)
+        T_small, _ = outputs(small, unseen)
         errors.append(np.abs(T - T_small).max() / np.ptp(T))
     assert errors[2] < errors[0] / 10
     assert errors[2] < 1e-3
@@ -134,6 +134,7 @@ def test_scenarios_stay_in_the_box_and_repeat():
     low, high = theta_bounds(load)
     for seed in range(12):
         drive = draw(load, seed, hours=1.0).drive
-        assert np.all(drive.theta >= low - 1e-12) and np.all(drive.theta <= high + 1e-12)
-        assert not drive.flags.any(), [n for n, f in zip(drive.flag_names, drive.flags.any(axis=0)) if f]
+        assert np.all(drive.theta >= low - 1e-12)
+        assert np.all(drive.theta <= high + 1e-12)
+        assert not drive.flags.any(), [n for n, f in zip(drive.flag_names, drive.flags.any(axis=0), strict=True) if f]
         assert np.array_equal(drive.power, draw(load, seed, hours=1.0).drive.power)

@@ -62,6 +62,9 @@ def test_steady_state_is_where_stepping_ends():
     steady = stepper.steady_state(drive, drive.n_steps - 1)
     x = steady
     for _ in range(3):  # a fixed point of the step
-        rhs = [b.E @ xb / 60 + f for b, xb, f in zip(machine.bodies, x, stepper.forcing(drive, drive.n_steps - 1), strict=True)]
+        rhs = [
+            b.E @ xb / 60 + f
+            for b, xb, f in zip(machine.bodies, x, stepper.forcing(drive, drive.n_steps - 1), strict=True)
+        ]
         x = stepper.solve(rhs, drive.theta[-1], contact_matrix(machine, drive, drive.n_steps - 1), 1 / 60)
     assert np.allclose(np.concatenate(x), np.concatenate(steady), rtol=1e-9, atol=1e-9)

@@ -1,4 +1,4 @@
-"""A small dense machine model: a random bed with a rail of five ports and a slide with two pads, two films, one joint."""
+"""A small dense machine: a random bed with a rail of five ports and a slide with two pads, two films, one joint."""
 
 from __future__ import annotations
 
@@ -85,5 +85,13 @@ def model(seed: int = 0, n: tuple[int, int] = (40, 30)) -> MachineModel:
         )
     grid = np.array([-0.35, 0.0, 0.35])
     return MachineModel(
-        "two bodies", tuple(bodies), load_model(), 20.0, tuple(f"T{i}" for i in range(6)), (), ("x",), (grid,), grid[:, None]
+        "two bodies",
+        tuple(bodies),
+        load_model(),
+        20.0,
+        tuple(f"T{i}" for i in range(6)),
+        (),
+        ("x",),
+        (grid,),
+        grid[:, None],
     )

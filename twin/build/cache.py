@@ -56,7 +56,7 @@ def cached(stage: str, key: tuple[object, ...], make: Callable[[], T]) -> T:
         return result
     except FileNotFoundError:
         pass
-    except Exception:  # noqa: BLE001 - whatever is wrong with a cache entry, the remedy is to make it again
+    except Exception:  # whatever is wrong with a cache entry, the remedy is to make it again
         path.unlink(missing_ok=True)
     result = make()
     try:

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from twin.build.scenario import Scenario
 from twin.build.stepper import CoupledStepper, sensor_temperatures, tcp_at_poses
+from twin.machine.description import Limits
 from twin.rom.model import MachineModel
 
 
@@ -39,6 +41,26 @@ class Comparison:
         """(n_poses, 3) m over all scenarios."""
         return self.displacement_high.max(axis=0) - self.displacement_low.min(axis=0)
 
+    @property
+    def temperature_case(self) -> np.ndarray:
+        """(n_scenarios,) K: the largest change of any sensor in each scenario, its size."""
+        return (self.temperature_high - self.temperature_low).max(axis=1, initial=0.0)
+
+    @property
+    def displacement_case(self) -> np.ndarray:
+        """(n_scenarios,) m: the largest change of the TCP displacement at any pose in each scenario."""
+        return (self.displacement_high - self.displacement_low).max(axis=(1, 2), initial=0.0)
+
+    def scaled(self, limits: Limits) -> tuple[np.ndarray, np.ndarray]:
+        """Maximum error per sensor (n_sensors,) K and TCP row (n_poses, 3) m with every scenario scaled to the case.
+
+        Exact for each scenario, because the models are linear in loads and air temperatures at given films and
+        positions: the scenario with all of them scaled has all responses and errors scaled.
+        """
+        T = self.temperature_error * (limits.at_temperature_range / self.temperature_case)[:, None]
+        u = self.displacement_error * (limits.at_displacement_range / self.displacement_case)[:, None, None]
+        return T.max(axis=0), u.max(axis=0)
+
 
 def compare(
     reference: MachineModel,
@@ -63,9 +85,7 @@ def compare(
                 np.minimum(low, value, out=low)
                 np.maximum(high, value, out=high)
 
-        runs = zip(
-            a.run(drive, a.uniform(scenario.start)), b.run(drive, b.uniform(scenario.start)), strict=True
-        )
+        runs = zip(a.run(drive, a.uniform(scenario.start)), b.run(drive, b.uniform(scenario.start)), strict=True)
         for (_, xa, _), (_, xb, _) in runs:
             account(xa, xb)
         last = drive.n_steps - 1
@@ -78,7 +98,7 @@ def compare(
 
 @dataclass(frozen=True)
 class Certificate:
-    """What the artefact claims about itself; errors are compact against full where known, else against rich."""
+    """What the artefact claims about itself. Errors are compact-rich plus, after `twin verify`, rich-full maxima."""
 
     scenarios: tuple[str, ...]
     full_scenarios: tuple[str, ...]  # those on which the rich model was compared with the full one
@@ -86,31 +106,37 @@ class Certificate:
     hours: float
     step: float  # s
     sensors: tuple[str, ...]
-    temperature_error: tuple[float, ...]  # K per sensor: compact-rich maximum plus rich-full maximum
+    case_temperature: float  # K: size of the case the limits are for
+    case_displacement: float  # m
+    limit_temperature: float  # K
+    limit_displacement: float  # m
+    temperature_error_in_case: tuple[float, ...]  # K per sensor, every scenario scaled to the case
+    displacement_error_in_case: tuple[tuple[float, float, float], ...]  # m per pose and axis
+    temperature_error: tuple[float, ...]  # K per sensor as drawn, anywhere in the certified box
     temperature_range: tuple[float, ...]  # K per sensor over all scenarios
-    displacement_error: tuple[tuple[float, float, float], ...]  # m per pose and axis, same sum
+    displacement_error: tuple[tuple[float, float, float], ...]  # m per pose and axis as drawn
     displacement_range: tuple[tuple[float, float, float], ...]
-    worst_temperature: str  # "sensor T07 in seed 3: ..."
+    worst_temperature: str  # "sensor T07 in seed 3: ...", as drawn
     worst_displacement: str
-    rich_temperature_error: float  # K, rich against full, maximum
-    rich_displacement_error: float  # m
-    limit_temperature: float
-    limit_displacement: float
+    rich_temperature_error: float | None  # K in the case, rich against full; None before `twin verify`
+    rich_displacement_error: float | None  # m
 
     @property
     def max_temperature_error(self) -> float:
-        return max(self.temperature_error, default=0.0)
+        """K, in the case."""
+        return max(self.temperature_error_in_case, default=0.0)
 
     @property
     def max_displacement_error(self) -> float:
-        return max((e for row in self.displacement_error for e in row), default=0.0)
+        """m, in the case."""
+        return max((e for row in self.displacement_error_in_case for e in row), default=0.0)
 
     @property
     def worst_relative(self) -> float:
         """The largest error of any output as a share of that output's own range."""
         error = np.concatenate([np.ravel(self.temperature_error), np.ravel(self.displacement_error)])
         span = np.concatenate([np.ravel(self.temperature_range), np.ravel(self.displacement_range)])
-        return float((error / span).max())
+        return float((error / span).max(initial=0.0))
 
     @property
     def passed(self) -> bool:
@@ -119,25 +145,28 @@ class Certificate:
             and self.max_displacement_error <= self.limit_displacement
         )
 
-    def to_json(self) -> dict:
-        return asdict(self)
+    def to_json(self) -> dict[str, Any]:
+        """JSON values, with the derived figures."""
+        return asdict(self) | {
+            "max_temperature_error_in_case": self.max_temperature_error,
+            "max_displacement_error_in_case": self.max_displacement_error,
+            "worst_relative": self.worst_relative,
+            "passed": self.passed,
+        }
 
 
 def certify(
-    model: MachineModel,
-    compact: Comparison,
-    rich: Comparison | None,
-    limits: tuple[float, float],
-    hours: float,
-    step: float,
+    model: MachineModel, compact: Comparison, rich: Comparison | None, limits: Limits, hours: float, step: float
 ) -> Certificate:
-    """Certificate from compact-against-rich (all scenarios) and rich-against-full (some). limits: (K, m)."""
+    """Certificate from compact-against-rich (all scenarios) and rich-against-full (some)."""
     T, u = compact.temperature_error.max(axis=0), compact.displacement_error.max(axis=0)
+    T_case, u_case = compact.scaled(limits)
+    rich_T = rich_u = None
     if rich is not None:
         T, u = T + rich.temperature_error.max(axis=0), u + rich.displacement_error.max(axis=0)
-    s, j = np.unravel_index(compact.temperature_error.argmax(), compact.temperature_error.shape)
-    k, p, c = np.unravel_index(compact.displacement_error.argmax(), compact.displacement_error.shape)
-    place = ", ".join(f"{a} {1e3 * v:.0f} mm" for a, v in zip(model.pose_axes, model.poses[p], strict=True))
+        T_rich, u_rich = rich.scaled(limits)
+        T_case, u_case = T_case + T_rich, u_case + u_rich
+        rich_T, rich_u = float(T_rich.max(initial=0.0)), float(u_rich.max(initial=0.0))
     return Certificate(
         scenarios=compact.labels,
         full_scenarios=rich.labels if rich is not None else (),
@@ -145,14 +174,35 @@ def certify(
         hours=hours,
         step=step,
         sensors=model.sensors,
+        case_temperature=limits.at_temperature_range,
+        case_displacement=limits.at_displacement_range,
+        limit_temperature=limits.temperature,
+        limit_displacement=limits.displacement,
+        temperature_error_in_case=tuple(T_case.tolist()),
+        displacement_error_in_case=_rows(u_case),
         temperature_error=tuple(T.tolist()),
         temperature_range=tuple(compact.temperature_range.tolist()),
-        displacement_error=tuple(map(tuple, u.tolist())),
-        displacement_range=tuple(map(tuple, compact.displacement_range.tolist())),
-        worst_temperature=f"sensor {model.sensors[j]} in {compact.labels[s]}",
-        worst_displacement=f"d{'xyz'[c]} at {place} in {compact.labels[k]}",
-        rich_temperature_error=float(rich.temperature_error.max()) if rich is not None else float("nan"),
-        rich_displacement_error=float(rich.displacement_error.max()) if rich is not None else float("nan"),
-        limit_temperature=limits[0],
-        limit_displacement=limits[1],
+        displacement_error=_rows(u),
+        displacement_range=_rows(compact.displacement_range),
+        worst_temperature=_worst_sensor(model, compact),
+        worst_displacement=_worst_pose(model, compact),
+        rich_temperature_error=rich_T,
+        rich_displacement_error=rich_u,
     )
+
+
+def _rows(table: np.ndarray) -> tuple[tuple[float, float, float], ...]:
+    return tuple((float(x), float(y), float(z)) for x, y, z in table)
+
+
+def _worst_sensor(model: MachineModel, c: Comparison) -> str:
+    if c.temperature_error.size == 0:
+        return "no sensors"
+    s, j = np.unravel_index(c.temperature_error.argmax(), c.temperature_error.shape)
+    return f"sensor {model.sensors[j]} in {c.labels[s]}"
+
+
+def _worst_pose(model: MachineModel, c: Comparison) -> str:
+    s, p, axis = np.unravel_index(c.displacement_error.argmax(), c.displacement_error.shape)
+    place = ", ".join(f"{a} {1e3 * v:.0f} mm" for a, v in zip(model.pose_axes, model.poses[p], strict=True))
+    return f"d{'xyz'[axis]} at {place or 'the only pose'} in {c.labels[s]}"

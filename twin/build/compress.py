@@ -1,4 +1,4 @@
-"""Compression inside the rich space: `galerkin` (POD of coupled trajectories) or `balanced` (oblique, smaller, checked).
+"""Compression in the rich space: `galerkin` (POD of coupled trajectories) or `balanced` (oblique, smaller, checked).
 
 Both measure states in the norm of the limits: how far a state moves the stored heat, the sensors and the TCP, each in
 units of the error the certificate allows. A plain energy norm spends its directions on heat that no output sees.
@@ -14,7 +14,7 @@ import scipy.linalg
 
 from twin.build.project import project
 from twin.build.scenario import Scenario, theta_bounds
-from twin.build.stepper import CoupledStepper, system_matrix
+from twin.build.stepper import CoupledStepper, sensor_temperatures, system_matrix
 from twin.errors import ModelError
 from twin.rom.model import AffineBody, MachineModel
 
@@ -27,17 +27,23 @@ class Tolerances:
     displacement: float  # m
 
 
-def trajectories(rich: MachineModel, scenarios: Iterable[Scenario], every: int = 3) -> list[np.ndarray]:
-    """Snapshots per body (n_b, m) of the coupled rich model: every `every`-th step and the final steady state."""
+def trajectories(rich: MachineModel, scenarios: Iterable[Scenario], every: int = 1) -> list[np.ndarray]:
+    """Snapshots per body (n_b, m) of the coupled rich model: every `every`-th step and the final steady state.
+
+    Each scenario is scaled until its warmest sensor changes by 1 K: the model is linear in the loads, and a scenario
+    that happens to be drawn mild must count as much as a violent one, since the certificate measures both so.
+    """
     stepper = CoupledStepper(rich)
     columns: list[list[np.ndarray]] = [[] for _ in rich.bodies]
     for scenario in scenarios:
         drive = scenario.drive
         states = [x for step, x, _ in stepper.run(drive, stepper.uniform(scenario.start)) if step % every == 0]
         states.append(stepper.steady_state(drive, drive.n_steps - 1))
+        response = np.array([sensor_temperatures(rich, x) for x in states])
+        size = max(float(np.ptp(response, axis=0).max(initial=0.0)), 1e-9) if response.size else 1.0
         for x in states:
             for c, xb in zip(columns, x, strict=True):
-                c.append(xb)
+                c.append(xb / size)
     return [np.column_stack(c) for c in columns]
 
 
@@ -59,7 +65,7 @@ def _without_mean(body: AffineBody, X: np.ndarray) -> np.ndarray:
 
 
 def _share(values: list[np.ndarray], states: int) -> list[int]:
-    """How many directions each body gets: the largest values of all bodies together, one state per body for the mean."""
+    """How many directions each body gets: the largest values of all bodies together; one per body is for the mean."""
     free = states - len(values)
     if free < len(values):
         raise ModelError(

@@ -92,7 +92,5 @@ def verify_artefact(
     result = certificate(
         machine, rich, artefact.model, full.thermal, options, VERIFY_SEED, full_scenarios, progress=progress
     )
-    write_artefact(
-        path, artefact.model, artefact.description, result.to_json(), artefact.provenance, artefact.fields
-    )
+    write_artefact(path, artefact.model, artefact.description, result.to_json(), artefact.provenance, artefact.fields)
     return result

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.rom.model import AffineBody
+from twin.rom.model import AffineBody, Matrix
 
 
 def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> AffineBody:
@@ -24,7 +24,7 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
     """
     left = V if W is None else W
 
-    def congruent(X):  # noqa: ANN001, ANN202 - sparse or dense
+    def congruent(X: Matrix) -> np.ndarray:
         R = left.T @ (X @ V)
         return (R + R.T) / 2 if W is None else R
 
@@ -46,7 +46,7 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
     )
 
 
-def orthonormalise(X: np.ndarray, E, V: np.ndarray | None = None, tolerance: float = 1e-12) -> np.ndarray:  # noqa: ANN001
+def orthonormalise(X: np.ndarray, E: Matrix, V: np.ndarray | None = None, tolerance: float = 1e-12) -> np.ndarray:
     """An E-orthonormal basis of the part of span(X) that is E-orthogonal to V, small directions dropped.
 
     X: (n, m), columns scaled by the caller so that `tolerance` (relative to the largest column norm 1) is meaningful;

@@ -2,9 +2,9 @@
 
 For sampled (s, theta) the basis holds (s E + A(theta))^-1 [B, M, P, C^T, G^T, P_out]. Theorem (Grimme 1997; for
 parameters Baur, Beattie, Benner, Gugercin, SIAM J. Sci. Comput. 33, 2011): the Galerkin model interpolates the transfer
-function at every sampled (s, theta), and because input and adjoint directions are both in the basis also its derivatives
-with respect to s and theta. With moving contacts as ports, no basis per pose is needed: the position changes only how
-ports are combined (`twin.rom.contact`).
+function at every sampled (s, theta), and because input and adjoint directions are both in the basis also its
+derivatives with respect to s and theta. With moving contacts as ports, no basis per pose is needed: the position
+changes only how ports are combined (`twin.rom.contact`).
 
 One shift, or many shifts at one film coefficient, stall at 1e-3 to 1e-2 of the range (docs/decisions/0002); the samples
 therefore fill (log s, log theta) jointly. The adjoints are the cheapest accuracy there is.
@@ -33,7 +33,9 @@ class RichOptions:
     seed: int = 0
 
 
-def sample_points(body: AffineBody, low: np.ndarray, high: np.ndarray, options: RichOptions) -> list[tuple[float, np.ndarray]]:
+def sample_points(
+    body: AffineBody, low: np.ndarray, high: np.ndarray, options: RichOptions
+) -> list[tuple[float, np.ndarray]]:
     """Shifts [1/s] and full theta vectors: Sobol points, log-uniform between the certified bounds low, high (n_theta,).
 
     The first two samples are the slowest shift at the middle of the box and the fastest one.
@@ -52,7 +54,7 @@ def sample_points(body: AffineBody, low: np.ndarray, high: np.ndarray, options: 
 
 
 def compress_rows(G: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:
-    """The dominant right singular directions (k, n) of the pose rows G (n_poses, 3, n): poses are strongly correlated."""
+    """The dominant right singular directions (k, n) of the pose rows G (n_poses, 3, n): poses are much correlated."""
     rows = G.reshape(-1, G.shape[-1])
     if rows.shape[0] == 0:
         return rows

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.rom.drive import Drive, evaluate
-from twin.rom.load_model import LoadModel
+from twin.rom.load_model import Film, Joint, LoadModel
 
 LOADS = ("blocks", "step", "cool-down", "ramp", "duty")
 FILMS = ("laws", "low", "high", "random")
@@ -35,7 +35,7 @@ def draw(load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still
     rng = np.random.default_rng([seed, 20231])
     pattern, film, ambient = rng.choice(LOADS), rng.choice(FILMS), rng.choice(AMBIENTS)
     sampling = dt / 6
-    n = int(round(hours * 3600 / sampling))
+    n = round(hours * 3600 / sampling)
     time = np.arange(n + 1) * sampling
     signals = {}
     positions = {axis.position: axis for axis in load.axes}
@@ -110,7 +110,11 @@ def _ambient(rng: np.random.Generator, time: np.ndarray, low: float, high: float
 def _films(rng: np.random.Generator, load: LoadModel, theta: np.ndarray, pattern: str, dt: float) -> np.ndarray:
     low, high = theta_bounds(load)
     if pattern == "laws":
-        return theta
+        # ten-minute means: a coefficient that follows every start and stop costs a factorisation per step and moves
+        # the surface no more than its mean does
+        n = max(1, round(600.0 / dt))
+        count = np.bincount(np.arange(len(theta)) // n)
+        return np.repeat(np.add.reduceat(theta, np.arange(0, len(theta), n)) / count[:, None], count, axis=0)
     if pattern == "low":
         return np.broadcast_to(low, theta.shape).copy()
     if pattern == "high":
@@ -123,5 +127,5 @@ def _films(rng: np.random.Generator, load: LoadModel, theta: np.ndarray, pattern
 
 def theta_bounds(load: LoadModel) -> tuple[np.ndarray, np.ndarray]:
     """Certified bounds (n_theta,) of the affine coefficients [W/(m^2 K)]."""
-    terms = (*load.films, *load.joints)
+    terms: tuple[Film | Joint, ...] = (*load.films, *load.joints)
     return np.array([t.low for t in terms]), np.array([t.high for t in terms])

@@ -108,8 +108,8 @@ def simulate_run(
     """The full model of a description driven by the loads of a run folder, as a run, and its worst heat balance error.
 
     mesh_size [m]: mesh anew with the model's geometry.py. TCP rows lie at the times and positions of the run's tcp.csv,
-    else every `tcp_every` [s] at the logged axis positions. The machine starts at the run's initial temperature, else at
-    the first ambient value.
+    else every `tcp_every` [s] at the logged axis positions. The machine starts at the run's initial temperature, else
+    at the first ambient value.
     """
     machine = load_machine(machine_path)
     if mesh_size is not None:
@@ -134,7 +134,9 @@ def simulate_run(
     kept = run.loads.time <= drive.time[-1]
     loads = Table(run.loads.time[kept], {k: v[kept] for k, v in run.loads.columns.items()}, run.loads.units)
     temperatures = Table(
-        result.time, dict(zip(result.sensors, result.temperatures.T, strict=True)), dict.fromkeys(result.sensors, "degC")
+        result.time,
+        dict(zip(result.sensors, result.temperatures.T, strict=True)),
+        dict.fromkeys(result.sensors, "degC"),
     )
     sigma = np.full(len(result.tcp_time), noise.displacement) if noise.displacement > 0 else None
     simulated = Run(

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -20,7 +21,7 @@ import scipy.sparse
 
 from twin.build.factorize import factorize
 from twin.rom.drive import Drive
-from twin.rom.model import AffineBody, MachineModel
+from twin.rom.model import AffineBody, MachineModel, Matrix
 
 
 def contact_matrix(model: MachineModel, drive: Drive, step: int) -> np.ndarray:
@@ -48,7 +49,7 @@ class _Factored:
     Q: np.ndarray  # (n_ports_b, n_ports_b)
 
 
-def system_matrix(body: AffineBody, theta: np.ndarray, rate: float):  # noqa: ANN201 - sparse or dense like the body
+def system_matrix(body: AffineBody, theta: np.ndarray, rate: float) -> Matrix:
     """rate E + A0 + sum_k theta_k A_k with rate = 1/h [1/s] (0: steady state)."""
     S = body.A0 + rate * body.E
     for k, a in zip(body.theta, body.A, strict=True):
@@ -73,18 +74,14 @@ class CoupledStepper:
         while len(cache) >= self._keep:  # free first: two factors of a large body need not fit beside a third
             cache.popitem(last=False)
         S = system_matrix(body, theta, rate)
+        solve: Callable[[np.ndarray], np.ndarray]
         if scipy.sparse.issparse(S):
             solve = factorize(S.tocsr(), rhs_hint=1000).solve
         elif body.symmetric:
             factor = scipy.linalg.cho_factor(S, lower=True, check_finite=False)
-
-            def solve(r: np.ndarray) -> np.ndarray:
-                return scipy.linalg.cho_solve(factor, r, check_finite=False)
+            solve = partial(scipy.linalg.cho_solve, factor, check_finite=False)
         else:
-            lu = scipy.linalg.lu_factor(S, check_finite=False)
-
-            def solve(r: np.ndarray) -> np.ndarray:
-                return scipy.linalg.lu_solve(lu, r, check_finite=False)
+            solve = partial(scipy.linalg.lu_solve, scipy.linalg.lu_factor(S, check_finite=False), check_finite=False)
 
         X = solve(np.ascontiguousarray(body.P)) if body.P.shape[1] else np.zeros_like(body.P)
         cache[key] = _Factored(solve, X, body.port_rows @ X)
@@ -99,7 +96,9 @@ class CoupledStepper:
         for body in self.model.bodies:
             rise = np.array(
                 [
-                    theta[k] * (drive.environment[step, load.films[k].environment] - T_ref) if k < len(load.films) else 0.0
+                    theta[k] * (drive.environment[step, load.films[k].environment] - T_ref)
+                    if k < len(load.films)
+                    else 0.0
                     for k in body.theta
                 ]
             )

@@ -57,7 +57,9 @@ def command(
     )
     write_run(Path(output), result)
     rows = 0 if result.tcp is None else len(result.tcp.time)
+    temperatures = result.temperatures
+    counts = (0, 0) if temperatures is None else (len(temperatures.time), len(temperatures.columns))
     click.echo(
-        f"{output}: {len(result.temperatures.time)} rows of {len(result.temperatures.columns)} temperatures, "
+        f"{output}: {counts[0]} rows of {counts[1]} temperatures, "
         f"{rows} TCP rows; heat balance closes to {balance:.1e} of the throughput"
     )

@@ -161,10 +161,15 @@ class Support(Entry):
 
 
 class Limits(Entry):
-    """Above these `twin verify` fails."""
+    """Above these errors, in a case of the stated size, `twin verify` fails.
+
+    The model is linear in its loads, so an error goes with the size of the temperature and TCP changes it belongs to.
+    """
 
     temperature: TemperatureDifference = Field(0.02, gt=0)
+    at_temperature_range: TemperatureDifference = Field(10.0, gt=0)  # largest change of any sensor in the case
     displacement: Length = Field(0.2e-6, gt=0)
+    at_displacement_range: Length = Field(38e-6, gt=0)  # largest change of the TCP error at any pose
 
 
 class MachineEntry(Entry):
