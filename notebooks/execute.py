@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -24,8 +25,9 @@ def execute(text: Path) -> None:
     notebook = jupytext.read(text)
     notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3", "language": "python"}
     root = {"metadata": {"path": HERE.parent}}
-    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")  # no ports: nothing to open or to clash
-    NotebookClient(notebook, km=kernel, timeout=1200, resources=root).execute()
+    with tempfile.TemporaryDirectory() as sockets:  # files instead of ports: nothing to open or to clash
+        kernel = AsyncKernelManager(kernel_name="python3", transport="ipc", ip=f"{sockets}/kernel")
+        NotebookClient(notebook, km=kernel, timeout=1200, resources=root).execute()
     for number, cell in enumerate(notebook.cells):  # nothing that differs from one execution to the next
         cell.id = f"cell-{number}"
         cell.metadata.pop("execution", None)

@@ -15,7 +15,8 @@ def lines(c: Certificate, every_output: bool = False) -> list[str]:
         f"certificate over {len(c.scenarios)} held-out scenarios of {c.hours:g} h and their steady states "
         f"(a new one exceeds these with probability <= {1 - c.confidence:.0%}):",
         f"  sensors   {c.max_temperature_error:.4f} K in a {c.case_temperature:g} K case "
-        f"(limit {c.limit_temperature:g} K); as drawn {error_T:.3f} K at ranges up to {span_T:.0f} K: {c.worst_temperature}",
+        f"(limit {c.limit_temperature:g} K); as drawn {error_T:.3f} K at ranges up to {span_T:.0f} K: "
+        f"{c.worst_temperature}",
         f"  TCP       {1e6 * c.max_displacement_error:.3f} um in a {1e6 * c.case_displacement:g} um case "
         f"(limit {1e6 * c.limit_displacement:g} um); as drawn {1e6 * error_u:.2f} um at ranges up to "
         f"{1e6 * span_u:.0f} um: {c.worst_displacement}",
