@@ -67,5 +67,5 @@ lock: ## resolve requirements.lock anew (keeps pins that still hold; UPGRADE=1 m
 
 .PHONY: clean
 clean: ## remove what was made here: .venv, caches, out/
-	rm -rf $(VENV) .cache out build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) .cache out build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find twin tests models benchmarks notebooks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -15,6 +15,7 @@ from twin.build.rich_basis import RichOptions, rich_basis, sample_points
 from twin.build.scenario import draw, theta_bounds
 from twin.build.stepper import CoupledStepper, heat_balance_error, sensor_temperatures, system_matrix, tcp_at_poses
 from twin.errors import ModelError
+from twin.rom.load_model import Signal
 
 
 def sparse(machine):
@@ -138,3 +139,17 @@ def test_scenarios_stay_in_the_box_and_repeat():
         assert np.all(drive.theta <= high + 1e-12)
         assert not drive.flags.any(), [n for n, f in zip(drive.flag_names, drive.flags.any(axis=0), strict=True) if f]
         assert np.array_equal(drive.power, draw(load, seed, hours=1.0).drive.power)
+
+
+def test_the_start_of_a_scenario_is_the_air_of_the_first_measured_environment():
+    """The same in every process, however names hash: an equal build gives an equal artefact."""
+    load = load_model()
+    pits = tuple(f"pit_{i}" for i in range(8))
+    load = replace(
+        load,
+        signals=load.signals + tuple(Signal(p, p, "degC", "value", 5.0, 35.0) for p in pits),
+        environments=(("floor", "", 19.0), *load.environments, *((p, p, 20.0) for p in pits)),
+    )
+    for seed in range(3):
+        scenario = draw(load, seed, hours=0.2, dt=1.0)
+        assert scenario.start == pytest.approx(scenario.drive.environment[0, 1], abs=0.02)

@@ -51,6 +51,10 @@ def test_film_ranges_look_at_every_corner():
     with pytest.raises(DescriptionError, match=r"gives 5 \.\. inf") as e:
         film_range(use, {"v": Signal("v", "v", "m/s", "value", 0.0, np.inf)}, "films.a")
     assert e.value.problems[0].where == "films.a"
+    without_natural_part = LawUse("forced_film", {"natural": 0.0, "forced": 10.0}, {"speed": "v"})
+    with pytest.raises(DescriptionError, match=r"gives 0 \.\. 30") as e:
+        film_range(without_natural_part, {"v": Signal("v", "v", "m/s", "value", 0.0, 3 ** (1 / 0.8))}, "films.a")
+    assert "adiabatic" in e.value.problems[0].remedy
 
 
 def test_the_load_model_survives_json():

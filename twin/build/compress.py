@@ -47,11 +47,14 @@ def trajectories(rich: MachineModel, scenarios: Iterable[Scenario], every: int =
     return [np.column_stack(c) for c in columns]
 
 
+PORT_WEIGHT = 1 / 30  # ports are no outputs, but neighbours feel them; without them TCP errors are a tenth larger
+
+
 def _weight(body: AffineBody, unit: Tolerances) -> np.ndarray:
     """Gram matrix (n, n) of the norm of the limits for a dense body with E = 1."""
     W = body.E / (body.one @ body.energy) / unit.temperature**2
-    if body.C.shape[0]:
-        W = W + body.C.T @ body.C / unit.temperature**2
+    W = W + body.C.T @ body.C / unit.temperature**2
+    W = W + PORT_WEIGHT * (body.P @ body.port_rows) / unit.temperature**2
     rows = body.G.reshape(-1, body.n)
     if rows.shape[0]:
         W = W + rows.T @ rows / (rows.shape[0] / 3) / unit.displacement**2

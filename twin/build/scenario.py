@@ -39,7 +39,7 @@ def draw(load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still
     time = np.arange(n + 1) * sampling
     signals = {}
     positions = {axis.position: axis for axis in load.axes}
-    air = {signal for _, signal, _ in load.environments if signal}
+    air = [signal for _, signal, _ in load.environments if signal]
     centre = None
     for signal in load.signals:
         if signal.name in positions:
@@ -54,7 +54,7 @@ def draw(load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still
             signals[signal.name] = _load(rng, time, signal.low, signal.high, pattern)
     drive = evaluate(load, time, signals, dt)
     drive = replace(drive, theta=_films(rng, load, drive.theta, film, dt))
-    start = float(signals[next(iter(air))][0]) if air else load.environments[0][2]
+    start = float(signals[air[0]][0]) if air else load.environments[0][2]
     return Scenario(f"seed {seed}: {pattern}, films {film}, ambient {ambient}", drive, start)
 
 

@@ -23,7 +23,7 @@ JOINT_MARGIN = 3.0  # certified joint conductances: a third to three times the d
 def load_model(machine: Machine, ports: ContactPorts) -> LoadModel:
     """Everything that turns a load log into heat, of a description whose references are sound.
 
-    Raises DescriptionError for a film law that turns negative or infinite within its signals' ranges.
+    Raises DescriptionError for a film law that is not positive and finite within its signals' ranges.
     """
     signals = {name: wiring.signal(name, entry) for name, entry in machine.signals.items()}
     environments = tuple(wiring.environment(name, entry, machine) for name, entry in machine.environment.items())
@@ -54,7 +54,7 @@ def film_range(use: LawUse, signals: Mapping[str, Signal], where: str) -> tuple[
     """Certified range [W/(m^2 K)] of a film: margins around its law over the corners of its signals' ranges.
 
     Zero counts as a corner where a range includes it: laws in |v| have their least value there. Raises DescriptionError
-    where the law turns negative or infinite.
+    where the law is not positive and finite: ranges are sampled on a logarithmic scale.
     """
     names = sorted(set(use.signals.values()))
     ranges = [(signals[n].low, signals[n].high) for n in names]
@@ -64,10 +64,11 @@ def film_range(use: LawUse, signals: Mapping[str, Signal], where: str) -> tuple[
     corners = np.array(combinations, dtype=float).reshape(len(combinations), len(names))
     values = law_values([use], dict(zip(names, corners.T, strict=True)), len(corners))
     low, high = float(values.min()), float(values.max())
-    if not (low >= 0 and math.isfinite(high)):
+    if not (low > 0 and math.isfinite(high)):
         raise DescriptionError(
             f"law '{use.law}' gives {low:g} .. {high:g} W/(m^2 K) over its signals' ranges",
             where,
-            "film coefficients are finite and not negative: check parameters and ranges",
+            "film coefficients are finite and above zero, at rest too: check parameters and ranges; "
+            "list surfaces without convection under `adiabatic` of their part",
         )
     return FILM_MARGIN[0] * low, FILM_MARGIN[1] * high

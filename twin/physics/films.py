@@ -14,6 +14,8 @@ def forced_film(speed, natural, forced, exponent):
     """alpha = alpha_natural + alpha_forced |v|^m with v in m/s. Source: paper 000 eq (7).
 
     The forced part of moving components is a free parameter in paper 000; m = 0.8 as for a turbulent plate
-    (Nu ~ Re^0.8, VDI-Waermeatlas).
+    (Nu ~ Re^0.8, VDI-Waermeatlas). Its derivative by speed, infinite at rest, is taken as zero there.
     """
-    return natural + forced * jnp.abs(speed) ** exponent
+    v = jnp.abs(speed)
+    power = jnp.where(v > 0.0, v, 1.0) ** exponent
+    return natural + forced * jnp.where(v > 0.0, power, 0.0)

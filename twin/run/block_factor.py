@@ -2,11 +2,12 @@
 
 Bodies touch their neighbours only, and a chain or tree eliminated from its leaves has no fill-in: the work is a sum of
 n_b^3 over the bodies instead of (sum n_b)^3, and a solve is a few products with small dense blocks. Golub, Van Loan,
-Matrix Computations, 4th ed., section 4.5 (block LDL^T); with D_i the pivot blocks that are left after elimination of
-earlier bodies, the factor holds D_i^-1, L_ji = S_ji D_i^-1 and R_ij = D_i^-1 S_ij for coupled later bodies j.
+Matrix Computations, 4th ed., sections 4.2.9 and 4.5; D_i are the pivot blocks left after elimination of earlier bodies.
 
-Pivot blocks are inverted by Cholesky for symmetric positive definite matrices (block elimination is then stable
-without pivoting) and by LU with pivoting inside the block otherwise.
+- symmetric positive definite: block Cholesky, D_i = G_i G_i^T. The factor holds G_i^-1 and L_ji = S_ji G_i^-T for
+  coupled later bodies j. Inverted triangles turn the many solves of frozen steps into products; D_i^-1 itself would
+  save a product per solve and cost n_i^3 more per factorisation.
+- otherwise: block LU, pivoting inside the blocks only. The factor holds D_i^-1, L_ji = S_ji D_i^-1, R_ij = D_i^-1 S_ij.
 """
 
 from __future__ import annotations
@@ -52,17 +53,17 @@ def plan(n_bodies: int, edges: set[tuple[int, int]]) -> Elimination:
 class BlockFactor:
     """Parallel to Elimination.order; inner tuples parallel to Elimination.later."""
 
-    pivot: tuple[jax.Array, ...]  # D_i^-1 (n_i, n_i)
+    pivot: tuple[jax.Array, ...]  # G_i^-1, or D_i^-1 for oblique matrices (n_i, n_i)
     left: tuple[tuple[jax.Array, ...], ...]  # L_ji (n_j, n_i)
-    right: tuple[tuple[jax.Array, ...], ...]  # R_ij (n_i, n_j); empty for symmetric matrices, where R_ij = L_ji^T
+    right: tuple[tuple[jax.Array, ...], ...]  # R_ij (n_i, n_j); empty for symmetric matrices
 
 
 def _inverse(block: jax.Array, symmetric: bool) -> jax.Array:
+    """G^-1 of G G^T = block, or block^-1."""
     if not symmetric:
         return jnp.linalg.inv(block)
     lower = jnp.linalg.cholesky(block, symmetrize_input=False)
-    inverse = solve_triangular(lower, jnp.eye(len(block)), lower=True)
-    return inverse.T @ inverse
+    return solve_triangular(lower, jnp.eye(len(block)), lower=True)
 
 
 def factorise(blocks: Blocks, elimination: Elimination, symmetric: bool) -> BlockFactor:
@@ -71,10 +72,10 @@ def factorise(blocks: Blocks, elimination: Elimination, symmetric: bool) -> Bloc
     pivots, lefts, rights = [], [], []
     for i, later in zip(elimination.order, elimination.later, strict=True):
         pivot = _inverse(S[i, i], symmetric)
-        left = tuple(S[j, i] @ pivot for j in later)
+        left = tuple(S[j, i] @ (pivot.T if symmetric else pivot) for j in later)
         for j, L in zip(later, left, strict=True):
-            for k in later:
-                update = L @ S[i, k]
+            for k, beside in zip(later, left, strict=True):
+                update = L @ (beside.T if symmetric else S[i, k])
                 S[j, k] = S[j, k] - update if (j, k) in S else -update
         pivots.append(pivot)
         lefts.append(left)
@@ -86,12 +87,18 @@ def solve(factor: BlockFactor, elimination: Elimination, right: list[jax.Array],
     """Solution per body for right-hand sides per body (n_b,)."""
     y = list(right)
     for place, (i, later) in enumerate(zip(elimination.order, elimination.later, strict=True)):
+        if symmetric:
+            y[i] = factor.pivot[place] @ y[i]
         for j, L in zip(later, factor.left[place], strict=True):
             y[j] = y[j] - L @ y[i]
     for place in reversed(range(len(elimination.order))):
-        i = elimination.order[place]
-        x = factor.pivot[place] @ y[i]
-        for k, j in enumerate(elimination.later[place]):
-            x = x - (factor.left[place][k].T @ y[j] if symmetric else factor.right[place][k] @ y[j])
-        y[i] = x
+        i, later = elimination.order[place], elimination.later[place]
+        if symmetric:
+            for j, L in zip(later, factor.left[place], strict=True):
+                y[i] = y[i] - L.T @ y[j]
+            y[i] = factor.pivot[place].T @ y[i]
+        else:
+            y[i] = factor.pivot[place] @ y[i]
+            for j, R in zip(later, factor.right[place], strict=True):
+                y[i] = y[i] - R @ y[j]
     return y
