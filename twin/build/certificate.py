@@ -1,8 +1,10 @@
 """The certificate: maximum error per output over held-out scenarios, the box it was tested in.
 
-"Scenario-certified": with N exchangeable held-out scenarios a new one exceeds the observed maximum with probability
-<= 1/(N + 1) (Vovk et al. 2005, conformal prediction); N = 19 gives 95 %. It is no bound: the rigorous energy-norm
-residual bound overestimates by 45 to 65,000 here and would be ignored. Outside the box every result is flagged.
+"Scenario-certified": with N exchangeable held-out scenarios a new one exceeds the observed maximum of any one quantity
+with probability <= 1/(N + 1) (Vovk et al. 2005, conformal prediction); N = 19 gives 95 %. This holds for compact
+against rich; rich against full, added from a few scenarios chosen by cost, is a check without a probability. It is no
+bound: the rigorous energy-norm residual bound overestimates by 45 to 65,000 here and would be ignored. Outside the box
+every result is flagged.
 """
 
 from __future__ import annotations

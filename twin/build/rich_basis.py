@@ -3,8 +3,8 @@
 For sampled (s, theta) the basis holds (s E + A(theta))^-1 [B, M, P, C^T, G^T, P_out]. Theorem (Grimme 1997; for
 parameters Baur, Beattie, Benner, Gugercin, SIAM J. Sci. Comput. 33, 2011): the Galerkin model interpolates the transfer
 function at every sampled (s, theta), and because input and adjoint directions are both in the basis also its
-derivatives with respect to s and theta. With moving contacts as ports, no basis per pose is needed: the position
-changes only how ports are combined (`twin.rom.contact`).
+derivatives with respect to s and theta; here up to the small directions that are dropped (`RichOptions`). With moving
+contacts as ports, no basis per pose is needed: the position changes only how ports are combined (`twin.rom.contact`).
 
 One shift, or many shifts at one film coefficient, stall at 1e-3 to 1e-2 of the range (docs/decisions/0002); the samples
 therefore fill (log s, log theta) jointly. The adjoints are the cheapest accuracy there is.

@@ -13,7 +13,7 @@ def lines(c: Certificate, every_output: bool = False) -> list[str]:
     error_T, error_u = max(c.temperature_error, default=0.0), np.max(c.displacement_error, initial=0.0)
     text = [
         f"certificate over {len(c.scenarios)} held-out scenarios of {c.hours:g} h and their steady states "
-        f"(a new one exceeds these with probability <= {1 - c.confidence:.0%}):",
+        f"(compact against rich, a new one exceeds any one maximum with probability <= {1 - c.confidence:.0%}):",
         f"  sensors   {c.max_temperature_error:.4f} K in a {c.case_temperature:g} K case "
         f"(limit {c.limit_temperature:g} K); as drawn {error_T:.3f} K at ranges up to {span_T:.0f} K: "
         f"{c.worst_temperature}",

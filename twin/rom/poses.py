@@ -5,7 +5,8 @@ stations. Three kinds, all exact at the nodes and for linear functions:
 
 - "linear": multilinear, error h^2/8 max|f''|; never overshoots;
 - "cubic": four nearest nodes, error of order h^4; continuous;
-- "lagrange": one polynomial through all nodes; best on few nodes of a smooth function, wild beyond about ten.
+- "lagrange": one polynomial through all nodes; best on few nodes of a smooth function, and so the default; wild beyond
+  about ten, so that axes with more than seven nodes fall back to "cubic".
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ import numpy as np
 
 Kind = Literal["linear", "cubic", "lagrange"]
 _WINDOW = {"linear": 2, "cubic": 4, "lagrange": None}  # nodes used along an axis; None: all of them
+MOST_LAGRANGE = 7  # nodes of an axis
 
 
-def axis_weights(nodes: np.ndarray, s: np.ndarray, kind: Kind = "cubic") -> np.ndarray:
+def axis_weights(nodes: np.ndarray, s: np.ndarray, kind: Kind = "lagrange") -> np.ndarray:
     """Weights (m, n) of nodes (n,) [m], increasing, at coordinates s (m,) [m], clipped to the nodes' range.
 
     Lagrange polynomials over a window of nodes around s (fewer where the axis has fewer). Each row sums to 1.
@@ -27,7 +29,7 @@ def axis_weights(nodes: np.ndarray, s: np.ndarray, kind: Kind = "cubic") -> np.n
     nodes = np.asarray(nodes, dtype=float)
     s = np.clip(np.asarray(s, dtype=float), nodes[0], nodes[-1])
     n = len(nodes)
-    size = min(_WINDOW[kind] or n, n)
+    size = min(_WINDOW[kind if n <= MOST_LAGRANGE or kind == "linear" else "cubic"] or n, n)
     cell = np.clip(np.searchsorted(nodes, s, side="right") - 1, 0, max(n - 2, 0))
     window = np.clip(cell - (size - 2) // 2, 0, n - size)[:, None] + np.arange(size)  # (m, size)
     x = nodes[window]
@@ -40,7 +42,7 @@ def axis_weights(nodes: np.ndarray, s: np.ndarray, kind: Kind = "cubic") -> np.n
 
 
 def pose_weights(
-    grid: Sequence[np.ndarray], position: np.ndarray, kind: Kind = "cubic"
+    grid: Sequence[np.ndarray], position: np.ndarray, kind: Kind = "lagrange"
 ) -> tuple[np.ndarray, np.ndarray]:
     """Weights (m, n_poses) on the C-ordered grid at positions (m, n_axes) [m], and where they lie outside it (m,) bool.
 

@@ -34,7 +34,7 @@ def replay(
     initial: float | np.ndarray | None = None,
     checkpoints: CheckpointFolder | None = None,
     progress: Progress = silent,
-    interpolation: Kind = "cubic",
+    interpolation: Kind = "lagrange",
 ) -> Result:
     """Step the artefact's model through the loads of a run.
 
@@ -63,7 +63,7 @@ def replay_drive(
     initial: float | np.ndarray,
     checkpoints: CheckpointFolder | None = None,
     progress: Progress = silent,
-    interpolation: Kind = "cubic",
+    interpolation: Kind = "lagrange",
 ) -> Result:
     """The same for loads that are evaluated already; position (n_axes,) [m] at the start. See `replay`."""
     model = artefact.model
