@@ -7,7 +7,7 @@ import importlib
 import resource
 import time
 
-NAMES = ("poses", "moved", "step", "replay", "growth", "pymor")
+NAMES = ("certificate", "case", "poses", "moved", "step", "replay", "growth", "pymor")
 
 
 def main() -> None:

@@ -15,11 +15,11 @@ def main() -> None:
     options = BuildOptions()
     unit = Tolerances(machine().limits.temperature, machine().limits.displacement)
     load = rich().load_model
-    still = [draw(load, TRAINING_SEED + i, options.hours, options.step, still=True) for i in range(options.training)]
+    still = [draw(load, TRAINING_SEED + i, 4.0, 2 * options.step, still=True) for i in range(60)]
     one_pose = galerkin(rich(), trajectories(rich(), still), options.states, unit)
     moving = [draw(load, VERIFY_SEED + i, options.hours, options.step) for i in range(6)]
     for label, model in (("trained at one pose", one_pose), ("ours", compact())):
-        result = compare(rich(), model, moving)
+        result = compare(rich(), model, moving, options.substeps)
         T, u = result.temperature_error.max(), result.displacement_error.max()
         share = (result.temperature_error.max(axis=0) / result.temperature_range).max()
         print(

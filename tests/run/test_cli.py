@@ -82,7 +82,7 @@ def test_resume_of_a_finished_run_and_equal_files(inputs, output, tmp_path):
 
 def test_flags_are_told(inputs, tmp_path):
     told = call(run, *inputs, "-o", str(tmp_path / "r"), "--dt", "30 s")
-    assert "step shorter than the certified 60 s: 121 steps" in told.output
+    assert "substep shorter than the certified 15 s: 121 steps" in told.output
 
 
 def test_info(inputs):

@@ -131,7 +131,7 @@ def test_flags_of_the_runtime(artefact, result):
         return {name for k, name in enumerate(r.flag_names) if r.flags[:, k].any()}
 
     assert raised(result) == set()
-    assert raised(replay(artefact, RUN, dt=30.0)) == {"step shorter than the certified 60 s"}
+    assert raised(replay(artefact, RUN, dt=30.0)) == {"substep shorter than the certified 15 s"}
     position = RUN.loads.columns["x_position"] * 0.9 / 0.8
     beyond = raised(replay(artefact, synthetic_run.run(MODEL, x_position=position)))
     assert {"axes.x beyond its stroke", "position outside the pose grid, TCP error of its border"} <= beyond

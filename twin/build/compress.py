@@ -47,14 +47,10 @@ def trajectories(rich: MachineModel, scenarios: Iterable[Scenario], every: int =
     return [np.column_stack(c) for c in columns]
 
 
-PORT_WEIGHT = 1 / 30  # ports are no outputs, but neighbours feel them; without them TCP errors are a tenth larger
-
-
 def _weight(body: AffineBody, unit: Tolerances) -> np.ndarray:
     """Gram matrix (n, n) of the norm of the limits for a dense body with E = 1."""
     W = body.E / (body.one @ body.energy) / unit.temperature**2
     W = W + body.C.T @ body.C / unit.temperature**2
-    W = W + PORT_WEIGHT * (body.P @ body.port_rows) / unit.temperature**2
     rows = body.G.reshape(-1, body.n)
     if rows.shape[0]:
         W = W + rows.T @ rows / (rows.shape[0] / 3) / unit.displacement**2
@@ -99,6 +95,9 @@ def galerkin(rich: MachineModel, snapshots: list[np.ndarray], states: int, unit:
     return replace(rich, bodies=tuple(bodies))
 
 
+PORT_WEIGHT = 1 / 30  # of a port's temperature beside a sensor's: as outputs of full weight ports crowd out the TCP
+
+
 def balanced(
     rich: MachineModel, snapshots: list[np.ndarray], states: int, unit: Tolerances, films: int = 8, seed: int = 7
 ) -> MachineModel:
@@ -117,7 +116,7 @@ def balanced(
             [
                 body.C / unit.temperature,
                 rows / unit.displacement / np.sqrt(max(len(rows) / 3, 1)),
-                body.port_rows / unit.temperature,
+                PORT_WEIGHT * body.port_rows / unit.temperature,
             ]
         )
         Q = np.zeros((body.n, body.n))

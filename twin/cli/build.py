@@ -17,7 +17,7 @@ import click
 )
 @click.option("--states", default=400, show_default=True, help="reduced states of the whole machine")
 @click.option("--samples", default=16, show_default=True, type=click.IntRange(2), help="points of the rich basis")
-@click.option("--training", default=80, show_default=True, type=click.IntRange(1), help="training scenarios")
+@click.option("--training", default=90, show_default=True, type=click.IntRange(1), help="training scenarios")
 def command(machine: str, output: str, method: str, states: int, samples: int, training: int) -> int:
     """Reduce MACHINE to a compact artefact and certify it against the rich model on held-out scenarios."""
     from dataclasses import replace

@@ -20,7 +20,8 @@ def lines(c: Certificate, every_output: bool = False) -> list[str]:
         f"  TCP       {1e6 * c.max_displacement_error:.3f} um in a {1e6 * c.case_displacement:g} um case "
         f"(limit {1e6 * c.limit_displacement:g} um); as drawn {1e6 * error_u:.2f} um at ranges up to "
         f"{1e6 * span_u:.0f} um: {c.worst_displacement}",
-        f"  worst output relative to its own range: {100 * c.worst_relative:.2f} %",
+        f"  worst output relative to its own range: {100 * c.worst_relative:.2f} % "
+        f"(limit {100 * c.limit_relative:g} %)",
     ]
     if c.rich_temperature_error is not None and c.rich_displacement_error is not None:
         text.append(

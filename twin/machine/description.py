@@ -170,6 +170,7 @@ class Limits(Entry):
     at_temperature_range: TemperatureDifference = Field(10.0, gt=0)  # largest change of any sensor in the case
     displacement: Length = Field(0.2e-6, gt=0)
     at_displacement_range: Length = Field(38e-6, gt=0)  # largest change of the TCP error at any pose
+    relative: float = Field(0.01, gt=0)  # of every output's own range over all scenarios
 
 
 class MachineEntry(Entry):
