@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from twin.atomic import atomic_folder, atomic_path
+from twin.atomic import atomic_folder, atomic_path, check_file, check_folder
 from twin.errors import TwinError
 
 
@@ -52,3 +52,19 @@ def test_a_file_keeps_its_content_when_writing_fails(tmp_path: Path, error):
         half(path)
     assert target.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["f"]
+
+
+def test_places_that_cannot_be_written_are_told_beforehand(tmp_path: Path, monkeypatch):
+    check_file(tmp_path / "new" / "folder" / "a.h5")
+    check_folder(tmp_path)
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(TwinError, match="is a folder"):
+        check_file(tmp_path)
+    for folder in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(TwinError, match="is a file") as caught:
+            check_folder(folder)
+        assert str(caught.value).startswith(f"{tmp_path / 'file'}: ")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    with pytest.raises(TwinError, match="Permission denied"):
+        check_file(tmp_path / "new" / "a.h5")
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]

@@ -11,6 +11,23 @@ from pathlib import Path
 from twin.errors import TwinError
 
 
+def check_folder(folder: Path) -> None:
+    """Raises TwinError where files cannot be written to `folder`, which need not exist: before hours are spent."""
+    remedy = "choose another folder with -o"
+    there = next((p for p in (folder, *folder.absolute().parents) if p.exists()), folder)
+    if not there.is_dir():
+        raise TwinError("is a file, not a folder", str(there), remedy)
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise TwinError("cannot write: Permission denied", str(there), f"check its permissions, or {remedy}")
+
+
+def check_file(target: Path) -> None:
+    """The same for a file to be written."""
+    if target.is_dir():
+        raise TwinError("is a folder, not a file", str(target), "name a file with -o")
+    check_folder(target.parent)
+
+
 @contextmanager
 def atomic_path(target: Path) -> Iterator[Path]:
     """Yield a temporary path in the target's folder; rename it to `target` on success, remove it on any failure.

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 
 import h5py
 import numpy as np
@@ -106,5 +107,34 @@ def test_bad_input_is_a_twin_error(inputs, tmp_path):
     (tmp_path / "bad.h5").write_text("nonsense")
     with pytest.raises(ArtefactError):
         call(info, str(tmp_path / "bad.h5"))
-    with pytest.raises(TwinError, match="time step"):
-        call(run, *inputs, "-o", str(tmp_path / "r"), "--dt", "-5 s")
+    for option, value in (("--dt", "-5 s"), ("--initial", "-400 degC"), ("-o", str(tmp_path / "bad.h5"))):
+        with pytest.raises(TwinError) as caught:
+            call(run, *inputs, "-o", str(tmp_path / "r"), option, value)
+        assert (value if option == "-o" else option) in str(caught.value)
+    with pytest.raises(ArtefactError, match="folder"):
+        call(info, str(tmp_path))
+
+
+def test_measured_data_is_never_replaced_by_results(inputs, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(inputs[1], folder)
+    (folder / "temperatures.csv").write_text("time [s],T00 [degC]\n0,20\n")
+    before = {p.name: p.read_bytes() for p in folder.iterdir()}
+    with pytest.raises(TwinError, match="run folder") as caught:
+        call(run, inputs[0], str(folder), "-o", str(folder))
+    assert "-o" in str(caught.value)
+    assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
+
+
+def test_loads_beyond_all_reason_leave_no_result(inputs, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(inputs[1], folder)
+    lines = (folder / "loads.csv").read_text().splitlines()
+    column = next(i for i, name in enumerate(lines[0].split(",")) if "current" in name)
+    cells = lines[5].split(",")
+    cells[column] = "1e300"
+    lines[5] = ",".join(cells)
+    (folder / "loads.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(TwinError, match="not finite"):
+        call(run, inputs[0], str(folder), "-o", str(tmp_path / "r"))
+    assert not (tmp_path / "r" / "result.h5").exists()

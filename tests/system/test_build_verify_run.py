@@ -53,6 +53,46 @@ def test_verify_refuses_another_machine(slide_artefact, tmp_path, capsys):
     assert "not the machine" in capsys.readouterr().err
 
 
+def test_build_refuses_what_check_refuses(tmp_path, capsys):
+    machine = tmp_path / "machine.toml"
+    text = (SLIDE / "machine.toml").read_text(encoding="utf-8")
+    machine.write_text(text.replace('conductivity = "50 W/(m*K)"', 'conductivity = "50 W/(mm*K)"'), encoding="utf-8")
+    assert run(["build", str(machine), "-o", str(tmp_path / "a.h5")]) == 2
+    assert "off by a factor 1000" in capsys.readouterr().err
+    assert run(["build", str(SLIDE), "-o", str(tmp_path)]) == 2
+    assert "is a folder" in capsys.readouterr().err
+    assert run(["build", str(SLIDE), "-o", str(machine)]) == 2
+    assert "would replace an input" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["machine.toml"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--dt", "0 s"),
+        ("--dt", "-60 s"),
+        ("--tcp-every", "0 s"),
+        ("--noise-tcp", "-1 um"),
+        ("--seed", "-1"),
+        ("--size", "0 mm"),
+    ],
+)
+def test_simulate_refuses_numbers_out_of_range(tmp_path, capsys, options):
+    short = str(SLIDE / "runs" / "short")
+    assert run(["simulate", str(SLIDE), short, "-o", str(tmp_path / "truth"), *options]) == 2
+    assert options[0] in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_simulate_never_replaces_the_run_it_reads(tmp_path, capsys):
+    folder = tmp_path / "run"
+    shutil.copytree(SLIDE / "runs" / "short", folder)
+    before = {p.name: p.read_bytes() for p in folder.iterdir()}
+    assert run(["simulate", str(SLIDE), str(folder), "-o", f"{folder}/../run", "--hours", "0.1"]) == 2
+    assert "is the run that is read" in capsys.readouterr().err
+    assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
+
+
 def test_runtime_equals_the_offline_stepper_on_the_same_model(slide_artefact):
     artefact = read_artefact(slide_artefact)
     model = artefact.model

@@ -23,13 +23,20 @@ def command(machine: str, output: str, method: str, states: int, samples: int, t
     from dataclasses import replace
     from pathlib import Path
 
+    from twin.atomic import check_file
     from twin.build.pipeline import BuildOptions
     from twin.build.product import build_artefact
     from twin.cli.certificate_text import lines
+    from twin.cli.sound import require_sound
+    from twin.errors import TwinError
     from twin.progress import bar
 
     options = BuildOptions(method=method, states=states, training=training)  # type: ignore[arg-type]
     options = replace(options, rich=replace(options.rich, samples=samples))
+    check_file(Path(output))
+    if Path(output).suffix in (".toml", ".msh", ".csv"):
+        raise TwinError("would replace an input", output, "name an artefact with -o, for example -o out/machine.h5")
+    require_sound(Path(machine))
     result = build_artefact(Path(machine), Path(output), options, bar)
     click.echo("\n".join([f"wrote {output}", *lines(result), f"next: twin verify {output}"]))
     return 0 if result.passed else 1

@@ -13,6 +13,8 @@ def command(output: str) -> int:
     Exit status 1 if the certificate is above the machine's limits.
     """
     import shlex
+    import shutil
+    import sys
     import time
     from pathlib import Path
 
@@ -40,15 +42,16 @@ def command(output: str) -> int:
         if status > 1:
             return status
         kept &= status == 0
+    program = "twin" if shutil.which("twin") else sys.argv[0]
     click.secho(f"\ndone in {time.perf_counter() - began:.0f} s", bold=True)
     click.echo(
-        f"made   {artefact}: the artefact (twin info {artefact})\n"
+        f"made   {artefact}: the artefact ({program} info {artefact})\n"
         f"       {result}/result.h5, temperatures.csv, tcp.csv, summary.json: the numbers\n"
         f"       {result}/index.html: the pictures\n"
         f"next   change something and see what it does:\n"
-        f"       twin run {artefact} {experiment} --dt '30 s' -o {output}/finer\n"
-        f"       edit a conductance in {machine}/machine.toml, then: twin check {machine}\n"
-        f"       twin simulate {machine} {experiment} --hours 1 -o {output}/truth    the full model, for comparison\n"
+        f"       {program} run {artefact} {experiment} --dt '30 s' --substeps 2 -o {output}/finer\n"
+        f"       edit a conductance in {machine}/machine.toml, then: {program} check {machine}\n"
+        f"       {program} simulate {machine} {experiment} --hours 1 -o {output}/truth    the full model\n"
         f"       notebooks/build_and_run.ipynb    the same story step by step"
     )
     if not kept:

@@ -29,25 +29,28 @@ def command(
     import numpy as np
 
     from twin import __version__
-    from twin.cli.quantity import option
+    from twin.atomic import check_folder
+    from twin.cli.quantity import option, positive
     from twin.errors import TwinError
     from twin.logs.read import read_run
     from twin.progress import bar
     from twin.rom.artefact import read_artefact
     from twin.run.checkpoint import CheckpointFolder
-    from twin.run.results import read_final_state, write_results
+    from twin.run.results import read_final_state, refuse_run_folder, write_results
 
     loaded = read_artefact(Path(artefact))
-    step = option("--dt", dt, "s")
-    if not 0.0 < step < np.inf:
-        raise TwinError(f"a time step of {step:g} s", "--dt", "give a positive time, for example --dt '60 s'")
+    step = positive("--dt", dt, "s")
     start: float | np.ndarray | None = None
     if initial is not None:
         if initial.endswith(".h5"):
             start = read_final_state(Path(initial), loaded.digest)
         else:
             start = option("--initial", initial, "degC")
+            if not -273.15 <= start < np.inf:
+                raise TwinError(f"{initial} is no temperature", "--initial", "write --initial '20 degC', for example")
     folder = Path(output)
+    check_folder(folder)
+    refuse_run_folder(folder)
     checkpoints = CheckpointFolder(folder / "checkpoints", checkpoint, resume)
     result = replay(loaded, read_run(Path(run)), step, substeps, start, checkpoints, bar)
     facts = {

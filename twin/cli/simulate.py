@@ -19,7 +19,7 @@ import click
 @click.option("--tcp-every", default="30 min", show_default=True, help="TCP rows, where the run has no tcp.csv")
 @click.option("--noise-temperature", default="0 K", show_default=True, help="standard deviation at sensors")
 @click.option("--noise-tcp", default="0 um", show_default=True, help="standard deviation of TCP rows")
-@click.option("--seed", default=0, show_default=True, help="of the noise")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="of the noise")
 def command(
     machine: str,
     run: str,
@@ -37,21 +37,31 @@ def command(
     from pathlib import Path
 
     from twin.build.simulate import Noise, simulate_run
-    from twin.cli.quantity import option
-    from twin.logs.write import write_run
+    from twin.cli.quantity import positive
+    from twin.cli.sound import require_sound
+    from twin.errors import LogError
+    from twin.logs.write import refuse_to_destroy, write_run
     from twin.progress import bar
 
     noise = Noise(
-        option("--noise-temperature", noise_temperature, "delta_degC"), option("--noise-tcp", noise_tcp, "m"), seed
+        positive("--noise-temperature", noise_temperature, "delta_degC", zero=True),
+        positive("--noise-tcp", noise_tcp, "m", zero=True),
+        seed,
     )
+    mesh_size = positive("--size", size, "m") if size else None
+    step, every = positive("--dt", dt, "s"), positive("--tcp-every", tcp_every, "s")
+    if Path(output).resolve() == Path(run).resolve():
+        raise LogError("is the run that is read", output, "choose another folder with -o")
+    refuse_to_destroy(Path(output))  # now, not after hours
+    require_sound(Path(machine))
     result, balance = simulate_run(
         Path(machine),
         Path(run),
-        mesh_size=option("--size", size, "m") if size else None,
-        dt=option("--dt", dt, "s"),
+        mesh_size=mesh_size,
+        dt=step,
         substeps=substeps,
         hours=hours,
-        tcp_every=option("--tcp-every", tcp_every, "s"),
+        tcp_every=every,
         noise=noise,
         progress=bar,
     )

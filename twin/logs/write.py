@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from twin.atomic import atomic_folder
+from twin.atomic import atomic_folder, check_folder
 from twin.errors import LogError
 from twin.logs.run import Run, Table, Tcp
 
@@ -22,7 +22,7 @@ def write_run(folder: Path, run: Run) -> None:
     Raises LogError where `folder` holds measured data or other files, TwinError where it cannot be written.
     """
     folder = Path(folder)
-    _refuse_to_destroy(folder)
+    refuse_to_destroy(folder)
     with atomic_folder(folder) as new:
         (new / "run.toml").write_text(_facts(run), encoding="utf-8")
         write_table(new / "loads.csv", run.loads)
@@ -32,11 +32,13 @@ def write_run(folder: Path, run: Run) -> None:
             write_tcp(new / "tcp.csv", run.tcp)
 
 
-def _refuse_to_destroy(folder: Path) -> None:
+def refuse_to_destroy(folder: Path) -> None:
+    """Raises LogError where `folder` is no place for a computed run, TwinError where it cannot be written."""
+    if folder.exists() and not folder.is_dir():
+        raise LogError("is a file, not a folder", str(folder), "choose another folder with -o")
+    check_folder(folder)
     if not folder.exists():
         return
-    if not folder.is_dir():
-        raise LogError("is a file, not a folder", str(folder), "choose another folder with -o")
     others = sorted({p.name for p in folder.iterdir()} - _FILES)
     if others:
         raise LogError(f"holds other files: {', '.join(others[:5])}", str(folder), "choose another folder with -o")

@@ -176,7 +176,8 @@ def read_artefact(path: Path) -> Artefact:
     path = Path(path)
     rebuild = "build the artefact again with `twin build`"
     if not path.is_file():
-        raise ArtefactError("no such file", str(path), rebuild)
+        what = "is a folder, not an artefact" if path.is_dir() else "no such file"
+        raise ArtefactError(what, str(path), f"check the path, or {rebuild}")
     with path.open("rb") as start:
         signature = start.read(8)
     if signature != b"\x89HDF\r\n\x1a\n":
@@ -191,7 +192,8 @@ def read_artefact(path: Path) -> Artefact:
 
 
 def _plain(e: Exception) -> str:
-    return str(e.args[0] if e.args else e).strip("\"'")
+    text = str(e.args[0] if e.args else e)
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'" else text
 
 
 def _digest(f: h5py.File) -> str:

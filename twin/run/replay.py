@@ -71,6 +71,10 @@ def replay_drive(
     start = prepared.uniform(initial) if isinstance(initial, float | int) else prepared.from_artefact(initial)
     steps = march(prepared, inputs_of(model.load_model, drive, substeps), start, artefact.digest, checkpoints, progress)
     states = np.concatenate([start[None], steps.z])
+    if not np.isfinite(states).all():
+        step = int(np.argmin(np.isfinite(states).all(axis=1)))
+        what = f"the temperatures are not finite after {drive.time[step]:g} s"
+        raise TwinError(what, "loads", "a value in the loads is beyond all reason: run `twin check` on the run folder")
     temperature, tcp = _observe(prepared, states)
     air = drive.environment[:, [i for _, i in model.ambient_sensors]]
     positions = np.concatenate([position[None], drive.position])

@@ -93,12 +93,19 @@ def summary(result: Result) -> dict[str, Any]:
     }
 
 
+def refuse_run_folder(folder: Path) -> None:
+    """Raises TwinError for a run folder: results would replace its measured temperatures.csv and tcp.csv."""
+    if any((folder / name).exists() for name in ("run.toml", "loads.csv")):
+        raise TwinError("is a run folder, not one for results", str(folder), "choose another folder with -o")
+
+
 def write_results(folder: Path, result: Result, facts: Mapping[str, Any]) -> dict[str, Any]:
     """Write all files of a result, each whole or not at all; returns the summary, led by `facts`.
 
-    Raises TwinError if a file cannot be written.
+    Raises TwinError if a file cannot be written, and for run folders.
     """
     folder = Path(folder)
+    refuse_run_folder(folder)
     told = {**facts, **summary(result)}
     _write_hdf5(folder / "result.h5", result)
     columns = dict(zip(result.sensors, result.temperature.T, strict=True))
