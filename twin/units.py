@@ -161,7 +161,9 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re
 def to_si(value: float | int | str, unit: str) -> float:
     """`value` as a number in `unit` ("m", "W/(m^2*K)"; "degC" for points on the scale, "K" for differences).
 
-    A bare number is taken to be in `unit` already. Raises ValueError naming the expected unit.
+    A bare number is taken to be in `unit` already, a string must say its unit.
+
+    Raises ValueError naming the unit wanted.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a number or a string with a unit of {unit or '1'}")
@@ -178,7 +180,10 @@ def to_si(value: float | int | str, unit: str) -> float:
 
 def _convert(number: float, written: str, unit: str, whole: str) -> float:
     if not written.strip():
-        return number
+        if unit in ("", "1"):
+            return number
+        # 0.2 is 0.2 m by agreement, "0.2" is somebody's slip: was it mm?
+        raise ValueError(f"'{whole}' has no unit: write '{whole.strip()} {unit}', or the number without quotes")
     difference = unit in ("K", "delta_degC", "mK")
     target = _KNOWN["delta_degC"] if unit == "K" else parse_unit(unit)
     try:

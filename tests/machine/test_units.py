@@ -31,7 +31,7 @@ from twin.units import parse_unit, to_si
         ("5 kN/cm", "N/m", 5e5),  # this one and the next are left to pint
         ("1 mW/(cm*K)", "W/(m*K)", 0.1),
         ("3 ft", "m", 0.9144),
-        ("7", "m", 7.0),
+        ("7", "1", 7.0),
     ],
 )
 def test_to_si(value, unit, expected):
@@ -43,7 +43,7 @@ def test_to_si(value, unit, expected):
     [
         ("3 rad/s", "1/s"), ("1 rad/h", "1/s"), ("20 degC", "K"), ("2 deg", "m"), ("1 foo", "m"), ("m", "m"), ("", "m"),
         (math.nan, "m"), (math.inf, "m"), (True, "m"), ("nan m", "m"), ("1 m 2", "m"), ("1 m^9^9^9^9^9", "m"),
-        ("1 __import__", "m"), ([1], "m"),
+        ("1 __import__", "m"), ([1], "m"), ("7", "m"),
     ],
 )  # fmt: skip
 def test_refused(value, unit):

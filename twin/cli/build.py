@@ -38,5 +38,6 @@ def command(machine: str, output: str, method: str, states: int, samples: int, t
         raise TwinError("would replace an input", output, "name an artefact with -o, for example -o out/machine.h5")
     require_sound(Path(machine))
     result = build_artefact(Path(machine), Path(output), options, bar)
-    click.echo("\n".join([f"wrote {output}", *lines(result), f"next: twin verify {output}"]))
+    hint = f"twin verify {output}" if result.passed else "more --states, or larger [limits] in the description"
+    click.echo("\n".join([f"wrote {output}", *lines(result), f"next: {hint}"]))
     return 0 if result.passed else 1

@@ -46,7 +46,7 @@ def command(
             start = read_final_state(Path(initial), loaded.digest)
         else:
             start = option("--initial", initial, "degC")
-            if not -273.15 <= start < np.inf:
+            if not -60.0 <= start <= 200.0:  # 20 K and 293 degC are slips
                 raise TwinError(f"{initial} is no temperature", "--initial", "write --initial '20 degC', for example")
     folder = Path(output)
     check_folder(folder)
