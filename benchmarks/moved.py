@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.five_axis import compact, machine, rich
 from twin.build.certificate import compare
 from twin.build.compress import Tolerances, galerkin, trajectories
-from twin.build.pipeline import TRAINING_SEED, VERIFY_SEED, BuildOptions
+from twin.build.pipeline import VERIFY_SEED, BuildOptions, training_scenarios
 from twin.build.scenario import draw
 
 
@@ -15,7 +15,7 @@ def main() -> None:
     options = BuildOptions()
     unit = Tolerances(machine().limits.temperature, machine().limits.displacement)
     load = rich().load_model
-    still = [draw(load, TRAINING_SEED + i, 4.0, 2 * options.step, still=True) for i in range(60)]
+    still = training_scenarios(load, options, still=True)
     one_pose = galerkin(rich(), trajectories(rich(), still), options.states, unit)
     moving = [draw(load, VERIFY_SEED + i, options.hours, options.step) for i in range(6)]
     for label, model in (("trained at one pose", one_pose), ("ours", compact())):

@@ -17,6 +17,7 @@ from twin.build.rich_basis import RichOptions, rich_basis
 from twin.build.scenario import Scenario, draw, theta_bounds
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
+from twin.rom.load_model import LoadModel
 from twin.rom.model import MachineModel
 
 TRAINING_SEED = 1000
@@ -58,14 +59,21 @@ def rich_model(
     return cached("rich", (machine_hash(machine), options), make)
 
 
+def training_scenarios(load: LoadModel, options: BuildOptions, still: bool = False) -> list[Scenario]:
+    """Long ones for the slow modes, short ones at the substep for the fast modes that a load step excites.
+
+    still: with all axes at rest in mid-stroke.
+    """
+    kinds = [(4.0, 2 * options.step)] * 2 + [(1.0, options.step / options.substeps)]
+    return [draw(load, TRAINING_SEED + i, *kinds[i % 3], still) for i in range(options.training)]
+
+
 def compact_model(
     machine: Machine, rich: MachineModel, options: BuildOptions, progress: Progress = silent
 ) -> MachineModel:
     """The rich model compressed to `options.states` states."""
     unit = Tolerances(machine.limits.temperature, machine.limits.displacement)
-    # Long ones for the slow modes, short ones at the substep for the fast modes that a load step excites.
-    kinds = [(4.0, 2 * options.step)] * 2 + [(1.0, options.step / options.substeps)]
-    scenarios = [draw(rich.load_model, TRAINING_SEED + i, *kinds[i % 3]) for i in range(options.training)]
+    scenarios = training_scenarios(rich.load_model, options)
     with progress("training scenarios", len(scenarios)) as advance:
 
         def reported() -> Iterator[Scenario]:
