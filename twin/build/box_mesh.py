@@ -8,8 +8,6 @@ from skfem import MeshTet1
 from twin.errors import DescriptionError
 from twin.machine.description import Box
 
-SURFACES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
-
 
 def box_mesh(box: Box, where: str = "box") -> tuple[MeshTet1, dict[str, np.ndarray]]:
     """Tetrahedra of a box and the facets of its six surfaces x_min .. z_max.

@@ -11,6 +11,7 @@ import hashlib
 import os
 import pickle
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -52,12 +53,14 @@ def cached(stage: str, key: tuple[object, ...], make: Callable[[], T]) -> T:
     path = folder() / f"{stage}-{name}.pickle"
     try:
         result = pickle.loads(path.read_bytes())
-        path.touch()
+        with suppress(OSError):  # a read-only cache keeps its order
+            path.touch()
         return result
     except FileNotFoundError:
         pass
     except Exception:  # whatever is wrong with a cache entry, the remedy is to make it again
-        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
     result = make()
     try:
         with atomic_path(path) as temporary, open(temporary, "wb") as f:
