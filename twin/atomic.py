@@ -28,6 +28,12 @@ def check_file(target: Path) -> None:
     check_folder(target.parent)
 
 
+def _cannot_write(e: OSError, target: Path) -> TwinError:
+    return TwinError(
+        f"cannot write: {e.strerror or e}", str(target), "free disk space or choose another folder with -o"
+    )
+
+
 @contextmanager
 def atomic_path(target: Path) -> Iterator[Path]:
     """Yield a temporary path in the target's folder; rename it to `target` on success, remove it on any failure.
@@ -43,9 +49,7 @@ def atomic_path(target: Path) -> Iterator[Path]:
             os.fsync(f.fileno())
         os.replace(temporary, target)
     except OSError as e:
-        raise TwinError(
-            f"cannot write: {e.strerror or e}", str(target), "free disk space or choose another folder with -o"
-        ) from e
+        raise _cannot_write(e, target) from e
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -66,9 +70,7 @@ def atomic_folder(target: Path) -> Iterator[Path]:
             os.replace(target, old)
         os.replace(temporary, target)
     except OSError as e:
-        raise TwinError(
-            f"cannot write: {e.strerror or e}", str(target), "free disk space or choose another folder with -o"
-        ) from e
+        raise _cannot_write(e, target) from e
     finally:
         if old.exists() and not target.exists():  # interrupted between the two renames
             os.replace(old, target)
