@@ -7,7 +7,10 @@ import importlib
 import resource
 import time
 
-NAMES = ("certificate", "case", "poses", "moved", "step", "replay", "growth", "pymor")
+NAMES = (
+    "machines", "certificate", "case", "poses", "moved", "step", "laws", "replay", "load_pipeline",
+    "growth", "pymor", "correction",
+)  # fmt: skip
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.five_axis import FOLDER, compact, full
-from twin.build.stepper import CoupledStepper, heat_balance_error, sensor_temperatures, tcp_at_poses
+from twin.build.stepper import CoupledStepper, sensor_temperatures, tcp_at_poses
 from twin.logs.read import read_run
 from twin.logs.signals import signal_values
 from twin.progress import bar
@@ -20,12 +20,10 @@ def main() -> None:
     start = run.initial_temperature if run.initial_temperature is not None else float(drive.environment[0, 0])
     a, b = CoupledStepper(reference), CoupledStepper(candidate)
     T, T_error, u, u_error, balance = [], [], [], [], 0.0
-    before = a.uniform(start)
-    steps = zip(a.run(drive, before, 4), b.run(drive, b.uniform(start), 4), strict=True)
+    steps = zip(a.run(drive, a.uniform(start), 4), b.run(drive, b.uniform(start), 4), strict=True)
     with bar("full model, 12 h", drive.n_steps) as advance:
-        for (step, xa, mean), (_, xb, _) in steps:
-            balance = max(balance, heat_balance_error(reference, drive, step, before, xa, mean))
-            before = xa
+        for (_, xa, heat), (_, xb, _) in steps:
+            balance = max(balance, heat.balance_error)
             T.append(sensor_temperatures(reference, xa))
             u.append(tcp_at_poses(reference, xa))
             T_error.append(np.abs(T[-1] - sensor_temperatures(candidate, xb)).max())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.rom.load_model import AxisWiring, Film, Joint, LawUse, LoadModel, Pair, Rail, Signal, Source
+from twin.rom.load_model import AxisWiring, EnvironmentWiring, Film, Joint, LawUse, LoadModel, Pair, Rail, Signal, Source
 from twin.rom.model import AffineBody, MachineModel
 
 STATIONS = (-0.4, -0.2, 0.0, 0.2, 0.4)
@@ -23,7 +23,7 @@ def load_model() -> LoadModel:
             Signal("air", "air", "degC", "value", 15.0, 30.0),
         ),
         axes=(AxisWiring("x", (1.0, 0.0, 0.0), -0.35, 0.35, "x"),),
-        environments=(("room", "air", 20.0),),
+        environments=(EnvironmentWiring("room", "air", 20.0),),
         sources=(Source("motor", copper, 1.0, "", 0.0), Source("guide", guide, 1.0, "guide", 0.6)),
         films=(Film("bed", still, 0, 3.0, 12.0), Film("slide", moving, 0, 3.0, 36.0)),
         joints=(Joint("plate", 3000.0, 1000.0, 9000.0),),

@@ -134,3 +134,15 @@ def test_run_is_checked_where_descriptions_cannot_be_read(tmp_path, capsys, monk
     status, found = check(capsys, tmp_path / "runs" / "short")
     assert (status, len(found["problems"])) == (0, 1)
     assert "no machine is known" in found["problems"][0]["what"]
+
+
+def test_limits_of_an_axis_ask_for_a_sampling(tmp_path, capsys):
+    limits = 'position = "x_position"\nspeed = "1 m/s"\nacceleration = "10 m/s^2"\njerk = "200 m/s^3"\n'
+    path = edited(tmp_path, ('position = "x_position"\n', limits))
+    status, found = check(capsys, RUN, "--machine", path)
+    (problem,) = [p for p in found["problems"] if "limits ask for" in p["what"]]
+    assert (status, problem["warning"]) == (0, True)
+    assert "ask for 5 ms (current of axis 'x')" in problem["what"]  # a segment of the screw is 70 mm: 7 ms
+    fast = limits.replace('jerk = "200 m/s^3"\n', "").replace('acceleration = "10 m/s^2"\n', "")
+    status, found = check(capsys, RUN, "--machine", edited(tmp_path, ('position = "x_position"\n', fast)))
+    assert any("7 ms (position of axis 'x')" in p["what"] for p in found["problems"])

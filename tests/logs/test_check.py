@@ -12,6 +12,7 @@ from tests.logs.test_read import RUN_TOML, write
 from twin.errors import LogError
 from twin.logs.check import check_run
 from twin.logs.read import read_run
+from twin.logs.sampling_rule import AxisLimits, Needed, core_sampling
 from twin.logs.signals import signal_values
 
 SLIDE_RUN = Path(__file__).parents[1] / "machines" / "slide" / "runs" / "short"
@@ -168,3 +169,18 @@ def test_speed_in_the_wrong_unit(tmp_path):
     (factor,) = found(tmp_path, {"time [s]": TIME, "x [m]": WAVE, "v [m/s]": 60.0 * SPEED})
     assert "times the speed of 'x'" in factor.what
     assert 59 < float(factor.what.split("is ")[1].split(" times")[0]) < 61
+
+
+def test_a_log_slower_than_the_rule_is_told_once(tmp_path):
+    """Table 16.1: what is lost and what is not; silent where the log is fast enough or the limits are not known."""
+    run = read_run(write(tmp_path, table({"time [s]": TIME, "x [m]": WAVE, "v [m/s]": SPEED})))
+    position = core_sampling([AxisLimits("x", speed=0.5, acceleration=5.0, jerk=50.0, segment=0.07)])
+    (problem,) = check_run(run, core=position)
+    assert problem.warning
+    assert problem.what == "loads are logged every 5 s, the axes' limits ask for 10 ms (current of axis 'x')"
+    assert "rms currents" in problem.remedy
+    (problem,) = check_run(run, core=core_sampling([AxisLimits("x", speed=1.0, segment=0.02)]))
+    assert "2 ms (position of axis 'x')" in problem.what
+    assert "rail segment" in problem.remedy
+    assert check_run(run, core=Needed(5.0, "x", "speed")) == []
+    assert check_run(run, core=None) == []

@@ -65,6 +65,7 @@ def test_syntax_error_names_the_line(tmp_path):
         ('"50 W/(m*K)"', '"50 W/m"', "materials.cast_iron.conductivity", "not a quantity in W/(m*K)"),
         ('"50 W/(m*K)"', "-50", "materials.cast_iron.conductivity", "greater than 0"),
         ('"50 W/(m*K)"', "nan", "materials.cast_iron.conductivity", "finite"),
+        ("poisson_ratio = 0.26\n", "", "materials.cast_iron.poisson_ratio", "missing key"),
         ("poisson_ratio = 0.26", "poisson_ratio = 0.5", "materials.cast_iron.poisson_ratio", "less than 0.5"),
         ('carries = ["slide"]', 'carries = ["slyde"]', "axes.x.carries", "unknown part 'slyde'"),
         ('carries = ["slide"]', 'carries = ["bed"]', "axes.x.carries", "moves the body that stands on"),

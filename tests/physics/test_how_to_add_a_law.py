@@ -26,6 +26,7 @@ def example() -> dict[str, object]:
 
 def test_its_own_test_passes(example):
     example["test_copper_loss_of_torque"]()
+    example["test_where_it_holds"]()
 
 
 def test_its_row_fits_its_function_as_all_rows_do(example):
@@ -33,9 +34,11 @@ def test_its_row_fits_its_function_as_all_rows_do(example):
     assert isinstance(row, Law)
     for name, law in {**LAWS, "motor_copper_of_torque": row}.items():
         arguments = list(inspect.signature(law.function).parameters)
-        assert sorted(arguments) == sorted([*law.signals, *law.parameters]), name
-        assert law.kind in ("loss", "film"), name
+        assert sorted(arguments) == sorted([*law.signals, *law.states, *law.parameters]), name
+        assert law.kind in ("loss", "film", "joint"), name
         assert law.source, name
+        assert law.formula, name
+    assert list(inspect.signature(row.validity.holds).parameters) == list(inspect.signature(row.function).parameters)
 
 
 def test_its_description_gives_every_argument_and_no_other(example):

@@ -155,8 +155,8 @@ def test_a_truncated_file(path, share):
 
 
 def test_a_future_schema_version(path):
-    problem = refuse(damaged(path, lambda f: f.attrs.__setitem__("schema_version", 2)))
-    assert "version 2" in problem.what
+    problem = refuse(damaged(path, lambda f: f.attrs.__setitem__("schema_version", 3)))
+    assert "version 3" in problem.what
     assert "update" in problem.remedy
 
 

@@ -10,6 +10,7 @@ from dense_reference import Dense, gamma
 
 from twin.rom.contact import station_weights
 from twin.rom.drive import evaluate
+from twin.rom.load_model import EnvironmentWiring
 from twin.run.replay import march
 from twin.run.stepping import advance, inputs_of, system_blocks
 from twin.run.system import prepare
@@ -47,9 +48,9 @@ def test_gamma_is_the_mean_of_d_dT_along_the_path():
 def test_system_matrix_equals_the_dense_one(model):
     """Blocks in coordinates with E = 1 against E^-1 A, compared through their action."""
     prepared, dense = prepare(model), Dense(model, DRIVE)
-    inputs = inputs_of(model.load_model, DRIVE, 4)
+    inputs = inputs_of(model.load_model, DRIVE, 4, follow=0.0)
     one_step = jax.tree.map(lambda a: a[9], inputs)
-    blocks = system_blocks(prepared.layout, prepared.system, one_step)
+    blocks = system_blocks(prepared.layout, prepared.system, one_step, one_step.theta)
     offsets = prepared.layout.offsets
     S = np.zeros((model.n, model.n))
     for (i, j), block in blocks.items():
@@ -104,7 +105,7 @@ def test_four_substeps_with_one_factor_are_three_to_four_times_closer():
 
 def test_heat_in_is_heat_stored_at_every_position(model):
     prepared = prepare(model)
-    steps = march(prepared, inputs_of(model.load_model, DRIVE, 4), prepared.uniform(20.0))
+    steps = march(prepared, inputs_of(model.load_model, DRIVE, 4, follow=0.0), prepared.uniform(20.0))
     into = 60.0 * (DRIVE.power.sum(axis=1) + steps.film.sum(axis=1))
     throughput = 60.0 * (DRIVE.power.sum(axis=1) + np.abs(steps.film).sum(axis=1))
     assert throughput.min() > 0.0
@@ -117,19 +118,19 @@ def test_heat_in_is_heat_stored_at_every_position(model):
 
 
 def test_a_machine_at_the_temperature_of_its_surroundings_stays_there(model):
-    load = replace(model.load_model, environments=(("hall", "ambient", 20.0), ("pit", "", 26.0)))
+    load = replace(model.load_model, environments=(EnvironmentWiring("hall", "ambient", 20.0), EnvironmentWiring("pit", "", 26.0)))
     model = replace(model, load_model=load)
     still = {name: np.zeros_like(values) for name, values in SIGNALS.items()} | {"ambient": np.full(len(TIME), 26.0)}
     still |= {axis.position: SIGNALS[axis.position] for axis in load.axes}
     drive = evaluate(load, TIME, still, 60.0)
     prepared, dense = prepare(model), Dense(model, drive)
-    steps = march(prepared, inputs_of(load, drive, 4), prepared.uniform(26.0))
+    steps = march(prepared, inputs_of(load, drive, 4, follow=0.0), prepared.uniform(26.0))
     np.testing.assert_allclose(dense.temperature(prepared.to_artefact(steps.z)), 26.0, atol=1e-10)
 
 
 def test_a_kept_factor_equals_factorising_every_step(model):
     prepared = prepare(model)
-    inputs = inputs_of(model.load_model, DRIVE, 4)
+    inputs = inputs_of(model.load_model, DRIVE, 4, follow=0.0)
     assert 0 < inputs.changed.sum() < DRIVE.n_steps  # axes rest for some steps
     kept = advance(prepared.layout, prepared.system, prepared.uniform(20.0), inputs)
     always = advance(
@@ -139,7 +140,7 @@ def test_a_kept_factor_equals_factorising_every_step(model):
         np.testing.assert_array_equal(a, b)
 
 
-@pytest.mark.parametrize("what", ["theta", "conductance", "weight", "time"])
+@pytest.mark.parametrize("what", ["conductance", "weight", "time"])
 def test_the_factor_is_renewed_when_the_matrix_changes(what):
     still = {name: np.repeat(values[:1], len(TIME)) for name, values in SIGNALS.items()}
     drive = evaluate(MODEL.load_model, TIME, still, 60.0)
@@ -159,14 +160,14 @@ def test_bodies_in_any_order_and_without_contacts():
     temperatures = []
     for model in (MODEL, swapped):
         prepared, dense = prepare(model), Dense(model, DRIVE)
-        steps = march(prepared, inputs_of(model.load_model, DRIVE, 4), prepared.uniform(20.0))
+        steps = march(prepared, inputs_of(model.load_model, DRIVE, 4, follow=0.0), prepared.uniform(20.0))
         temperatures.append(dense.temperature(prepared.to_artefact(steps.z)))
     np.testing.assert_allclose(temperatures[1], temperatures[0], rtol=1e-12)
     alone = synthetic.machine(n_bodies=1)
     time, signals = synthetic.loads(alone.load_model)
     drive = evaluate(alone.load_model, time, signals, 60.0)
     prepared, dense = prepare(alone), Dense(alone, drive)
-    steps = march(prepared, inputs_of(alone.load_model, drive, 4), prepared.uniform(10.0))
+    steps = march(prepared, inputs_of(alone.load_model, drive, 4, follow=0.0), prepared.uniform(10.0))
     expected = dense.euler(dense.uniform(10.0), 4)[1:]
     np.testing.assert_allclose(
         dense.temperature(prepared.to_artefact(steps.z)), dense.temperature(expected), rtol=1e-12

@@ -11,7 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.rom.load_model import AxisWiring, Film, Joint, LawUse, LoadModel, Pair, Rail, Signal, Source
+from twin.rom.load_model import (
+    AxisWiring,
+    EnvironmentWiring,
+    Film,
+    Joint,
+    LawUse,
+    LoadModel,
+    Pair,
+    Rail,
+    Signal,
+    Source,
+)
 from twin.rom.model import AffineBody, MachineModel
 
 AXES = ("x", "y", "z")
@@ -64,7 +75,7 @@ def load_model(n_bodies: int = 3, n_segments: int = 8, pads: int = 2) -> LoadMod
             use = LawUse("forced_film", {"natural": 8.0, "forced": 10.0}, {"speed": f"{AXES[b - 1]}_speed"})
             films.append(Film(f"body_{b}_forced", use, 1, 4.0, 36.0))
     joints = (Joint("plate", 2000.0, 700.0, 6000.0),)
-    environments = (("hall", "ambient", 20.0), ("pit", "", 18.0))
+    environments = (EnvironmentWiring("hall", "ambient", 20.0), EnvironmentWiring("pit", "", 18.0))
     return LoadModel(
         tuple(signals), tuple(axes), environments, tuple(sources), tuple(films), joints,
         tuple(ports), tuple(rails), tuple(pairs),

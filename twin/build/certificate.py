@@ -17,6 +17,7 @@ import numpy as np
 
 from twin.build.scenario import Scenario
 from twin.build.stepper import CoupledStepper, sensor_temperatures, tcp_at_poses
+from twin.build.workers import LONG, each
 from twin.machine.description import Limits
 from twin.rom.model import MachineModel
 
@@ -75,40 +76,49 @@ def compare(
     scenarios: Sequence[Scenario],
     substeps: int = 4,
     progress: Callable[[str], None] = lambda _: None,
+    long: float = LONG,
 ) -> Comparison:
     """Step both models through the scenarios and, at their ends, to the steady state of the last loads.
 
-    substeps: implicit Euler steps per step, as many as the runtime takes: short steps excite faster modes.
+    substeps: implicit Euler steps per step, as many as the runtime takes: short steps excite faster modes. long: s of
+    work left that are worth another process (`twin.build.workers`); the result does not depend on it.
     """
-    a, b = CoupledStepper(reference), CoupledStepper(candidate)
-    rows = []
-    for scenario in scenarios:
-        drive = scenario.drive
-        T_err, u_err = np.zeros(len(reference.sensors)), np.zeros((len(reference.poses), 3))
-        T_low, T_high = np.full_like(T_err, np.inf), np.full_like(T_err, -np.inf)
-        u_low, u_high = np.full_like(u_err, np.inf), np.full_like(u_err, -np.inf)
-
-        def account(xa: list[np.ndarray], xb: list[np.ndarray]) -> None:
-            T, u = sensor_temperatures(reference, xa), tcp_at_poses(reference, xa)
-            np.maximum(T_err, np.abs(T - sensor_temperatures(candidate, xb)), out=T_err)  # noqa: B023
-            np.maximum(u_err, np.abs(u - tcp_at_poses(candidate, xb)), out=u_err)  # noqa: B023
-            for value, low, high in ((T, T_low, T_high), (u, u_low, u_high)):  # noqa: B023
-                np.minimum(low, value, out=low)
-                np.maximum(high, value, out=high)
-
-        runs = zip(
-            a.run(drive, a.uniform(scenario.start), substeps),
-            b.run(drive, b.uniform(scenario.start), substeps),
-            strict=True,
-        )
-        for (_, xa, _), (_, xb, _) in runs:
-            account(xa, xb)
-        last = drive.n_steps - 1
-        account(a.steady_state(drive, last), b.steady_state(drive, last))
-        rows.append((T_err, u_err, T_low, T_high, u_low, u_high))
-        progress(scenario.label)
+    pair = (CoupledStepper(reference), CoupledStepper(candidate), substeps)
+    rows = each(_compared, pair, scenarios, lambda scenario: progress(scenario.label), long)
     T_err, u_err, T_low, T_high, u_low, u_high = (np.array(column) for column in zip(*rows, strict=True))
     return Comparison(tuple(s.label for s in scenarios), T_err, u_err, T_low, T_high, u_low, u_high)
+
+
+def _compared(pair: tuple[CoupledStepper, CoupledStepper, int], scenario: Scenario) -> tuple[np.ndarray, ...]:
+    """Largest errors and the range of the reference in one scenario: the columns of `Comparison` after the labels."""
+    a, b, substeps = pair
+    reference, candidate, drive = a.model, b.model, scenario.drive
+    T_err, u_err = np.zeros(len(reference.sensors)), np.zeros((len(reference.poses), 3))
+    T_low, T_high = np.full_like(T_err, np.inf), np.full_like(T_err, -np.inf)
+    u_low, u_high = np.full_like(u_err, np.inf), np.full_like(u_err, -np.inf)
+
+    def account(xa: list[np.ndarray], xb: list[np.ndarray]) -> None:
+        T, u = sensor_temperatures(reference, xa), tcp_at_poses(reference, xa)
+        np.maximum(T_err, np.abs(T - sensor_temperatures(candidate, xb)), out=T_err)
+        np.maximum(u_err, np.abs(u - tcp_at_poses(candidate, xb)), out=u_err)
+        for value, low, high in ((T, T_low, T_high), (u, u_low, u_high)):
+            np.minimum(low, value, out=low)
+            np.maximum(high, value, out=high)
+
+    for stepper in (a, b):
+        stepper.forget()
+    runs = zip(
+        a.run(drive, a.uniform(scenario.start), substeps),
+        b.run(drive, b.uniform(scenario.start), substeps),
+        strict=True,
+    )
+    for (_, xa, _), (_, xb, _) in runs:
+        account(xa, xb)
+    last = drive.n_steps - 1
+    account(a.steady_state(drive, last), b.steady_state(drive, last))
+    for stepper in (a, b):
+        stepper.forget()  # factors of a full model need not wait for the next scenario
+    return T_err, u_err, T_low, T_high, u_low, u_high
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.build.encoder import scale_gaps
 from twin.build.interface import interface
+from twin.build.lumped import lumped_ports
+from twin.build.lumped_body import count
 from twin.build.mesh import BodyMesh, PartMesh, body_mesh, load_part_mesh
 from twin.build.ports import ContactPorts, contact_ports
 from twin.build.surface import Patch, patch
 from twin.errors import Problem, TwinError
 from twin.machine.bodies import Body, bodies_of, body_of, split_surface
+from twin.machine.check_lumped import total_capacity
 from twin.machine.description import Machine
 from twin.machine.kinematics import direction, linear_axes, moving_contacts
 from twin.machine.surfaces import film_surfaces, unknown_surface
@@ -32,11 +36,17 @@ class MeshReport:
     parts: int
     bodies: int
     nodes: int  # P2 nodes: the temperatures of the full model
-    mass: float  # kg
+    mass: float  # kg, of parts
+    capacity: float = 0.0  # J/K, of nodes and bars
 
 
 def check_meshes(machine: Machine) -> MeshReport:
-    """Read all meshes and check the description against them. Later checks wait for what they build on."""
+    """Read all meshes and check the description against them. Later checks wait for what they build on.
+
+    Of a lumped machine there are no meshes: only the travel of what runs on its bars is checked.
+    """
+    if machine.lumped:
+        return _check_lumped(machine)
     parts, problems = _load(machine)
     problems += [p for part in parts.values() for p in _size(machine, part)]
     if len(parts) == len(machine.parts):
@@ -45,7 +55,7 @@ def check_meshes(machine: Machine) -> MeshReport:
         surfaces = _surfaces(machine, parts)
         problems += surfaces
         if not surfaces:
-            problems += [*_fixed(machine, bodies, meshes), *_moving(machine, parts, meshes)]
+            problems += [*_fixed(machine, bodies, meshes), *_moving(machine, parts, meshes), *_scales(machine, meshes)]
         problems += [*_grounded(machine, bodies), *_driven(machine), *_sensors(machine, parts)]
         problems += [] if surfaces else _tcp(machine, bodies, parts)
     return MeshReport(
@@ -54,6 +64,17 @@ def check_meshes(machine: Machine) -> MeshReport:
         bodies=len(bodies_of(machine)),
         nodes=sum(p.n for p in parts.values()),
         mass=sum(_volume(p) * machine.materials[machine.parts[n].material].density for n, p in parts.items()),
+    )
+
+
+def _check_lumped(machine: Machine) -> MeshReport:
+    return MeshReport(
+        problems=tuple(_travel(machine, lumped_ports(machine))),
+        parts=0,
+        bodies=len(bodies_of(machine)),
+        nodes=sum(count(machine, member) for member in machine.members),
+        mass=0.0,
+        capacity=total_capacity(machine),
     )
 
 
@@ -112,6 +133,10 @@ def _other_uses(machine: Machine) -> Iterator[tuple[str, str]]:
     for name, contact in machine.contacts.items():
         for pair in contact.pairs:
             yield from ((f"contacts.{name}.pairs", surface) for surface in pair)
+    for name, axis in machine.axes.items():
+        for key in ("scale", "reader"):
+            if surface := getattr(axis.encoder, key):
+                yield f"axes.{name}.encoder.{key}", surface
     for name, source in machine.sources.items():
         if source.surface:
             yield f"sources.{name}.surface", source.surface
@@ -145,6 +170,14 @@ def _moving(machine: Machine, parts: dict[str, PartMesh], meshes: tuple[BodyMesh
                 yield from _plane(rail, pad, direction(machine, contact.axis), f"contacts.{name}.pairs", parts)
 
 
+def _scales(machine: Machine, meshes: tuple[BodyMesh, ...]) -> Iterator[Problem]:
+    """Linear scales that are shorter than the stroke, fixed beside themselves, or far from their readers."""
+    try:
+        yield from scale_gaps(machine, meshes)
+    except TwinError as e:
+        yield from e.problems
+
+
 def _travel(machine: Machine, ports: ContactPorts) -> Iterator[Problem]:
     """Pads must stay between the first and the last station of their rail: beyond them eq (1) has no second station."""
     axes = linear_axes(machine)
@@ -160,7 +193,8 @@ def _travel(machine: Machine, ports: ContactPorts) -> Iterator[Problem]:
                 f"pad '{ports.names[pair.pad_port]}' runs {beyond * 1e3:.3g} mm beyond the end stations of rail"
                 f" '{rail.name}' ({first:.4g} .. {last:.4g} m along axis '{axis}') within the stroke",
                 f"contacts.{pair.contact}",
-                "stations are the centres of the segments: use more segments, a longer rail, or a shorter stroke",
+                f"stations are the centres of the {'elements' if machine.lumped else 'segments'}: use more of them, "
+                "a longer rail, or a shorter stroke",
             )
 
 

@@ -6,7 +6,7 @@ units of the error the certificate allows. A plain energy norm spends its direct
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ import scipy.linalg
 from twin.build.project import project
 from twin.build.scenario import Scenario, theta_bounds
 from twin.build.stepper import CoupledStepper, sensor_temperatures, system_matrix
+from twin.build.workers import each
 from twin.errors import ModelError
 from twin.rom.model import AffineBody, MachineModel
 
@@ -27,24 +28,33 @@ class Tolerances:
     displacement: float  # m
 
 
-def trajectories(rich: MachineModel, scenarios: Iterable[Scenario], every: int = 1) -> list[np.ndarray]:
-    """Snapshots per body (n_b, m) of the coupled rich model: every `every`-th step and the final steady state.
+# Snapshots need the shapes of fields, not the last per cent: coefficients may go far from those of a factor (what
+# remains is stepped explicitly, stable up to 1), which saves most factorisations.
+TRAINING_FOLLOW, TRAINING_KEEP = 0.8, 4
 
-    Each scenario is scaled until its warmest sensor changes by 1 K: the model is linear in the loads, and a scenario
-    that happens to be drawn mild must count as much as a violent one, since the certificate measures both so.
+
+def trajectories(
+    rich: MachineModel, scenarios: Sequence[Scenario], progress: Callable[[Scenario], None] = lambda _: None
+) -> list[np.ndarray]:
+    """Snapshots per body (n_b, m) of the coupled rich model: every step and the final steady state.
+
+    Each scenario is scaled until its warmest sensor changes by 1 K: the model is nearly linear in the loads, and a
+    scenario that happens to be drawn mild must count as much as a violent one, since the certificate measures both so.
     """
-    stepper = CoupledStepper(rich)
-    columns: list[list[np.ndarray]] = [[] for _ in rich.bodies]
-    for scenario in scenarios:
-        drive = scenario.drive
-        states = [x for step, x, _ in stepper.run(drive, stepper.uniform(scenario.start)) if step % every == 0]
-        states.append(stepper.steady_state(drive, drive.n_steps - 1))
-        response = np.array([sensor_temperatures(rich, x) for x in states])
-        size = max(float(np.ptp(response, axis=0).max(initial=0.0)), 1e-9) if response.size else 1.0
-        for x in states:
-            for c, xb in zip(columns, x, strict=True):
-                c.append(xb / size)
-    return [np.column_stack(c) for c in columns]
+    stepper = CoupledStepper(rich, keep=TRAINING_KEEP, follow=TRAINING_FOLLOW)
+    columns = each(_snapshots, stepper, scenarios, progress)
+    return [np.column_stack(body) for body in zip(*columns, strict=True)]
+
+
+def _snapshots(stepper: CoupledStepper, scenario: Scenario) -> list[np.ndarray]:
+    """Snapshots per body (n_b, steps + 1) of one scenario."""
+    stepper.forget()
+    drive = scenario.drive
+    states = [x for _, x, _ in stepper.run(drive, stepper.uniform(scenario.start))]
+    states.append(stepper.steady_state(drive, drive.n_steps - 1))
+    response = np.array([sensor_temperatures(stepper.model, x) for x in states])
+    size = max(float(np.ptp(response, axis=0).max(initial=0.0)), 1e-9) if response.size else 1.0
+    return [np.column_stack(body) / size for body in zip(*states, strict=True)]
 
 
 def _weight(body: AffineBody, unit: Tolerances) -> np.ndarray:

@@ -36,9 +36,10 @@ class DisplacementField:
         forces, motions = self._structure.solve(positions, fields)
         system = self._structure.system
         loads = np.split(-system.gap_rows(positions).T @ forces, system.offsets[1:-1])
+        shifts = self._structure.encoder_shifts(positions, fields)
         return tuple(
-            (supported.solve((e.KT @ T + U @ p)[:, None])[:, 0] + rigid_modes(body.nodes) @ a).reshape(-1, 3)
-            for supported, e, U, T, p, body, a in zip(
-                self._supported, self._elasticity, self._U, fields, loads, self._bodies, motions, strict=True
+            (supported.solve((e.KT @ T + U @ p)[:, None])[:, 0] + rigid_modes(body.nodes) @ a).reshape(-1, 3) + shift
+            for supported, e, U, T, p, body, a, shift in zip(
+                self._supported, self._elasticity, self._U, fields, loads, self._bodies, motions, shifts, strict=True
             )
         )

@@ -1,9 +1,9 @@
 """Where springs and the TCP take hold of a body: area-mean functionals of surface patches on its displacements.
 
-A *mean* port is the mean displacement of a patch (3 scalars). A *rigid* port adds the patch's rotation (3 scalars), the
-least-squares fit of a rigid motion u + w x (x - c) to its displacements (paper 000, Fig. 6, fits a plane to nodes: the
-fit over the area depends on the patch, not on its mesh). The transpose of a port spreads a force over its patch, so
-that every force and moment that passes a port is conserved.
+A *mean* port is the mean displacement of a patch (3 scalars), an *axial* port one component at a point. A *rigid* port
+adds the patch's rotation (3 scalars), the least-squares fit of a rigid motion u + w x (x - c) to its displacements
+(paper 000, Fig. 6, fits a plane to nodes: the fit over the area depends on the patch, not on its mesh). The transpose
+of a port spreads a force over its patch, so that every force and moment that passes a port is conserved.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from twin.build.mesh import BodyMesh, PartMesh
-from twin.build.surface import Patch, patch, segments
+from twin.build.surface import Patch, facet_nodes, patch, segments
 from twin.errors import DescriptionError
 from twin.machine.bodies import split_surface
 
@@ -54,6 +54,15 @@ class RailPort:
     stations: np.ndarray  # (n_segments,) m along the axis
 
 
+@dataclass(frozen=True)
+class AxialPort:
+    """One column: the displacement [m] along a direction at a point of a surface's centre line."""
+
+    body: int
+    first: int
+    point: np.ndarray  # (3,) m, mesh coordinates
+
+
 @dataclass
 class PortTable:
     """Collects the ports of all bodies; asking twice for the same port gives the same columns.
@@ -64,7 +73,7 @@ class PortTable:
     bodies: tuple[BodyMesh, ...]
     names: list[list[str]] = field(default_factory=list)
     _rows: list[list[tuple[np.ndarray, np.ndarray]]] = field(default_factory=list)
-    _known: dict[tuple[object, ...], MeanPort | RigidPort | RailPort] = field(default_factory=dict)
+    _known: dict[tuple[object, ...], MeanPort | RigidPort | RailPort | AxialPort] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.names = [[] for _ in self.bodies]
@@ -104,6 +113,37 @@ class PortTable:
         port = self._known[key]
         assert isinstance(port, RailPort)
         return port
+
+    def axial(self, surface: str, direction: np.ndarray, at: float, piece: Patch) -> AxialPort:
+        """The point at coordinate `at` [m] along the unit vector `direction`, of the slice `piece` of a surface.
+
+        Exact where the displacement is linear in the slice: what moves rigidly or grows evenly is read to the last
+        digit, wherever in the slice the point lies.
+        """
+        key = ("axial", surface, tuple(direction), at)
+        if key not in self._known:
+            body, offset, _, _ = self._surface(surface)
+            lever = at - float(piece.centroid @ direction)
+            weights = piece.mean + lever * fitted_slope(piece, direction)
+            dofs = (3 * (piece.nodes + offset)[:, None] + np.arange(3)).ravel()
+            first = len(self.names[body])
+            self.names[body].append(f"{surface}@{at:g}.along")
+            self._rows[body].append((dofs, np.outer(weights, direction).ravel()))
+            self._known[key] = AxialPort(body, first, piece.centroid + lever * direction)
+        port = self._known[key]
+        assert isinstance(port, AxialPort)
+        return port
+
+    def slices(self, surface: str, direction: np.ndarray, n: int) -> tuple[int, int, list[Patch]]:
+        """Body, first node of the part within it, and `n` equal lengths of a surface along the unit vector."""
+        body, offset, part, facets = self._surface(surface)
+        return body, offset, segments(part, facets, direction, n)
+
+    def extent(self, surface: str, direction: np.ndarray, n: int) -> np.ndarray:
+        """Borders (n + 1,) [m] of the slices along the unit vector, in mesh coordinates."""
+        _, _, part, facets = self._surface(surface)
+        s = part.nodes[facet_nodes(part, facets)[:, :3]] @ direction
+        return np.linspace(s.min(), s.max(), n + 1)
 
     def matrices(self) -> tuple[csr_array, ...]:
         """Per body U (3n, n_ports): port displacements are U^T u, port forces load the body with U f."""
@@ -147,6 +187,15 @@ class PortTable:
         for i in range(3):
             self.names[body].append(f"{label}.{COMPONENTS[3 + i]}")
             self._rows[body].append((dofs, fit[i].ravel()))
+
+
+def fitted_slope(p: Patch, direction: np.ndarray) -> np.ndarray:
+    """Row (m,) [1/m] at `p.nodes`: slope along the unit vector `direction` of the least-squares linear field.
+
+    The direction must lie in the patch; slopes across it are told apart from it.
+    """
+    towards = np.linalg.pinv(p.second_moment, rcond=1e-9, hermitian=True) @ direction
+    return towards @ p.moment
 
 
 def cross_matrix(r: np.ndarray) -> np.ndarray:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from twin.build.lumped import assemble_lumped, lumped_bodies
+from twin.build.lumped_structure import LumpedStructure, lumped_structure
 from twin.build.mesh import BodyMesh, load_body_meshes
 from twin.build.structure import Structure, assemble_structure
 from twin.build.thermal import assemble_thermal
@@ -26,13 +28,15 @@ class SurfaceMesh:
 @dataclass(frozen=True)
 class FullModel:
     thermal: MachineModel  # sparse bodies, G filled for the pose grid, F for their surfaces
-    structure: Structure
-    bodies: tuple[BodyMesh, ...]
-    surfaces: tuple[SurfaceMesh, ...]
+    structure: Structure | LumpedStructure
+    bodies: tuple[BodyMesh, ...]  # none of a lumped machine
+    surfaces: tuple[SurfaceMesh, ...]  # likewise
 
 
 def assemble(machine: Machine, progress: Progress = silent) -> FullModel:
-    """Read meshes, assemble and condense. Raises DescriptionError and ModelError."""
+    """Read meshes, assemble and condense, or assemble nodes and bars. Raises DescriptionError and ModelError."""
+    if machine.lumped:
+        return _assemble_lumped(machine)
     with progress("meshes and thermal matrices", 2) as advance:
         bodies = load_body_meshes(machine)
         advance("meshes")
@@ -44,6 +48,15 @@ def assemble(machine: Machine, progress: Progress = silent) -> FullModel:
     parts = zip(thermal.bodies, rows, selections, strict=True)
     thermal = replace(thermal, bodies=tuple(replace(b, G=G, F=F) for b, G, F in parts))
     return FullModel(thermal, structure, bodies, surfaces)
+
+
+def _assemble_lumped(machine: Machine) -> FullModel:
+    bodies = lumped_bodies(machine)
+    thermal = assemble_lumped(machine, bodies)
+    structure = lumped_structure(machine, bodies)
+    rows = structure.pose_rows(thermal.poses)
+    parts = zip(thermal.bodies, rows, strict=True)
+    return FullModel(replace(thermal, bodies=tuple(replace(b, G=G) for b, G in parts)), structure, (), ())
 
 
 def _surface(body: BodyMesh) -> tuple[SurfaceMesh, sp.csr_array]:

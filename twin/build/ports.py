@@ -17,6 +17,7 @@ from twin.errors import DescriptionError, Problem, TwinError
 from twin.machine.bodies import split_surface
 from twin.machine.description import Contact, Machine
 from twin.machine.kinematics import direction, linear_axes, rail_moves
+from twin.machine.wiring import joint_conductance
 from twin.rom.load_model import Pair, Rail
 
 
@@ -99,7 +100,8 @@ def contact_ports(machine: Machine, bodies: tuple[BodyMesh, ...]) -> ContactPort
                     station=float(patches[port].centroid @ direction(machine, axis)),
                     rail_moves=moves,
                     area=patches[port].area,
-                    conductance=contact.conductance,
+                    conductance=joint_conductance(contact_name, machine),
+                    assignment=contact.assignment,
                 )
             )
     if problems:

@@ -44,7 +44,7 @@ def build_artefact(
     result = certificate(machine, rich, compact, None, options, BUILD_SEED, progress=progress)
     fields = [
         SurfaceField(body.name, surface.points, surface.triangles, np.asarray(body.F))
-        for body, surface in zip(compact.bodies, full.surfaces, strict=True)
+        for body, surface in zip(compact.bodies if full.surfaces else (), full.surfaces, strict=True)
     ]
     bare = replace(compact, bodies=tuple(replace(b, F=None) for b in compact.bodies))
     description = Path(machine_path) / "machine.toml" if Path(machine_path).is_dir() else Path(machine_path)

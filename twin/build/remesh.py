@@ -15,8 +15,11 @@ def remesh(machine: Machine, size: float) -> Machine:
     """`machine` with every mesh file made anew at `size` [m]; files are kept in the cache folder.
 
     A model's geometry.py takes `--size METRES -o FOLDER` and writes the mesh files under the names machine.toml uses.
-    Raises DescriptionError where there is none or it fails (gmsh missing, say).
+    Raises DescriptionError where there is none or it fails (gmsh missing, say), and for lumped machines.
     """
+    if machine.lumped:
+        remedy = "leave --size away; more `elements` of its bars are another discretisation"
+        raise DescriptionError("a lumped machine has no mesh", "--size", remedy)
     script = machine.folder / "geometry.py"
     if not script.exists():
         raise DescriptionError("this model has no geometry.py", str(script), "leave --size away, or add the script")

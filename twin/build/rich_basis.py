@@ -13,6 +13,7 @@ therefore fill (log s, log theta) jointly. The adjoints are the cheapest accurac
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,10 @@ from scipy.stats import qmc
 from twin.build.factorize import factorize
 from twin.build.project import orthonormalise
 from twin.build.stepper import system_matrix
+from twin.build.workers import workers
 from twin.rom.model import AffineBody
+
+LARGEST_AT_ONCE = 100_000  # nodes of a body of which several factors are held in memory
 
 
 @dataclass(frozen=True)
@@ -80,13 +84,21 @@ def rich_basis(
     # ports of a symmetric body appear as input and as output: once is enough
     inputs = _distinct(inputs)
     V = body.one[:, None] / np.sqrt(body.one @ body.energy)
-    for i, (s, theta) in enumerate(sample_points(body, low, high, options)):
+
+    def response(point: tuple[float, np.ndarray]) -> np.ndarray:
+        s, theta = point
         factor = factorize(system_matrix(body, theta, s).tocsr(), rhs_hint=inputs.shape[1])
         X = factor.solve(inputs)
         factor.close()
-        X = X / np.sqrt(np.einsum("ij,ij->j", X, body.E @ X))
-        V = np.column_stack([V, orthonormalise(X, body.E, V, options.tolerance)])
-        progress(f"{body.name}: sample {i + 1}/{options.samples}, {V.shape[1]} directions")
+        return X / np.sqrt(np.einsum("ij,ij->j", X, body.E @ X))
+
+    # Samples are independent of each other, and sparse solvers let go of the interpreter: threads will do here. The
+    # directions are added in the order of the samples, so the basis does not depend on the number of threads.
+    points = sample_points(body, low, high, options)
+    with ThreadPoolExecutor(workers() if body.n < LARGEST_AT_ONCE else 1) as pool:
+        for i, X in enumerate(pool.map(response, points)):
+            V = np.column_stack([V, orthonormalise(X, body.E, V, options.tolerance)])
+            progress(f"{body.name}: sample {i + 1}/{options.samples}, {V.shape[1]} directions")
     return V
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.rom.drive import Drive, evaluate
+from twin.rom.following import DIFFERENCES, Following
 from twin.rom.load_model import Film, Joint, LoadModel
 
 LOADS = ("blocks", "step", "cool-down", "ramp", "duty")
@@ -39,7 +40,7 @@ def draw(load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still
     time = np.arange(n + 1) * sampling
     signals = {}
     positions = {axis.position: axis for axis in load.axes}
-    air = [signal for _, signal, _ in load.environments if signal]
+    air = [e.signal for e in load.environments if e.signal]
     centre = None
     for signal in load.signals:
         if signal.name in positions:
@@ -53,8 +54,12 @@ def draw(load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still
         else:
             signals[signal.name] = _load(rng, time, signal.low, signal.high, pattern)
     drive = evaluate(load, time, signals, dt)
-    drive = replace(drive, theta=_films(rng, load, drive.theta, film, dt))
-    start = float(signals[air[0]][0]) if air else load.environments[0][2]
+    if film != "laws":  # whole coefficients anywhere in the box, radiation included
+        n = drive.n_steps
+        drive = replace(
+            drive, theta=_films(rng, load, n, film, dt), films=Following.none(n, DIFFERENCES), radiation=False
+        )
+    start = float(signals[air[0]][0]) if air else load.environments[0].temperature
     return Scenario(f"seed {seed}: {pattern}, films {film}, ambient {ambient}", drive, start)
 
 
@@ -107,20 +112,14 @@ def _ambient(rng: np.random.Generator, time: np.ndarray, low: float, high: float
     return (a + b) / 2 + (a - b) / 2 * np.sin(2 * np.pi * (time / 86400.0 + rng.random()))
 
 
-def _films(rng: np.random.Generator, load: LoadModel, theta: np.ndarray, pattern: str, dt: float) -> np.ndarray:
+def _films(rng: np.random.Generator, load: LoadModel, n_steps: int, pattern: str, dt: float) -> np.ndarray:
     low, high = theta_bounds(load)
-    if pattern == "laws":
-        # ten-minute means: a coefficient that follows every start and stop costs a factorisation per step and moves
-        # the surface no more than its mean does
-        n = max(1, round(600.0 / dt))
-        count = np.bincount(np.arange(len(theta)) // n)
-        return np.repeat(np.add.reduceat(theta, np.arange(0, len(theta), n)) / count[:, None], count, axis=0)
     if pattern == "low":
-        return np.broadcast_to(low, theta.shape).copy()
+        return np.tile(low, (n_steps, 1))
     if pattern == "high":
-        return np.broadcast_to(high, theta.shape).copy()
+        return np.tile(high, (n_steps, 1))
     # every hour or so all coefficients move anywhere in the box (one factorisation of the full model each time)
-    block = _blocks(rng, np.arange(len(theta)) * dt, 2400.0, 7200.0)
+    block = _blocks(rng, np.arange(n_steps) * dt, 2400.0, 7200.0)
     values = low * (high / low) ** rng.random((block[-1] + 1, len(low)))
     return values[block]
 

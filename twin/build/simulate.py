@@ -13,7 +13,7 @@ import numpy as np
 from twin.build.full_model import FullModel
 from twin.build.pipeline import full_model
 from twin.build.remesh import remesh
-from twin.build.stepper import CoupledStepper, heat_balance_error, sensor_temperatures
+from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.logs.signals import signal_values
@@ -75,9 +75,8 @@ def simulate(
     tcp_rows(-1)
     balance = np.zeros(drive.n_steps)
     with progress("full model", drive.n_steps) as advance:
-        for step, x_new, mean in stepper.run(drive, x, substeps):
-            balance[step] = heat_balance_error(model, drive, step, x, x_new, mean)
-            x = x_new
+        for step, x, heat in stepper.run(drive, x, substeps):  # noqa: B020  x goes on from where it began
+            balance[step] = heat.balance_error
             temperatures.append(np.concatenate([sensor_temperatures(model, x), drive.environment[step, air]]))
             tcp_rows(step)
             advance(f"{drive.time[step + 1] / 3600:.1f} h")

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.build.elastic_ports import MeanPort, PortTable, RailPort, RigidPort
+from twin.build.encoder import LinearEncoder, linear_encoders
 from twin.errors import DescriptionError
 from twin.machine.bodies import Body
 from twin.machine.description import Contact, Machine, StiffnessOfPair
@@ -58,6 +59,7 @@ class SpringSystem:
     tool: RigidPort
     tool_point: np.ndarray  # (3,) m at axis positions zero
     work: RigidPort
+    encoders: tuple[LinearEncoder, ...] = ()  # linear scales; axes without one are read at their screw
 
     def vector(self, positions: Positions) -> np.ndarray:
         """Positions (n_axes,) [m] in the order of `axes`. Raises ValueError for unknown axes or a wrong number."""
@@ -92,7 +94,49 @@ class SpringSystem:
         return J
 
     def tcp_rows(self, positions: Positions) -> np.ndarray:
-        """t (3, P): displacement [m] of the tool minus the work side at the tool centre point of this pose."""
+        """t (3, P): displacement [m] of the tool minus the work side at the tool centre point of this pose.
+
+        With linear scales, the reader's part of it included; the scales' own growth is in `scale_rows`.
+        """
+        t = self.nut_rows(positions)
+        for encoder in self.encoders:
+            t += np.outer(self._lever(encoder) * encoder.sign, self.reader_row(encoder, positions))
+        return t
+
+    def scale_rows(self, positions: Positions) -> list[tuple[int, np.ndarray, np.ndarray]]:
+        """What the growth of each scale adds: (body, its nodes (m,), displacement (3, m) [m/K] per T - T_ref there)."""
+        return [
+            (e.strip.body, e.strip.nodes, np.outer(-self._lever(e) * e.sign, self.scale_row(e, positions)))
+            for e in self.encoders
+        ]
+
+    def scale_row(self, encoder: LinearEncoder, positions: Positions) -> np.ndarray:
+        """(m,) [m/K]: growth of a scale up to its reader per T - T_ref at its `strip.nodes`."""
+        return encoder.scale_row(self._offset(encoder, positions))
+
+    def reader_row(self, encoder: LinearEncoder, positions: Positions) -> np.ndarray:
+        """(P,): axial displacement [m] of the reader minus that of its scale's fixing point."""
+        row = np.zeros(int(self.offsets[-1]))
+        column = self.offsets[encoder.reader.body] + encoder.reader.first
+        row[column : column + 6] = encoder.reader_row(self._offset(encoder, positions))
+        row[self.offsets[encoder.fixing.body] + encoder.fixing.first] -= 1.0
+        return row
+
+    def carried_by(self, encoder: LinearEncoder) -> np.ndarray:
+        """(n_bodies, 3): translation of each body per [reader minus fixing point minus the scale's growth]."""
+        return encoder.sign * self.shifts[:, encoder.axis]
+
+    def _lever(self, encoder: LinearEncoder) -> np.ndarray:
+        """(3,): tool minus work per shift of the carried side along the axis."""
+        return self.shifts[self.tool.body, encoder.axis] - self.shifts[self.work.body, encoder.axis]
+
+    def _offset(self, encoder: LinearEncoder, positions: Positions) -> np.ndarray:
+        """(3,) [m]: how far the pose brings the reader's body along relative to the scale's."""
+        shift = np.einsum("bak,a->bk", self.shifts, self.vector(positions))
+        return shift[encoder.reader.body] - shift[encoder.strip.body]
+
+    def nut_rows(self, positions: Positions) -> np.ndarray:
+        """t (3, P) with every nut as the datum of its axis: `tcp_rows` of a machine without linear scales."""
         shift = np.einsum("bak,a->bk", self.shifts, self.vector(positions))
         t = np.zeros((3, int(self.offsets[-1])))
         for port, sign in ((self.tool, 1.0), (self.work, -1.0)):
@@ -106,7 +150,7 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
     """Collect the springs and the TCP of a machine; adds the ports they need to `ports`.
 
     Raises DescriptionError: a pad whose normal is along the axis, radial stiffnesses of a cylinder that differ,
-    a tool without a point.
+    a tool without a point; a scale that does not reach (`linear_encoders`).
     """
     names: list[str] = []
     stiffness: list[float] = []
@@ -131,9 +175,11 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
     tool, work = ports.rigid(machine.tcp.tool.surface), ports.rigid(machine.tcp.work.surface)
     axes = linear_axes(machine)
     shifts = np.array([[displacement(machine, b.name, {a: 1.0}) for a in axes] for b in bodies])
+    shifts = shifts.reshape(len(bodies), len(axes), 3)
+    encoders = linear_encoders(machine, ports, shifts)
     return SpringSystem(
         axes=axes,
-        shifts=shifts.reshape(len(bodies), len(axes), 3),
+        shifts=shifts,
         offsets=np.cumsum([0] + [len(n) for n in ports.names]),
         names=tuple(names),
         stiffness=np.array(stiffness),
@@ -142,6 +188,7 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
         tool=tool,
         tool_point=np.array(machine.tcp.tool.point),
         work=work,
+        encoders=encoders,
     )
 
 

@@ -4,7 +4,7 @@ Springs act on gaps g = J w of port displacements w; with w = H T + F p + R a of
 
     (k^-1 + J F J^T) f - J R a = J H T        compatibility, k the spring stiffnesses
                       R^T J^T f = 0           equilibrium of every body
-    TCP displacement  = t w
+    TCP displacement  = t w + growth of linear scales (`encoder`)
 
 Only J (which segments face which pad, levers) and t (levers of the tool centre point) depend on the position, so a pose
 costs one dense system of the size of the springs. T is temperature above the reference, per node of each body.
@@ -13,22 +13,27 @@ costs one dense system of the size of the springs. T is temperature above the re
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_array
 
 from twin.build.elastic_ports import PortTable, cross_matrix
 from twin.build.elasticity import body_elasticity
+from twin.build.encoder import EncoderTerms, LinearEncoder
 from twin.build.flexibility import BodyFlexibility, block_count, condense
 from twin.build.mesh import BodyMesh
 from twin.build.springs import Positions, SpringSystem, spring_system
+from twin.build.workers import workers
 from twin.errors import ModelError
 from twin.machine.bodies import bodies_of
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
 
+LARGEST_AT_ONCE = 100_000  # nodes of a machine whose bodies are factored at the same time
 FREE = 1e-9  # rigid-body stiffness (scaled to lengths) below this share of the largest is a mechanism
 
 
@@ -47,7 +52,7 @@ class Structure:
         return self.system.axes
 
     def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
-        """Z_b (3, n_ports_b) per body: the TCP displacement is sum_b Z_b H_b T_b at this pose.
+        """Z_b (3, n_ports_b) per body: the TCP displacement is sum_b Z_b H_b T_b at this pose, plus `scale_rows`.
 
         Raises ModelError where a body can move freely.
         """
@@ -63,15 +68,66 @@ class Structure:
         poses (n_poses, n_axes) [m].
         """
         stacked = [np.array(z) for z in zip(*(self.rows(p) for p in poses), strict=True)]
-        return tuple(
+        rows = tuple(
             (z.reshape(-1, z.shape[2]) @ body.H).reshape(len(poses), 3, -1)
             for z, body in zip(stacked, self.bodies, strict=True)
         )
+        for i, pose in enumerate(poses):
+            for b, nodes, growth in self.system.scale_rows(pose):
+                rows[b][i][:, nodes] += growth
+        return rows
 
     def displacement(self, positions: Positions, fields: Sequence[np.ndarray]) -> np.ndarray:
         """TCP displacement (3,) [m], tool minus work side; fields: T - T_ref (n_nodes_b,) [K] per body."""
         rows = self.rows(positions)
-        return np.sum([z @ (b.H @ T) for z, b, T in zip(rows, self.bodies, fields, strict=True)], axis=0)
+        w = np.sum([z @ (b.H @ T) for z, b, T in zip(rows, self.bodies, fields, strict=True)], axis=0)
+        for b, nodes, growth in self.system.scale_rows(positions):
+            w = w + growth @ fields[b][nodes]
+        return w
+
+    def encoder_terms(self, axis: str, positions: Positions, fields: Sequence[np.ndarray]) -> EncoderTerms:
+        """What makes up the error along an axis, actual minus indicated; fields as in `displacement`.
+
+        The axis' own scale only: scales of other axes act along those. Reader and scale are zero for a rotary encoder,
+        and for an axis that carries both tool and work. Raises ValueError for an unknown linear axis.
+        """
+        if axis not in self.axes:
+            raise ValueError(f"no linear axis '{axis}'; axes are {self.axes}")
+        w = self._port_displacements(positions, fields)
+        k = self.axes.index(axis)
+        moves = self.system.shifts[:, k]
+        along = moves[np.argmax(np.linalg.norm(moves, axis=1))]
+        reader = scale = 0.0
+        for e in self.system.encoders:
+            if e.axis == k:
+                lever = float((moves[self.system.tool.body] - moves[self.system.work.body]) @ along) * e.sign
+                reader = lever * float(self.system.reader_row(e, positions) @ w)
+                scale = -lever * self._growth(e, positions, fields)
+        return EncoderTerms(float(along @ self.system.nut_rows(positions) @ w), reader, scale)
+
+    def encoder_shifts(self, positions: Positions, fields: Sequence[np.ndarray]) -> np.ndarray:
+        """(n_bodies, 3) [m]: what linear scales move each body by, on top of where nuts and springs hold it."""
+        shifts = np.zeros((len(self.bodies), 3))
+        if self.system.encoders:
+            w = self._port_displacements(positions, fields)
+            for e in self.system.encoders:
+                off = float(self.system.reader_row(e, positions) @ w) - self._growth(e, positions, fields)
+                shifts += off * self.system.carried_by(e)
+        return shifts
+
+    def _growth(self, encoder: LinearEncoder, positions: Positions, fields: Sequence[np.ndarray]) -> float:
+        """Growth [m] of a scale from its fixing point to its reader."""
+        return float(self.system.scale_row(encoder, positions) @ fields[encoder.strip.body][encoder.strip.nodes])
+
+    def _port_displacements(self, positions: Positions, fields: Sequence[np.ndarray]) -> np.ndarray:
+        """w = H T + F p + R a (P,) of all bodies, with every nut as the datum of its axis."""
+        J = self.system.gap_rows(positions)
+        HT = np.concatenate([b.H @ T for b, T in zip(self.bodies, fields, strict=True)])
+        f, a = self._solve(J, J @ HT, np.zeros(6 * len(self.bodies)))
+        forces = np.split(-J.T @ f, self.system.offsets[1:-1])
+        elastic = [b.F @ p for b, p in zip(self.bodies, forces, strict=True)]
+        rigid = [m @ x for m, x in zip(self._modes(), a.reshape(-1, 6), strict=True)]
+        return HT + np.concatenate(elastic) + np.concatenate(rigid)
 
     def solve(self, positions: Positions, fields: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Spring forces (s,) [N], positive where the gap opens, in the order of `system.names`, and rigid motions
@@ -141,10 +197,16 @@ def assemble_structure(machine: Machine, bodies: tuple[BodyMesh, ...], progress:
     """
     ports = PortTable(bodies)
     system = spring_system(machine, bodies_of(machine), ports)
-    flexible = []
-    with progress("elastic bodies", sum(block_count(len(names)) for names in ports.names)) as advance:
-        for body, names, U in zip(bodies, ports.names, ports.matrices(), strict=True):
-            flexible.append(condense(body.name, tuple(names), U, body_elasticity(machine, body), body.nodes, advance))
+    at_once = workers() if sum(body.n for body in bodies) < LARGEST_AT_ONCE else 1
+    with (
+        progress("elastic bodies", sum(block_count(len(names)) for names in ports.names)) as advance,
+        ThreadPoolExecutor(at_once) as pool,  # sparse solvers let go of the interpreter
+    ):
+
+        def condensed(body: BodyMesh, names: list[str], U: csr_array) -> BodyFlexibility:
+            return condense(body.name, tuple(names), U, body_elasticity(machine, body), body.nodes, advance)
+
+        flexible = list(pool.map(condensed, bodies, ports.names, ports.matrices()))
     middles = np.array([body.nodes.mean(axis=0) for body in bodies])
     size = max(float(np.linalg.norm(b.nodes - m, axis=1).max()) for b, m in zip(bodies, middles, strict=True))
     structure = Structure(tuple(flexible), system, middles, size)

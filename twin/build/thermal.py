@@ -50,14 +50,21 @@ def assemble_thermal(machine: Machine, bodies: tuple[BodyMesh, ...]) -> MachineM
         raise DescriptionError.collect(wrong)
     films = film_surfaces(machine, {part.name: tuple(part.surfaces) for body in bodies for part in body.parts})
     ports = contact_ports(machine, bodies)
-    load = load_model(machine, ports)
+    load = load_model(machine, ports, _film_areas(bodies, films))
     rows = _sensor_rows(machine, bodies)
-    environments = [name for name, _, _ in load.environments]
+    return machine_model(
+        machine, load, tuple(_body(machine, body, films, ports, load, rows[body.name]) for body in bodies)
+    )
+
+
+def machine_model(machine: Machine, load: LoadModel, bodies: tuple[AffineBody, ...]) -> MachineModel:
+    """Bodies and loads with the names of the sensors and the grid of poses."""
+    environments = [e.name for e in load.environments]
     grid = pose_grid(machine)
     axes = np.meshgrid(*grid, indexing="ij")
     return MachineModel(
         name=machine.machine.name,
-        bodies=tuple(_body(machine, body, films, ports, load, rows[body.name]) for body in bodies),
+        bodies=bodies,
         load_model=load,
         reference_temperature=machine.machine.reference_temperature,
         sensors=_structural(machine),
@@ -115,19 +122,22 @@ def _body(
     one = np.ones(body.n)
     own = {part.name for part in body.parts}
 
-    A, theta, M = [], [], []
+    A, theta, M, H = [], [], [], []
+    height = body.nodes[:, "xyz".index(machine.machine.vertical)]
     for k, film in enumerate(load.films):
         surfaces = [(p, s) for p, s in films[film.name] if p in own]
         if surfaces:
             A.append(_film_matrix(body, surfaces))
             theta.append(k)
             M.append(A[-1] @ one)
+            H.append(A[-1] @ height)
     for j, joint in enumerate(load.joints):
         pair = machine.contacts[joint.name].surfaces
         if pair is not None and split_surface(pair[0])[0] in own:
             A.append(interface(body, *pair, where=f"contacts.{joint.name}").matrix)
             theta.append(len(load.films) + j)
             M.append(np.zeros(body.n))
+            H.append(np.zeros(body.n))
 
     B, sources = [], []
     for i, source in enumerate(load.sources):
@@ -153,12 +163,23 @@ def _body(
         G=np.zeros((0, 3, body.n)),
         one=one,
         energy=E @ one,
+        H=np.column_stack(H) if H and any(e.gradient for e in load.environments) else None,
     )
 
 
 def _structural(machine: Machine) -> tuple[str, ...]:
     """Sensors on parts, not in the air."""
     return tuple(name for name, s in machine.sensors.items() if s.environment is None)
+
+
+def _film_areas(bodies: tuple[BodyMesh, ...], films: FilmSurfaces) -> dict[str, float]:
+    """m^2 of every film's surfaces."""
+    areas = dict.fromkeys(films, 0.0)
+    for body in bodies:
+        for part in body.parts:
+            for name, surfaces in films.items():
+                areas[name] += sum(patch(part, part.facets(s)).area for p, s in surfaces if p == part.name)
+    return areas
 
 
 def _film_matrix(body: BodyMesh, surfaces: list[tuple[str, str]]) -> sp.csr_array:

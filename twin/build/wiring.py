@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,26 +14,39 @@ from twin.errors import DescriptionError
 from twin.machine import wiring
 from twin.machine.description import Machine
 from twin.machine.kinematics import linear_axes
-from twin.rom.law_values import law_values
-from twin.rom.load_model import Film, Joint, LawUse, LoadModel, Signal
+from twin.physics.laws import LAWS
+from twin.physics.radiation import radiation_coefficient
+from twin.rom.law_values import law_table, law_values, states_of
+from twin.rom.load_model import EnvironmentWiring, Film, Joint, LoadModel, Signal
 
 FILM_MARGIN = (0.5, 2.0)  # certified film coefficients: from half the least to twice the greatest value of the law
 JOINT_MARGIN = 3.0  # certified joint conductances: a third to three times the described one
 
 
-def load_model(machine: Machine, ports: ContactPorts) -> LoadModel:
+# Certified surface temperatures, above and below the environment [K]. At equal temperatures no heat flows, so the least
+# coefficient of free convection is taken just beside.
+DIFFERENCES = np.array([-60.0, -10.0, -1.0, -0.01, 0.01, 1.0, 10.0, 60.0])
+
+
+def load_model(machine: Machine, ports: ContactPorts, areas: Mapping[str, float]) -> LoadModel:
     """Everything that turns a load log into heat, of a description whose references are sound.
 
+    areas: m^2 of every film's surfaces, for laws that need it.
     Raises DescriptionError for a film law that is not positive and finite within its signals' ranges.
     """
     signals = {name: wiring.signal(name, entry) for name, entry in machine.signals.items()}
     environments = tuple(wiring.environment(name, entry, machine) for name, entry in machine.environment.items())
-    order = [name for name, _, _ in environments]
+    order = [e.name for e in environments]
     films = []
     for name, entry in machine.films.items():
         use = wiring.film_law(name, entry, machine)
-        low, high = film_range(use, signals, f"films.{name}")
-        films.append(Film(name, use, order.index(entry.environment), low, high))
+        if "area" in LAWS[use.law].parameters and "area" not in use.parameters:
+            use = replace(use, parameters={**use.parameters, "area": areas[name]})
+        air = order.index(entry.environment)
+        radiant = air if entry.radiant is None else order.index(entry.radiant)
+        film = Film(name, use, air, 0.0, 0.0, entry.gain, wiring.emissivity(entry), radiant)
+        low, high = film_range(film, environments, signals, f"films.{name}")
+        films.append(replace(film, low=low, high=high))
     return LoadModel(
         signals=tuple(signals.values()),
         axes=tuple(wiring.axis(name, machine) for name in linear_axes(machine)),
@@ -40,9 +54,10 @@ def load_model(machine: Machine, ports: ContactPorts) -> LoadModel:
         sources=tuple(wiring.source(name, entry, machine) for name, entry in machine.sources.items()),
         films=tuple(films),
         joints=tuple(
-            Joint(name, c.conductance, c.conductance / JOINT_MARGIN, c.conductance * JOINT_MARGIN)
+            Joint(name, g, g / JOINT_MARGIN, g * JOINT_MARGIN, "conductance" if c.total is None else "total")
             for name, c in machine.contacts.items()
             if c.kind == "fixed"
+            for g in [wiring.joint_conductance(name, machine)]
         ),
         ports=ports.names,
         rails=ports.rails,
@@ -50,20 +65,29 @@ def load_model(machine: Machine, ports: ContactPorts) -> LoadModel:
     )
 
 
-def film_range(use: LawUse, signals: Mapping[str, Signal], where: str) -> tuple[float, float]:
-    """Certified range [W/(m^2 K)] of a film: margins around its law over the corners of its signals' ranges.
+def film_range(
+    film: Film, environments: tuple[EnvironmentWiring, ...], signals: Mapping[str, Signal], where: str
+) -> tuple[float, float]:
+    """Certified range [W/(m^2 K)] of a film: margins around its law and radiation over the corners of all ranges.
 
     Zero counts as a corner where a range includes it: laws in |v| have their least value there. Raises DescriptionError
-    where the law is not positive and finite: ranges are sampled on a logarithmic scale.
+    where the coefficient is not positive and finite: ranges are sampled on a logarithmic scale.
     """
-    names = sorted(set(use.signals.values()))
-    ranges = [(signals[n].low, signals[n].high) for n in names]
-    combinations = list(
-        itertools.product(*((low, 0.0, high) if low < 0 < high else (low, high) for low, high in ranges))
-    )
-    corners = np.array(combinations, dtype=float).reshape(len(combinations), len(names))
-    values = law_values([use], dict(zip(names, corners.T, strict=True)), len(corners))
-    low, high = float(values.min()), float(values.max())
+    use, air = film.use, environments[film.environment]
+    names = sorted({*use.signals.values(), *([air.signal] if air.signal else [])})
+    corners = _corners([(signals[n].low, signals[n].high) for n in names])
+    values = dict(zip(names, corners.T, strict=True))
+    ambient = values[air.signal] if air.signal else np.full(len(corners), air.temperature)
+    surface = ambient[:, None] + DIFFERENCES
+    free = states_of(use)
+    if free:
+        states = {"surface": surface, "ambient": ambient[:, None]}
+        convection = law_table(use, values, len(corners), {name: states[name] for name in free})
+    else:
+        convection = law_values([use], values, len(corners))
+    radiant = _middle(environments[film.radiant], signals)
+    h = film.gain * convection + radiation_coefficient(surface, radiant, film.emissivity)
+    low, high = float(h.min()), float(h.max())
     if not (low > 0 and math.isfinite(high)):
         raise DescriptionError(
             f"law '{use.law}' gives {low:g} .. {high:g} W/(m^2 K) over its signals' ranges",
@@ -72,3 +96,17 @@ def film_range(use: LawUse, signals: Mapping[str, Signal], where: str) -> tuple[
             "list surfaces without convection under `adiabatic` of their part",
         )
     return FILM_MARGIN[0] * low, FILM_MARGIN[1] * high
+
+
+def _corners(ranges: Iterable[tuple[float, float]]) -> np.ndarray:
+    """All corners (n, len(ranges)) of a box, with zero where a range includes it."""
+    ends = [(low, 0.0, high) if low < 0 < high else (low, high) for low, high in ranges]
+    corners = list(itertools.product(*ends))
+    return np.array(corners, dtype=float).reshape(len(corners), len(ends))
+
+
+def _middle(environment: EnvironmentWiring, signals: Mapping[str, Signal]) -> float:
+    """degC: of a radiant environment; its coefficient varies by 2 % for 10 K, which the margins cover."""
+    if not environment.signal:
+        return environment.temperature
+    return (signals[environment.signal].low + signals[environment.signal].high) / 2

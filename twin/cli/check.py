@@ -12,6 +12,8 @@ import click
 from twin.errors import LogError, Problem, TwinError
 
 if TYPE_CHECKING:
+    from twin.logs.sampling_rule import Needed
+    from twin.machine.description import Machine
     from twin.rom.load_model import Signal
 
 
@@ -23,6 +25,7 @@ class Expected:
     signals: tuple[Signal, ...]
     axes: tuple[str, ...]  # linear
     sensors: tuple[str, ...]
+    core: Needed | None = None  # the sampling that the axes' limits ask for, where they are known
 
 
 @dataclass
@@ -93,14 +96,22 @@ def _check_machine(path: Path, meshes: bool) -> Findings:
     except TwinError as e:
         findings.problems += e.problems
         return findings
-    findings.facts = {"name": machine.machine.name, "parts": len(machine.parts), "signals": len(machine.signals)}
+    findings.facts = {"name": machine.machine.name}
+    if machine.lumped:
+        findings.facts |= {"nodes": len(machine.nodes), "bars": len(machine.bars), "signals": len(machine.signals)}
+    else:
+        findings.facts |= {"parts": len(machine.parts), "signals": len(machine.signals)}
     findings.problems += check_machine(machine)
     if meshes:
         from twin.build.check_meshes import check_meshes
 
         report = check_meshes(machine)
         findings.problems += report.problems
-        findings.facts |= {"bodies": report.bodies, "nodes": report.nodes, "kg": round(report.mass, 1)}
+        findings.facts["bodies"] = report.bodies
+        if machine.lumped:
+            findings.facts |= {"states": report.nodes, "kJ/K": round(report.capacity / 1e3, 3)}
+        else:
+            findings.facts |= {"nodes": report.nodes, "kg": round(report.mass, 1)}
     return findings
 
 
@@ -131,7 +142,7 @@ def _check_run(path: Path, machine_path: Path | None) -> Findings:
         findings.problems += [Problem(what, str(path), remedy, warning=True), *check_run(run)]
         return findings
     findings.facts["machine"] = expected.machine
-    findings.problems += check_run(run, expected.signals, expected.axes, expected.sensors)
+    findings.problems += check_run(run, expected.signals, expected.axes, expected.sensors, expected.core)
     return findings
 
 
@@ -156,7 +167,23 @@ def _of_description(path: Path) -> Expected:
 
     machine = load_machine(path)
     signals = tuple(signal(name, entry) for name, entry in machine.signals.items())
-    return Expected(machine.machine.name, signals, linear_axes(machine), tuple(machine.sensors))
+    axes = linear_axes(machine)
+    return Expected(machine.machine.name, signals, axes, tuple(machine.sensors), _core_sampling(machine, axes))
+
+
+def _core_sampling(machine: Machine, axes: tuple[str, ...]) -> Needed | None:
+    """By Table 16.1 of paper 001. Meshes of rails are read only for axes whose speed limit is given."""
+    from twin.logs.sampling_rule import AxisLimits, core_sampling
+
+    limits = []
+    for name in axes:
+        axis, segment = machine.axes[name], None
+        if axis.speed is not None and not machine.lumped:
+            from twin.build.rail_segments import shortest_segment
+
+            segment = shortest_segment(machine, name)
+        limits.append(AxisLimits(name, axis.speed, axis.acceleration, axis.jerk, segment))
+    return core_sampling(limits)
 
 
 def _of_artefact(path: Path) -> Expected:

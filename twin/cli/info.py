@@ -36,13 +36,15 @@ def facts(artefact: Artefact) -> dict[str, Any]:
     for source in load.sources:
         parameters |= use(f"sources.{source.name}", source.use) | {f"sources.{source.name}.gain": source.gain}
     for film in load.films:
-        parameters |= use(f"films.{film.name}", film.use)
+        owner = f"films.{film.name}"
+        parameters |= use(owner, film.use) | {f"{owner}.gain": film.gain, f"{owner}.emissivity": film.emissivity}
     for joint in load.joints:
-        parameters[f"contacts.{joint.name}.conductance"] = joint.conductance
+        parameters[f"contacts.{joint.name}.{joint.key}"] = joint.conductance
     for pair in load.pairs:
-        parameters[f"contacts.{pair.contact}.conductance"] = pair.conductance
-    terms = [*((f"films.{f.name}", f.low, f.high) for f in load.films),
-             *((f"contacts.{j.name}.conductance", j.low, j.high) for j in load.joints)]  # fmt: skip
+        parameters[f"contacts.{pair.contact}.{pair.key}"] = pair.conductance
+    unit = {"conductance": "W/(m^2*K)", "total": "W/K"}
+    terms = [*((f"films.{f.name}", f.low, f.high, unit["conductance"]) for f in load.films),
+             *((f"contacts.{j.name}.{j.key}", j.low, j.high, unit[j.key]) for j in load.joints)]  # fmt: skip
     return {
         "name": model.name,
         "created": artefact.created,
@@ -68,7 +70,7 @@ def facts(artefact: Artefact) -> dict[str, Any]:
             "signals": {
                 s.name: {"low": s.low, "high": s.high, "unit": s.unit, "column": s.column} for s in load.signals
             },
-            "coefficients": {name: {"low": low, "high": high, "unit": "W/(m^2*K)"} for name, low, high in terms},
+            "coefficients": {name: {"low": low, "high": high, "unit": u} for name, low, high, u in terms},
         },
         "certificate": {
             name: value if not hasattr(value, "tolist") else value.tolist()

@@ -19,12 +19,17 @@ from twin.errors import TwinError
 # name -> what `twin --help` says about it; the command object is twin.cli.NAME.command
 COMMANDS = {
     "check": "Find mistakes in a machine description or a run folder.",
+    "unpack": "Turn a file of load blocks into a run folder.",
+    "losses": "Show the heat of every source, every film coefficient, and where they come from.",
     "simulate": "Step the full model through a run and write a run folder.",
     "build": "Reduce a machine to an artefact with a certificate.",
     "verify": "Test an artefact against the full model on held-out scenarios.",
     "run": "Run an artefact on a run folder: temperatures, TCP error.",
     "info": "Show what is in an artefact.",
     "report": "Draw the pictures of a result.",
+    "poses": "Find the pose grid that suffices for a run, and the shares of the volumetric error.",
+    "correction": "Compress the TCP error of a result to polynomials for the control.",
+    "warmup": "Tell when a result has warmed up, and how it drifts at the end.",
     "demo": "Build, verify and run the shipped five-axis machine.",
 }
 
@@ -40,7 +45,9 @@ class LazyGroup(click.Group):
             return None
         # JAX calls SciPy's OpenBLAS; with its threads small factorisations take 9 to 22 ms instead of 0.1, and on two
         # cores a whole build takes twice as long. It reads this once, when numpy is imported.
+        # MKL likewise: builds work on several things at once, each in one thread, so that equal input gives equal bits.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        os.environ.setdefault("MKL_NUM_THREADS", "1")
         return importlib.import_module(f"twin.cli.{name}").command
 
     def resolve_command(

@@ -64,9 +64,14 @@ def command(
     checkpoints.clear()  # the results hold all of it
     worst = told["tcp"]["worst"]
     place = ", ".join(f"{axis} {1e3 * value:.0f} mm" for axis, value in worst["pose_m"].items())
+    largest = (
+        f"largest TCP error d{worst['component']} {1e6 * worst['value_m']:.1f} um after {worst['time_s'] / 3600:.2f} h "
+        f"at {place or 'the only pose'}"
+        if loaded.model.moves
+        else "no temperature moves the tool"
+    )
     click.echo(
-        f"{output}: {told['steps']} steps of {step:g} s; largest TCP error d{worst['component']} "
-        f"{1e6 * worst['value_m']:.1f} um after {worst['time_s'] / 3600:.2f} h at {place or 'the only pose'}; "
+        f"{output}: {told['steps']} steps of {step:g} s; {largest}; "
         f"heat balance closes to {told['heat']['max_balance_error']:.1e} of the throughput"
     )
     raised = {name: flag for name, flag in told["flags"].items() if flag["steps"]}

@@ -9,6 +9,7 @@ import numpy as np
 from twin.errors import Problem
 from twin.logs.motion import motion_problems
 from twin.logs.run import Run, Table
+from twin.logs.sampling_rule import Needed
 from twin.logs.signals import SignalLike, signal_problems
 from twin.nearest import did_you_mean
 
@@ -17,12 +18,17 @@ _PLAUSIBLE = (-40.0, 200.0)  # degC in a workshop
 
 
 def check_run(
-    run: Run, signals: Sequence[SignalLike] = (), axes: Sequence[str] = (), sensors: Sequence[str] = ()
+    run: Run,
+    signals: Sequence[SignalLike] = (),
+    axes: Sequence[str] = (),
+    sensors: Sequence[str] = (),
+    core: Needed | None = None,
 ) -> list[Problem]:
     """Errors (times that do not increase, missing signals) and warnings (gaps, constant zeros, odd clocks) of a run.
 
     signals: the load channels that must be there, with their certified ranges; axes: names of the linear axes that
-    tcp.csv must tell the position of; sensors: names that the columns of temperatures.csv should have.
+    tcp.csv must tell the position of; sensors: names that the columns of temperatures.csv should have; core: the
+    sampling that the limits of the axes ask for.
     """
     problems = [*signal_problems(run, signals)]
     tables = {"loads": run.loads}
@@ -39,6 +45,7 @@ def check_run(
         if name != "loads":
             problems += _overlap(table, run.loads, where)
     problems += _ranges(run, signals)
+    problems += _slow(run, core)
     if not any(p for p in problems if not p.warning):
         problems += motion_problems(run.loads, str(run.folder / "loads.csv"))
     if run.temperatures is not None and sensors:
@@ -89,6 +96,30 @@ def _time(table: Table, where: str, name: str, sampling: float | None) -> list[P
                     "a factor 1000 is milliseconds: mend 'time [s]' or sampling", warning=True)
         )  # fmt: skip
     return problems
+
+
+def _slow(run: Run, core: Needed | None) -> list[Problem]:
+    """A log slower than the rule of paper 001: one warning that says what it costs and what it does not."""
+    step = np.diff(run.loads.time)
+    if core is None or not (step > 0.0).any():
+        return []
+    usual = float(np.median(step[step > 0.0]))
+    if usual <= 1.01 * core.interval:
+        return []
+    cost = {
+        "position": "which rail segment a load falls on is known only on the average over that time",
+        "speed": "losses in each rail segment are known only on the average over that time",
+        "current": "peaks between two rows are missed",
+    }[core.quantity]
+    return [
+        Problem(
+            f"loads are logged every {usual:g} s, the axes' limits ask for {core}",
+            str(run.folder / "loads.csv"),
+            f"{cost}; heat is right if rows are means (rms currents, mean magnitudes of speeds, mean powers), not"
+            f" single samples: `twin unpack FILE -o RUN --mean '{usual:g} s'` makes such means of a fast log",
+            warning=True,
+        )
+    ]
 
 
 def _times(n: int) -> str:

@@ -1,4 +1,5 @@
-"""Bodies: the parts that move and are factored as one, because fixed contacts join them."""
+"""Bodies: the parts (of a lumped machine the nodes and bars) that move and are factored as one, because fixed contacts
+join them."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ class Body:
     """Parts joined, directly or through others, by contacts of kind "fixed"."""
 
     name: str  # the first part's name
-    parts: tuple[str, ...]  # in the order of the description
+    parts: tuple[str, ...]  # or nodes and bars, in the order of the description
 
 
 def split_surface(surface: str) -> tuple[str, str]:
@@ -26,13 +27,18 @@ def split_surface(surface: str) -> tuple[str, str]:
     return part, name
 
 
+def owner_of(place: str) -> str:
+    """The part of "part.surface", the bar of "bar.end", or the node or bar itself."""
+    return place.partition(".")[0]
+
+
 def bodies_of(machine: Machine) -> tuple[Body, ...]:
     """The bodies of a machine, ordered as their first parts appear.
 
     Raises DescriptionError where a fixed contact names an unknown part or has no two surfaces.
     """
-    leader = {part: part for part in machine.parts}  # disjoint sets; leaders are the earliest parts
-    order = {part: i for i, part in enumerate(machine.parts)}
+    leader = {part: part for part in machine.members}  # disjoint sets; leaders are the earliest parts
+    order = {part: i for i, part in enumerate(machine.members)}
 
     def find(part: str) -> str:
         while leader[part] != part:
@@ -46,15 +52,15 @@ def bodies_of(machine: Machine) -> tuple[Body, ...]:
             remedy = "give surfaces = ['part.surface', 'part.surface']"
             raise DescriptionError("a fixed contact without surfaces", f"contacts.{name}", remedy)
         for surface in contact.surfaces:
-            if split_surface(surface)[0] not in leader:
-                remedy = f"parts are: {', '.join(machine.parts)}"
+            if owner_of(surface) not in leader:
+                remedy = f"parts are: {', '.join(machine.members)}"
                 raise DescriptionError(f"unknown part in '{surface}'", f"contacts.{name}.surfaces", remedy)
-        a, b = (find(split_surface(s)[0]) for s in contact.surfaces)
+        a, b = (find(owner_of(s)) for s in contact.surfaces)
         first, second = sorted((a, b), key=order.__getitem__)
         leader[second] = first
 
     members: dict[str, list[str]] = {}
-    for part in machine.parts:
+    for part in machine.members:
         members.setdefault(find(part), []).append(part)
     return tuple(Body(name, tuple(parts)) for name, parts in members.items())
 

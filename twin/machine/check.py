@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from twin.errors import Problem
+from twin.machine.check_lumped import lumped_oddities
 from twin.machine.description import Machine, Material
 
 # From polymers and foams to copper, diamond tools and Invar: wide enough for what machines are made of, narrow enough
@@ -33,6 +34,7 @@ def check_machine(machine: Machine) -> list[Problem]:
     problems: list[Problem] = []
     for name, material in machine.materials.items():
         problems += _material(name, material)
+    problems += lumped_oddities(machine) if machine.lumped else []
     problems += _unused(machine)
     return problems
 
@@ -41,6 +43,8 @@ def _material(name: str, material: Material) -> Iterator[Problem]:
     bands = _BANDS | (_METAL if material.density > 2600.0 else {})
     for key, (low, high, unit) in bands.items():
         value = getattr(material, key)
+        if key not in material.model_fields_set:
+            continue  # of a lumped machine
         if low <= value <= high:
             continue
         where = f"machine.toml: materials.{name}.{key}"
@@ -55,13 +59,15 @@ def _material(name: str, material: Material) -> Iterator[Problem]:
 
 
 def _unused(machine: Machine) -> Iterator[Problem]:
-    used_materials = {p.material for p in machine.parts.values()}
+    used_materials = {p.material for p in machine.parts.values()} | {b.material for b in machine.bars.values()}
+    used_materials |= {n.material for n in machine.nodes.values() if n.material is not None}
     used_signals = {a.position for a in machine.axes.values()} | {e.signal for e in machine.environment.values()}
     used_signals |= {s for source in machine.sources.values() for s in source.signals.values()}
     used_signals |= {s for film in machine.films.values() for s in film.signals.values()}
     used_environments = {f.environment for f in machine.films.values()} | {
         s.environment for s in machine.sensors.values()
     }
+    used_environments |= {f.radiant for f in machine.films.values()}
     for section, names, used in (
         ("materials", machine.materials, used_materials),
         ("signals", machine.signals, used_signals),

@@ -7,6 +7,7 @@ All part meshes are in machine coordinates [m] with every axis at position zero.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -44,6 +45,16 @@ Pressure = Annotated[float, _Quantity("Pa")]
 Expansion = Annotated[float, _Quantity("1/K")]
 FilmCoefficient = Annotated[float, _Quantity("W/(m^2*K)")]
 Stiffness = Annotated[float, _Quantity("N/m")]
+Speed = Annotated[float, _Quantity("m/s")]
+Acceleration = Annotated[float, _Quantity("m/s^2")]
+Jerk = Annotated[float, _Quantity("m/s^3")]
+TemperatureGradient = Annotated[float, _Quantity("K/m")]
+Area = Annotated[float, _Quantity("m^2")]
+Volume = Annotated[float, _Quantity("m^3")]
+Mass = Annotated[float, _Quantity("kg")]
+Capacity = Annotated[float, _Quantity("J/K")]
+Conductance = Annotated[float, _Quantity("W/K")]
+DisplacementPerKelvin = Annotated[float, _Quantity("m/K")]
 Vector = tuple[float, float, float]
 Point = tuple[Length, Length, Length]
 
@@ -52,12 +63,16 @@ class Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+def _not_given() -> float:
+    return math.nan
+
+
 class Material(Entry):
     conductivity: Conductivity = Field(gt=0)
     density: Density = Field(gt=0)
     heat_capacity: HeatCapacity = Field(gt=0)
-    youngs_modulus: Pressure = Field(gt=0)
-    poisson_ratio: float = Field(gt=-1, lt=0.5)
+    youngs_modulus: Pressure = Field(default_factory=_not_given, gt=0)  # of nodes and bars not needed
+    poisson_ratio: float = Field(default_factory=_not_given, gt=-1, lt=0.5)  # likewise
     expansion: Expansion
 
 
@@ -77,12 +92,58 @@ class Part(Entry):
     adiabatic: tuple[str, ...] = ()  # surfaces without heat exchange
 
 
+class Node(Entry):
+    """Of a lumped machine: a capacity at one temperature. Without a film it exchanges heat through contacts only."""
+
+    capacity: Capacity | None = Field(None, gt=0)  # or a material with a volume or a mass
+    material: str | None = None
+    volume: Volume | None = Field(None, gt=0)
+    mass: Mass | None = Field(None, gt=0)
+    area: Area | None = Field(None, gt=0)  # that films exchange heat through
+    position: Point | None = None  # at axis positions zero; of pads, and where the air is warmer above
+
+
+class Bar(Entry):
+    """Of a lumped machine: a straight one-dimensional conductor, such as a ball screw.
+
+    It conducts along its length and exchanges heat through its mantle; its end faces are adiabatic unless a fixed
+    contact names them, as "NAME.start" and "NAME.end".
+    """
+
+    material: str
+    origin: Point  # of its start, at axis positions zero
+    direction: Vector
+    length: Length = Field(gt=0)
+    cross_section: Area = Field(gt=0)
+    perimeter: Length | None = Field(None, gt=0)  # times the length: the area of films
+    elements: int = Field(12, ge=2, le=10_000)  # of equal length; linear temperatures between their ends
+    fixed_end: Literal["start", "end"] = "start"  # of a screw: the fixed bearing, from which it grows
+
+
+class Encoder(Entry):
+    """What the control of a linear axis reads its position from (paper 004, eq 27).
+
+    rotary: the motor's angle; the screw is the scale. linear: a scale on one side of the guide and a reader on the
+    other; the control keeps the reader at the scale's mark, whatever the screw does.
+    """
+
+    kind: Literal["rotary", "linear"] = "rotary"
+    scale: str | None = None  # linear: "part.surface" whose temperature the scale takes and which holds it
+    reader: str | None = None  # linear: "part.surface" on the other side of the guide that carries the reading head
+    fixed_at: Length = 0.0  # linear: coordinate along the axis of the scale's fixing point, machine coordinates
+    expansion: Expansion = 0.0  # linear: 1/K of the scale's material
+
+
 class Axis(Entry):
     kind: Literal["linear", "rotary"] = "linear"
     direction: Vector
     stroke: tuple[Length, Length] = (0.0, 0.0)  # rotary axes carry no stroke: structure is evaluated at angle zero
     carries: tuple[str, ...]  # parts that move with the axis (their whole bodies do)
     position: str  # signal
+    encoder: Encoder = Encoder()
+    speed: Speed | None = Field(None, gt=0)  # limits of the drive: with them `twin check RUN` judges the log's sampling
+    acceleration: Acceleration | None = Field(None, gt=0)
+    jerk: Jerk | None = Field(None, gt=0)
 
 
 class StiffnessOfPair(Entry):
@@ -93,21 +154,35 @@ class StiffnessOfPair(Entry):
     lateral: Stiffness = Field(0.0, ge=0)
 
 
+class JointLaw(Entry):
+    """The conductance of a fixed joint by a law of kind "joint", from roughness, hardness and bolts (004 eqs 7-10)."""
+
+    law: str
+    parameters: dict[str, float | str] = {}
+
+
 class Contact(Entry):
-    """fixed: two surfaces glued, meshes need not match. moving: pads (carriages, nuts) on rails or screws."""
+    """fixed: two surfaces glued, meshes need not match. moving: pads (carriages, nuts) on rails or screws.
+
+    Of a lumped machine, `surfaces` are nodes or ends of bars, and a pair is (bar, node).
+    """
 
     kind: Literal["fixed", "moving"]
     surfaces: tuple[str, str] | None = None  # fixed: "part.surface" twice
     axis: str | None = None  # moving
     pairs: tuple[tuple[str, str], ...] = ()  # moving: (rail "part.surface", pad "part.surface")
     segments: int = Field(12, ge=2)  # moving: stations along each rail
-    conductance: FilmCoefficient = Field(gt=0)  # of the joint, or per pad area
+    assignment: Literal["interpolated", "segment"] = "interpolated"  # moving: between stations, or to the segment below
+    conductance: FilmCoefficient | None = Field(None, gt=0)  # of the joint, or per pad area
+    area: Area | None = Field(None, gt=0)  # lumped machines: of the joint, or of each pad
+    total: Conductance | None = Field(None, gt=0)  # lumped machines: of the joint or each pad, instead of both
+    joint: JointLaw | None = None  # fixed: instead of `conductance`
     stiffness: StiffnessOfPair = StiffnessOfPair()  # moving; fixed joints are glued
 
 
 class Source(Entry):
     law: str
-    surface: str | None = None  # "part.surface"
+    surface: str | None = None  # "part.surface"; of a lumped machine a node, a bar, or an end of a bar
     contact: str | None = None  # a moving contact: heat goes to its rails (by dwell time) and pads
     rail_share: float = Field(0.5, ge=0, le=1)
     gain: float = Field(1.0, ge=0)
@@ -116,16 +191,27 @@ class Source(Entry):
 
 
 class Film(Entry):
+    """Convection by a law, and radiation, which is on by default."""
+
     law: str
-    surfaces: tuple[str, ...]  # "part.surface", or "part.*" for every surface of the part not used elsewhere
+    # "part.surface", or "part.*" for every surface of the part not used elsewhere; of a lumped machine nodes and bars
+    surfaces: tuple[str, ...]
+    area: Area | None = Field(None, gt=0)  # lumped machines: of a node that exchanges heat through several films
     environment: str
+    gain: float = Field(1.0, gt=0)  # calibration factor of the convection
+    emissivity: float | None = Field(None, ge=0, le=1)  # 0.9 (paint) by default, 0 for channels of a coolant
+    radiant: str | None = None  # environment at the radiant temperature, the film's own by default
     parameters: dict[str, float | str] = {}
     signals: dict[str, str] = {}
 
 
 class Environment(Entry):
+    """Air of a zone, a radiant surrounding, or a coolant at its inlet."""
+
     signal: str | None = None
     temperature: Temperature | None = None  # constant, where no signal is given
+    gradient: TemperatureGradient = 0.0  # warmer by this per metre above `height`
+    height: Length = 0.0  # vertical machine coordinate at which the temperature is measured
 
 
 class SignalEntry(Entry):
@@ -136,7 +222,7 @@ class SignalEntry(Entry):
 
 
 class Sensor(Entry):
-    part: str | None = None
+    part: str | None = None  # or a node or bar
     position: Point | None = None  # at axis positions zero; the nearest point of the part's surface or volume
     environment: str | None = None  # a sensor in the air
 
@@ -149,8 +235,14 @@ class TcpSide(Entry):
 
 
 class Tcp(Entry):
-    tool: TcpSide
-    work: TcpSide
+    """The two sides of the TCP; of a lumped machine what each temperature moves the tool by, as seen from the work."""
+
+    tool: TcpSide = TcpSide(surface="")  # both sides are needed where there are parts
+    work: TcpSide = TcpSide(surface="")
+    # lumped machines: TCP displacement along x, y, z per kelvin of a node, or of a bar's mean
+    expansion: dict[str, tuple[DisplacementPerKelvin, DisplacementPerKelvin, DisplacementPerKelvin]] = {}
+    # lumped machines: bars that position an axis; the screw grows from its fixed end, and its nut holds this side
+    screws: dict[str, Literal["tool", "work"]] = {}
 
 
 class Support(Entry):
@@ -181,9 +273,13 @@ class MachineEntry(Entry):
 
 
 class Machine(Entry):
+    """A machine of parts with meshes, or a lumped machine: nodes and bars, no mesh."""
+
     machine: MachineEntry
-    materials: dict[str, Material]
-    parts: dict[str, Part]
+    materials: dict[str, Material] = {}
+    parts: dict[str, Part] = {}
+    nodes: dict[str, Node] = {}
+    bars: dict[str, Bar] = {}
     axes: dict[str, Axis] = {}
     contacts: dict[str, Contact] = {}
     signals: dict[str, SignalEntry] = {}
@@ -191,8 +287,18 @@ class Machine(Entry):
     sources: dict[str, Source] = {}
     films: dict[str, Film]
     sensors: dict[str, Sensor] = {}
-    tcp: Tcp
-    supports: dict[str, Support]
+    tcp: Tcp = Tcp()
+    supports: dict[str, Support] = {}
     poses: dict[str, int | tuple[Length, ...]] = {}  # per linear axis: number of equidistant positions, or a list
     limits: Limits = Limits()
     folder: Path = Path(".")  # where machine.toml lies; set by the loader
+
+    @property
+    def lumped(self) -> bool:
+        """Whether it consists of nodes and bars."""
+        return bool(self.nodes or self.bars)
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """Names of the parts, or of the nodes and bars: what bodies are made of."""
+        return (*self.parts, *self.nodes, *self.bars)

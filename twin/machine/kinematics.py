@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from twin.errors import DescriptionError
-from twin.machine.bodies import Body, bodies_of, body_of, split_surface
+from twin.machine.bodies import Body, bodies_of, body_of, owner_of
 from twin.machine.description import Machine
 
 
@@ -32,7 +32,7 @@ def direction(machine: Machine, axis: str) -> np.ndarray:
 def moving_contacts(machine: Machine, bodies: tuple[Body, ...]) -> tuple[tuple[str, str, str], ...]:
     """Every (axis, rail body, pad body) that a moving contact joins."""
     return tuple(
-        (contact.axis, body_of(bodies, split_surface(rail)[0]).name, body_of(bodies, split_surface(pad)[0]).name)
+        (contact.axis, body_of(bodies, owner_of(rail)).name, body_of(bodies, owner_of(pad)).name)
         for contact in machine.contacts.values()
         if contact.kind == "moving" and contact.axis is not None
         for rail, pad in contact.pairs
@@ -53,7 +53,7 @@ def moved_bodies(machine: Machine, axis: str) -> frozenset[str]:
         frontier = reached - moved
         moved |= frontier
     for name, support in machine.supports.items():
-        if body_of(bodies, split_surface(support.surface)[0]).name in moved:
+        if body_of(bodies, owner_of(support.surface)).name in moved:
             raise DescriptionError(
                 f"axis '{axis}' moves the body that stands on supports.{name}",
                 f"axes.{axis}.carries",
@@ -70,7 +70,7 @@ def rail_moves(machine: Machine, axis: str, rail: str, pad: str) -> bool:
     """
     bodies = bodies_of(machine)
     moved = moved_bodies(machine, axis)
-    of_rail, of_pad = (body_of(bodies, split_surface(s)[0]).name in moved for s in (rail, pad))
+    of_rail, of_pad = (body_of(bodies, owner_of(s)).name in moved for s in (rail, pad))
     if of_rail == of_pad:
         raise DescriptionError(
             f"'{rail}' and '{pad}' {'both move' if of_rail else 'both stand still'} when axis '{axis}' moves",

@@ -15,7 +15,7 @@ from twin.atomic import atomic_path
 from twin.errors import DescriptionError, Problem
 from twin.machine.description import Machine, MachineEntry
 from twin.machine.references import reference_problems
-from twin.machine.schema_errors import Keys, known_keys, schema_problem
+from twin.machine.schema_errors import Keys, known_keys, missing_section, schema_problem
 from twin.machine.toml_lines import key_lines, line_of
 from twin.nearest import nearest
 
@@ -99,6 +99,10 @@ def _schema_problems(data: dict[str, Any]) -> tuple[list[tuple[Keys, Problem]], 
         for detail in error.errors(include_url=False, include_context=False):
             keys, problem = schema_problem(detail, data)
             found.setdefault(keys, problem)  # every branch of a union complains; the first will do
+    if not any(isinstance(data.get(key), dict) and data[key] for key in ("nodes", "bars")):
+        found |= {(key,): missing_section(key) for key in _OF_PARTS if key not in data or data[key] == {}}
+        place = {section: i for i, section in enumerate(Machine.model_fields)}
+        found = dict(sorted(found.items(), key=lambda item: place.get(item[0][0] if item[0] else "", -1)))
     if "folder" in data:
         found["folder",] = Problem("unknown key 'folder'", "folder", "remove it")
     sound = deepcopy(data)
@@ -110,6 +114,9 @@ def _schema_problems(data: dict[str, Any]) -> tuple[list[tuple[Keys, Problem]], 
             _mark_broken(sound, keys)
     mistyped = {(*keys[:-1], _meant(keys, data)) for keys in unknown}
     return [(keys, p) for keys, p in found.items() if keys not in mistyped or keys in unknown], sound
+
+
+_OF_PARTS = ("materials", "parts", "tcp", "supports")  # sections that only lumped machines can do without
 
 
 def _meant(keys: Keys, data: dict[str, Any]) -> str | None:
@@ -149,7 +156,8 @@ def _partial(data: dict[str, Any], sound: dict[str, Any], folder: Path) -> Machi
             continue
         kept = sound.get(section)
         if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
-            values[section] = field.annotation.model_validate(kept) if kept is not None else None
+            default = None if field.is_required() or section in data else field.get_default()
+            values[section] = field.annotation.model_validate(kept) if kept is not None else default
             continue
         given = data.get(section)
         if section in data and not isinstance(kept, dict):

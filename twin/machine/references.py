@@ -9,26 +9,32 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 
 from twin.errors import Problem, TwinError
 from twin.machine import description, wiring
+from twin.machine.bodies import bodies_of
 from twin.machine.description import BOX_SURFACES, Machine
+from twin.machine.encoders import encoder_problems, scale_problems
 from twin.machine.kinematics import linear_axes, rail_moves
+from twin.machine.lumped_references import bodies_without_film, joint_law_problems, lumped_problems, misplaced
 from twin.nearest import did_you_mean, nearest
 from twin.units import parse_unit
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _NAMED = (
-    "materials", "parts", "axes", "contacts", "signals", "environment", "sources", "films", "sensors", "supports",
+    "materials", "parts", "nodes", "bars", "axes", "contacts", "signals", "environment", "sources", "films", "sensors",
+    "supports",
 )  # fmt: skip
 
 
 def reference_problems(machine: Machine) -> list[Problem]:
     """All problems that need more than one entry, or more than its type, to be seen."""
     problems = [*_names(machine)]
-    for check in (_parts, _axes, _contacts, _laws, _films, _sensors, _tcp, _supports, _poses):
+    of_meshes = (_parts, _axes, _contacts, _laws, _films, _sensors, _tcp, _supports, misplaced)
+    for check in (*((lumped_problems, _axes, _laws, _sensors) if machine.lumped else of_meshes), _poses):
         problems += check(machine)
     whole = not any(entry is None for section in _NAMED for entry in getattr(machine, section).values())
     return problems or (list(_motion(machine)) if whole else [])
@@ -54,7 +60,9 @@ def _names(machine: Machine) -> Iterator[Problem]:
 
 def _parts(machine: Machine) -> Iterator[Problem]:
     if not machine.parts:
-        yield Problem("no parts", "parts", "add at least one [parts.NAME] with a material and a mesh or a box")
+        remedy = "add at least one [parts.NAME] with a material and a mesh or a box, or [nodes.NAME] with a capacity"
+        yield Problem("no parts", "parts", remedy)
+    missing: set[tuple[str, str]] = set()
     for name, part in machine.parts.items():
         if part is None:
             continue
@@ -62,6 +70,12 @@ def _parts(machine: Machine) -> Iterator[Problem]:
         if part.material not in machine.materials:
             remedy = did_you_mean(part.material, machine.materials, "materials")
             yield Problem(f"unknown material '{part.material}'", f"{where}.material", remedy)
+        elif (material := machine.materials[part.material]) is not None:
+            for key in ("youngs_modulus", "poisson_ratio"):
+                if key not in material.model_fields_set and (part.material, key) not in missing:
+                    missing.add((part.material, key))
+                    remedy = 'parts bend: write youngs_modulus = "120 GPa" and poisson_ratio = 0.26, for example'
+                    yield Problem(f"missing key '{key}'", f"materials.{part.material}.{key}", remedy)
         if (part.mesh is None) == (part.box is None):
             yield Problem("give either a mesh or a box", where, 'set mesh = "file.msh" or box = {...}, not both')
         elif part.mesh is not None and not (machine.folder / part.mesh).is_file():
@@ -105,14 +119,20 @@ def _axes(machine: Machine) -> Iterator[Problem]:
         if not entry.carries:
             yield Problem("carries no part", f"{where}.carries", "list the parts that move with the axis")
         for part in entry.carries:
-            if part not in machine.parts:
-                remedy = did_you_mean(part, machine.parts, "parts")
+            if part not in machine.members:
+                remedy = did_you_mean(part, machine.members, "nodes and bars" if machine.lumped else "parts")
                 yield Problem(f"unknown part '{part}'", f"{where}.carries", remedy)
         if entry.kind == "rotary" and not math.hypot(*entry.direction) > 0:
             yield Problem("the direction has no length", f"{where}.direction", "give a vector like [1, 0, 0]")
         if entry.kind == "rotary" and entry.position not in machine.signals:
             remedy = did_you_mean(entry.position, machine.signals, "signals")
             yield Problem(f"unknown signal '{entry.position}'", f"{where}.position", remedy)
+        if machine.lumped:
+            continue
+        yield from encoder_problems(name, entry)
+        for key in ("scale", "reader"):
+            if (surface := getattr(entry.encoder, key)) is not None:
+                yield from _surface(surface, f"{where}.encoder.{key}", machine)
     linear = {n: a for n, a in machine.axes.items() if a is not None and a.kind == "linear"}
     yield from _each(linear, lambda name: wiring.axis(name, machine))
 
@@ -167,7 +187,7 @@ def _laws(machine: Machine) -> Iterator[Problem]:
     yield from _each(machine.sources, lambda name: wiring.source(name, machine.sources[name], machine))
     yield from _each(machine.films, lambda name: wiring.film_law(name, machine.films[name], machine))
     for name, entry in machine.sources.items():
-        if entry is not None and entry.surface is not None:
+        if entry is not None and entry.surface is not None and not machine.lumped:
             yield from _surface(entry.surface, f"sources.{name}.surface", machine)
 
 
@@ -195,6 +215,8 @@ def _sensors(machine: Machine) -> Iterator[Problem]:
                 'part = "bed" and position = [...], or environment = "shop"',
             )
         elif sensor.part is not None:
+            if machine.lumped:
+                continue
             if sensor.part not in machine.parts:
                 yield Problem(
                     f"unknown part '{sensor.part}'", f"{where}.part", did_you_mean(sensor.part, machine.parts, "parts")
@@ -211,8 +233,12 @@ def _sensors(machine: Machine) -> Iterator[Problem]:
 
 
 def _tcp(machine: Machine) -> Iterator[Problem]:
-    if machine.tcp is None:
-        return
+    if machine.tcp is None or not machine.tcp.model_fields_set:
+        return  # reported on reading
+    for side in ("tool", "work"):
+        if side not in machine.tcp.model_fields_set:
+            yield Problem(f"missing key '{side}'", f"tcp.{side}", 'write surface = "table.top"')
+            return
     yield from _surface(machine.tcp.tool.surface, "tcp.tool.surface", machine)
     yield from _surface(machine.tcp.work.surface, "tcp.work.surface", machine)
     if machine.tcp.tool.point is None:
@@ -268,6 +294,12 @@ def _motion(machine: Machine) -> Iterator[Problem]:
                 rail_moves(machine, str(contact.axis), rail, pad)
             except TwinError as e:
                 yield from e.problems
+    if machine.lumped:
+        yield from joint_law_problems(machine)
+        yield from bodies_without_film(machine, [body.parts for body in bodies_of(machine)])
+        return
+    with suppress(TwinError):  # axes that carry the wrong side are reported above
+        yield from scale_problems(machine)
     used = {c.axis for c in machine.contacts.values()}
     for name in linear_axes(machine):
         if name not in used:

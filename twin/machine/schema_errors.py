@@ -35,6 +35,11 @@ def schema_problem(error: ErrorDetails, data: dict[str, Any]) -> tuple[Keys, Pro
     return keys, Problem(f"{shown}{message}", where, _example(keys))
 
 
+def missing_section(name: str) -> Problem:
+    """What to say about a section that a machine with meshes needs and a lumped one does not."""
+    return Problem(f"missing key '{name}'", name, _example((name,)))
+
+
 def known_keys(path: Keys) -> list[str]:
     """Keys that the table at `path` may have; none where any name may stand."""
     model = _annotation(path)
@@ -100,10 +105,14 @@ _EXAMPLES = {
     "stiffness": '["50 N/um", "50 N/um", "200 N/um"]', "name": '"my machine"', "point": "[0, 0, 0.3]",
     "origin": "[0, 0, 0]", "size": '["800 mm", "300 mm", "100 mm"]', "divisions": "[8, 3, 1]",
     "pairs": '[["bed.rail_1", "column.pad_1"]]', "temperature": '"20 degC"', "reference_temperature": '"20 degC"',
-    "segments": "12", "tool": '{ surface = "spindle.nose", point = [0, 0, 0.3] }', "work": '{ surface = "table.top" }',
+    "segments": "12", "elements": "20", "capacity": '"1200 J/K"', "total": '"12 W/K"', "area": '"0.1 m^2"',
+    "volume": '"0.4 l"', "mass": '"3 kg"', "length": '"800 mm"', "perimeter": '"100 mm"', "cross_section": '"8 cm^2"',
+    "fixed_end": '"start"',
+    "tool": '{ surface = "spindle.nose", point = [0, 0, 0.3] }', "work": '{ surface = "table.top" }',
 }  # fmt: skip
 _SECTIONS = {
-    "machine": '[machine] with name = "..."', "materials": "[materials.NAME]", "parts": "[parts.NAME]",
+    "machine": '[machine] with name = "..."', "materials": "[materials.NAME]",
+    "parts": "[parts.NAME], or [nodes.NAME] for a machine without meshes",
     "environment": '[environment.shop] with temperature = "20 degC"', "films": "[films.NAME]",
     "tcp": "[tcp.tool] and [tcp.work]", "supports": "[supports.NAME]",
 }  # fmt: skip

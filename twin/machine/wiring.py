@@ -11,8 +11,11 @@ from twin.machine.description import Machine
 from twin.machine.kinematics import direction
 from twin.nearest import did_you_mean, nearest
 from twin.physics.laws import LAWS, Argument
-from twin.rom.load_model import AxisWiring, LawUse, Signal, Source
+from twin.rom.load_model import AxisWiring, EnvironmentWiring, LawUse, Signal, Source
 from twin.units import parse_unit, to_si
+
+
+PAINT = 0.9  # emissivity of painted and of rough oxidised surfaces (VDI-Waermeatlas, K3: 0.85 to 0.95)
 
 
 def signal(name: str, entry: description.SignalEntry) -> Signal:
@@ -41,17 +44,18 @@ def signal(name: str, entry: description.SignalEntry) -> Signal:
     return Signal(name, entry.column or name, unit.si, entry.kind, low, high)
 
 
-def environment(name: str, entry: description.Environment, machine: Machine) -> tuple[str, str, float]:
-    """(name, signal or "", constant degC) of an environment. Raises DescriptionError unless exactly one is given."""
+def environment(name: str, entry: description.Environment, machine: Machine) -> EnvironmentWiring:
+    """An environment. Raises DescriptionError unless either a signal or a temperature is given."""
     where = f"environment.{name}"
     if (entry.signal is None) == (entry.temperature is None):
         raise DescriptionError(
             "give either a signal or a temperature", where, 'signal = "shop_air" or temperature = "20 degC"'
         )
     if entry.signal is None:
-        return name, "", float(entry.temperature or 0.0)
+        return EnvironmentWiring(name, "", float(entry.temperature or 0.0), entry.gradient, entry.height)
     expect_signal(entry.signal, "degC", f"{where}.signal", machine)
-    return name, entry.signal, machine.machine.reference_temperature
+    reference = machine.machine.reference_temperature
+    return EnvironmentWiring(name, entry.signal, reference, entry.gradient, entry.height)
 
 
 def axis(name: str, machine: Machine) -> AxisWiring:
@@ -80,16 +84,24 @@ def source(name: str, entry: description.Source, machine: Machine) -> Source:
         remedy = did_you_mean(entry.contact, moving, "moving contacts")
         raise DescriptionError(f"unknown moving contact '{entry.contact}'", f"{where}.contact", remedy)
     use = law_use(entry.law, "loss", entry.parameters, entry.signals, where, machine)
+    free = sorted(set(LAWS[use.law].states) - set(use.signals))
+    if free and entry.contact:
+        raise DescriptionError(
+            f"law '{use.law}' needs {', '.join(free)}, which a moving contact has no single value of",
+            f"{where}.signals",
+            "wire a logged temperature, choose a law without it, or put the source on a surface",
+        )
     return Source(name, use, entry.gain, entry.contact or "", entry.rail_share)
 
 
 def film_law(name: str, entry: description.Film, machine: Machine) -> LawUse:
-    """The law of a film. Raises DescriptionError with all problems of its environment and its law."""
+    """The law of a film. Raises DescriptionError with all problems of its environments and its law."""
     where = f"films.{name}"
     problems = []
-    if entry.environment not in machine.environment:
-        remedy = did_you_mean(entry.environment, machine.environment, "environments")
-        problems.append(Problem(f"unknown environment '{entry.environment}'", f"{where}.environment", remedy))
+    for key, named in (("environment", entry.environment), ("radiant", entry.radiant)):
+        if named is not None and named not in machine.environment:
+            remedy = did_you_mean(named, machine.environment, "environments")
+            problems.append(Problem(f"unknown environment '{named}'", f"{where}.{key}", remedy))
     try:
         use = law_use(entry.law, "film", entry.parameters, entry.signals, where, machine)
     except TwinError as e:
@@ -97,6 +109,38 @@ def film_law(name: str, entry: description.Film, machine: Machine) -> LawUse:
     if problems:
         raise DescriptionError.collect(problems)
     return use
+
+
+def emissivity(entry: description.Film) -> float:
+    """Of a film's surfaces: as described, else of paint where the law's surfaces see their surroundings."""
+    if entry.emissivity is not None:
+        return entry.emissivity
+    return PAINT if LAWS[entry.law].radiates else 0.0
+
+
+def joint_conductance(name: str, machine: Machine) -> float:
+    """W/(m^2 K) of a contact, given or by a law of kind "joint"; W/K where its `total` is given (lumped machines).
+
+    Raises DescriptionError unless exactly one is there.
+    """
+    entry, where = machine.contacts[name], f"contacts.{name}"
+    if entry.total is not None:
+        return entry.total
+    if (entry.conductance is None) == (entry.joint is None):
+        raise DescriptionError(
+            "give either a conductance or a joint law", where, 'conductance = "2000 W/(m^2*K)", or joint = { law = ... }'
+        )
+    if entry.joint is None:
+        return float(entry.conductance or 0.0)
+    if entry.kind != "fixed":
+        raise DescriptionError("a joint law is for fixed contacts", f"{where}.joint", "give a conductance")
+    use = law_use(entry.joint.law, "joint", entry.joint.parameters, {}, f"{where}.joint", machine)
+    law = LAWS[use.law]
+    values = {n: use.parameters.get(n, a.default) for n, a in law.parameters.items()}
+    value = float(law.function(**values))
+    if not (value > 0 and math.isfinite(value)):
+        raise DescriptionError(f"law '{use.law}' gives {value:g} W/(m^2 K)", f"{where}.joint", "check its parameters")
+    return value
 
 
 def law_use(
@@ -115,7 +159,8 @@ def law_use(
             f"'{law_name}' is no {kind} law", f"{where}.law", did_you_mean(law_name, known, f"{kind} laws")
         )
     problems = _names(law_name, parameters, law.parameters, f"{where}.parameters", "parameters")
-    problems += _names(law_name, signals, law.signals, f"{where}.signals", "signals")
+    # a state of the model may be wired to a signal that measures it
+    problems += _names(law_name, signals, law.signals, f"{where}.signals", "signals", law.states)
     values: dict[str, float] = {}
     for name, argument in law.parameters.items():
         given = parameters.get(name, argument.default)
@@ -130,7 +175,8 @@ def law_use(
         if not argument.low <= values[name] <= argument.high:
             bounds = f"{argument.low:g} .. {argument.high:g} {argument.unit}"
             problems.append(Problem(f"{values[name]:g} is outside {bounds}", at, f"{argument.meaning}: check the unit"))
-    for name, argument in law.signals.items():
+    readable = {**law.signals, **law.states}
+    for name, argument in readable.items():
         if name in signals:
             try:
                 expect_signal(signals[name], argument.unit, f"{where}.signals.{name}", machine)
@@ -138,19 +184,28 @@ def law_use(
                 problems += e.problems
     if problems:
         raise DescriptionError.collect(problems)
-    return LawUse(law_name, values, {name: signals[name] for name in law.signals})
+    return LawUse(law_name, values, {name: signals[name] for name in readable if name in signals})
 
 
-def _names(law: str, given: Iterable[str], arguments: Mapping[str, Argument], where: str, what: str) -> list[Problem]:
+def _names(
+    law: str,
+    given: Iterable[str],
+    arguments: Mapping[str, Argument],
+    where: str,
+    what: str,
+    optional: Mapping[str, Argument] = {},  # noqa: B006  never written to
+) -> list[Problem]:
     """Unknown names, and names without a default that are not given."""
-    given = list(given)
+    given, known = list(given), {**arguments, **optional}
     problems = [
-        Problem(f"law '{law}' has no '{name}'", f"{where}.{name}", did_you_mean(name, arguments, what))
+        Problem(f"law '{law}' has no '{name}'", f"{where}.{name}", did_you_mean(name, known, what))
         for name in given
-        if name not in arguments
+        if name not in known
     ]
-    mistyped = {nearest(name, arguments) for name in given if name not in arguments}
+    mistyped = {nearest(name, known) for name in given if name not in known}
     for name, argument in arguments.items():
+        if name == "area" and what == "parameters":
+            continue  # the build knows the area of a film's surfaces
         if name not in given and name not in mistyped and argument.default is None:
             problems.append(Problem(f"law '{law}' needs '{name}'", where, f"{argument.meaning}, in {argument.unit}"))
     return problems

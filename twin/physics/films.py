@@ -1,4 +1,4 @@
-"""Film coefficients of convection [W/(m^2 K)]."""
+"""Film coefficients as literature values or assumptions [W/(m^2 K)]."""
 
 from __future__ import annotations
 
@@ -19,3 +19,11 @@ def forced_film(speed, natural, forced, exponent):
     v = jnp.abs(speed)
     power = jnp.where(v > 0.0, v, 1.0) ** exponent
     return natural + forced * jnp.where(v > 0.0, power, 0.0)
+
+
+def enclosed_gap(conductance):
+    """Heat through an enclosed gap or a cover, convection and radiation together, as a conductance per area.
+
+    An assumed value: the papers have no correlation for covers and gaps. A candidate for calibration.
+    """
+    return jnp.asarray(conductance)

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from twin.machine.bodies import bodies_of, body_of, split_surface
 from twin.machine.description import Machine
-from twin.machine.kinematics import displacement
+from twin.machine.kinematics import direction, displacement, rail_moves
 from twin.pictures.surface import SurfaceMesh
 from twin.rom.artefact import Artefact, SurfaceField
 
@@ -43,7 +43,20 @@ def parts_of(triangles: np.ndarray, n_points: int) -> np.ndarray:
 
 def poses_in_space(machine: Machine, axes: Sequence[str], poses: np.ndarray) -> np.ndarray:
     """The tool's place as seen from the work (n_poses, 3) [m] at poses (n_poses, n_axes) [m]; zero at position zero."""
+    if machine.lumped:
+        return poses @ np.array([_lumped_axis(machine, a) for a in axes]).reshape(len(axes), 3)
     bodies = bodies_of(machine)
     tool, work = (body_of(bodies, split_surface(side.surface)[0]).name for side in (machine.tcp.tool, machine.tcp.work))
     per_metre = np.array([displacement(machine, tool, {a: 1.0}) - displacement(machine, work, {a: 1.0}) for a in axes])
     return poses @ per_metre.reshape(len(axes), 3)
+
+
+def _lumped_axis(machine: Machine, axis: str) -> np.ndarray:
+    """How the tool moves (3,) with an axis, as seen from the work: screws tell which side moves, else the tool does."""
+    along = direction(machine, axis)
+    for contact in machine.contacts.values():
+        for rail, pad in contact.pairs if contact.axis == axis else ():
+            if (side := machine.tcp.screws.get(rail)) is not None:
+                nut_moves = not rail_moves(machine, axis, rail, pad)
+                return along if nut_moves == (side == "tool") else -along
+    return along

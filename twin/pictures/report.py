@@ -27,19 +27,21 @@ _SHARES = (1 / 12, 1 / 3, 1 / 2, 1.0)  # of a run: the four times of the surface
 def write_report(artefact: Artefact, folder: Path, progress: Progress = silent) -> list[Path]:
     """Draw the result in `folder` into it: PNG files and index.html; returns their paths, the page last.
 
-    The surface is left out where the artefact carries no field basis, the workspace where it has a single pose.
+    The surface is left out where the artefact carries no field basis (lumped machines), the workspace where it has a
+    single pose, and all of the TCP where no temperature moves it; the page says so.
     Raises TwinError where the folder holds no result of this artefact, or cannot be written.
     """
     result = read_result(folder, artefact)
     machine = described(artefact)
     drawings: dict[str, tuple[str, Callable[[], Figure]]] = {
         "temperatures": ("Temperatures at the sensors", lambda: _temperatures(artefact, result)),
-        "tcp": (
+    }
+    if artefact.model.moves:
+        drawings["tcp"] = (
             "TCP displacement over time",
             lambda: tcp_figure(result.hours, result.tcp_actual, result.tcp, result.middle, result.outside),
-        ),
-    }
-    if len(result.poses) > 1:
+        )
+    if artefact.model.moves and len(result.poses) > 1:
         drawings["workspace"] = ("The distorted workspace", lambda: _workspace(machine, artefact, result))
     if artefact.fields:
         drawings["surface"] = ("Surface temperature", lambda: surface_of(artefact, result, machine))
@@ -109,9 +111,13 @@ def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
         f"{len(result.hours) - 1} steps over {result.hours[-1]:.3g} h",
         f"{artefact.model.n} states, {len(result.poses)} poses, {len(result.sensors)} sensors",
         f"largest TCP displacement {1e6 * result.tcp[worst]:+.1f} µm in {'xyz'[worst[2]]} "
-        f"after {result.hours[worst[0]]:.2f} h",
+        f"after {result.hours[worst[0]]:.2f} h"
+        if artefact.model.moves
+        else "no temperature moves the tool: the description has no [tcp.expansion] and no [tcp.screws]",
         f"{int(result.outside.sum())} steps outside the certified box",
     ]
+    if not artefact.fields:
+        facts.append("lumped machine: no surface to draw")
     items = "\n".join(f"<li>{html.escape(fact)}</li>" for fact in facts)
     pictures = "\n".join(
         f'<figure><img src="{name}" alt="{html.escape(caption)}">'

@@ -1,4 +1,4 @@
-"""The artefact: one HDF5 file with everything the runtime needs (schema version 1, docs/artefact.md)."""
+"""The artefact: one HDF5 file with everything the runtime needs (schema version 2, docs/artefact.md)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from twin.rom.load_model import LoadModel
 from twin.rom.model import AffineBody, MachineModel
 
 FORMAT = "twin artefact"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 # Dataset of a body -> (unit, dimensions). `equation` counts rows, `state` columns: they differ for oblique projections.
 _MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -27,7 +27,9 @@ _MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
     "A0": ("W/K", ("equation", "state")),
     "A": ("m^2", ("theta", "equation", "state")),
     "M": ("m^2", ("equation", "theta")),
+    "H": ("m^3", ("equation", "theta")),
     "B": ("1", ("equation", "sources")),
+    "B_out": ("1", ("state", "sources")),
     "P": ("1", ("equation", "ports")),
     "P_out": ("1", ("state", "ports")),
     "C": ("1", ("sensors", "state")),
@@ -35,6 +37,7 @@ _MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
     "one": ("K", ("state",)),
     "energy": ("J/K", ("state",)),
 }
+_OPTIONAL = ("H", "B_out", "P_out")
 _INDICES = {"theta": "theta", "sources": "source", "ports": "port", "sensors": "sensor"}  # into root coordinates
 
 
@@ -100,7 +103,7 @@ def write_artefact(
 def _write_coordinates(f: h5py.File, model: MachineModel) -> None:
     load = model.load_model
     scale(f, "body", [b.name for b in model.bodies], "", "bodies: parts joined by fixed contacts")
-    scale(f, "theta", load.theta_names, "", "coefficients of affine terms [W/(m^2*K)]")
+    scale(f, "theta", load.theta_names, "", "coefficients of affine terms [W/(m^2*K)], totals [W/K]")
     scale(f, "source", [s.name for s in load.sources], "", "heat sources [W]")
     scale(f, "port", load.ports, "", "segments of rails, and pads")
     scale(f, "sensor", model.sensors, "", "structural temperature sensors [degC]")
@@ -264,7 +267,7 @@ def _read_body(f: h5py.File, name: str, n_poses: int) -> AffineBody:
         return np.asarray(_dataset(f, f"bodies/{name}/{part}")[...])
 
     indices = {part: tuple(int(i) for i in get(part)) for part in _INDICES}
-    values = {part: get(part) for part in _MATRICES if part != "P_out" or f"bodies/{name}/P_out" in f}
+    values = {part: get(part) for part in _MATRICES if part not in _OPTIONAL or f"bodies/{name}/{part}" in f}
     n = len(values["one"])
     sizes = {"equation": n, "state": n, "pose": n_poses, "component": 3} | {k: len(v) for k, v in indices.items()}
     for part, value in values.items():
@@ -287,4 +290,6 @@ def _read_body(f: h5py.File, name: str, n_poses: int) -> AffineBody:
         one=values["one"],
         energy=values["energy"],
         P_out=values.get("P_out"),
+        B_out=values.get("B_out"),
+        H=values.get("H"),
     )

@@ -27,6 +27,11 @@ def station_weights(stations: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np
     return i, np.clip(weight, 0.0, 1.0)
 
 
+def segment_borders(stations: np.ndarray) -> np.ndarray:
+    """Borders (n - 1,) [m] between the segments around stations (n,)."""
+    return (stations[:-1] + stations[1:]) / 2
+
+
 @dataclass(frozen=True)
 class Dwell:
     """Dwell-time means of the weights w of one pad on the n segments of its rail, per step (leading axis)."""
@@ -34,6 +39,19 @@ class Dwell:
     mean: np.ndarray  # (n_steps, n) mean of w_i; each row sums to 1
     square: np.ndarray  # (n_steps, n) mean of w_i^2
     neighbour: np.ndarray  # (n_steps, n - 1) mean of w_i w_{i+1}
+
+
+def dwell_by_segment(
+    stations: np.ndarray, s: np.ndarray, step: np.ndarray, time_weight: np.ndarray, n_steps: int
+) -> Dwell:
+    """The same with all of a pad's heat and conductance on the segment below it (local assignment, paper 001, 1.05).
+
+    Arguments as in `dwell`; the pad's path must be cut at the borders of segments (`segment_borders`).
+    """
+    n = len(stations)
+    cell = step * n + np.searchsorted(segment_borders(stations), s)
+    share = np.bincount(cell, weights=time_weight, minlength=n_steps * n).reshape(n_steps, n)
+    return Dwell(mean=share, square=share, neighbour=np.zeros((n_steps, n - 1)))
 
 
 def dwell(stations: np.ndarray, s: np.ndarray, step: np.ndarray, time_weight: np.ndarray, n_steps: int) -> Dwell:

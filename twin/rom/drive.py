@@ -14,10 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.errors import LogError
-from twin.rom.contact import dwell
-from twin.rom.law_values import law_values
-from twin.rom.load_model import LoadModel, Pair
+from twin.physics.laws import LAWS
+from twin.rom.contact import dwell, dwell_by_segment, segment_borders
+from twin.rom.following import Following
+from twin.rom.law_values import law_values, laws_hold, states_of
+from twin.rom.load_model import LawUse, LoadModel, Pair
 from twin.rom.sampling import Intervals, cut, path_points
+from twin.rom.tabulate import following_films, following_losses
 
 
 @dataclass(frozen=True)
@@ -25,9 +28,11 @@ class Drive:
     """Per step of length dt (n steps); everything the same for the full model, the reduced model and calibration."""
 
     time: np.ndarray  # (n + 1,) s, step edges
-    power: np.ndarray  # (n, n_sources) W, gains included; sources of surfaces and of contacts alike
+    power: np.ndarray  # (n, n_sources) W, gains included, surfaces and contacts alike; 0 where `losses` tells
     port_heat: np.ndarray  # (n, n_ports) W that contact sources bring into each port, following the moving pads
-    theta: np.ndarray  # (n, n_theta) W/(m^2 K): films, then joints
+    theta: np.ndarray  # (n, n_theta) W/(m^2 K): convection of films, gains included, 0 where `films` tells; then joints
+    films: Following  # films whose law follows the surface temperature
+    losses: Following  # sources whose law follows the temperature of their surface
     environment: np.ndarray  # (n, n_environments) degC
     conductance: np.ndarray  # (n, n_pairs) W/K
     weight: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w, zero-padded to the longest rail
@@ -36,6 +41,7 @@ class Drive:
     position: np.ndarray  # (n, n_axes) m at the end of each step
     flags: np.ndarray  # (n, n_flags) bool: flag_names[k] holds at some time in this step
     flag_names: tuple[str, ...]  # e.g. "signals.x_current above 20 A", "gap in loads"
+    radiation: bool = True  # False where `theta` is the whole coefficient of films (scenarios at the box's bounds)
 
     @property
     def n_steps(self) -> int:
@@ -65,21 +71,26 @@ def evaluate(
     edges = dt * np.arange(n_steps + 1)
     intervals = cut(t, edges)
 
-    gains = np.array([source.gain for source in load_model.sources])
-    powers = gains * law_values([s.use for s in load_model.sources], values, len(t))
-    films = law_values([f.use for f in load_model.films], values, len(t))
+    powers, powers_hold = _read_from_log([(s.use, s.gain) for s in load_model.sources], values, len(t))
+    films, films_hold = _read_from_log([(f.use, f.gain) for f in load_model.films], values, len(t))
     joints = np.array([j.conductance for j in load_model.joints])
-    environments = _columns([values[s] if s else np.full(len(t), c) for _, s, c in load_model.environments], len(t))
+    environments = _columns(
+        [values[e.signal] if e.signal else np.full(len(t), e.temperature) for e in load_model.environments], len(t)
+    )
 
     path = {a.name: np.interp(np.append(intervals.start, intervals.end[-1]), t, values[a.position])
             for a in load_model.axes}  # fmt: skip
-    flags = _flags(load_model, t, values, missing, films, path, intervals, dt)
+    flags = _flags(load_model, t, values, missing, path, intervals, dt)
+    flags |= _outside("sources", [(s.name, s.use) for s in load_model.sources], powers_hold, intervals)
+    flags |= _outside("films", [(f.name, f.use) for f in load_model.films], films_hold, intervals)
     weight, square, neighbour, port_heat = _contacts(load_model, path, powers, intervals)
     return Drive(
         time=time[0] + edges,
         power=intervals.mean(powers),
         port_heat=port_heat,
         theta=np.hstack([intervals.mean(films), np.tile(joints, (n_steps, 1))]),
+        films=following_films(load_model, values, environments, intervals),
+        losses=following_losses(load_model, values, intervals),
         environment=intervals.mean(environments),
         conductance=np.tile([p.conductance * p.area for p in load_model.pairs], (n_steps, 1)),
         weight=weight,
@@ -89,6 +100,35 @@ def evaluate(
         flags=np.stack(list(flags.values()), axis=1),
         flag_names=tuple(flags),
     )
+
+
+def outside_flag(kind: str, name: str, text: str) -> str:
+    """The name of the flag of a law outside its validity, of "sources" or "films"."""
+    return f"{kind}.{name}: law outside {text}"
+
+
+def _outside(
+    kind: str, uses: list[tuple[str, LawUse]], hold: np.ndarray, intervals: Intervals
+) -> dict[str, np.ndarray]:
+    """Flags of laws that read the log alone; those that follow a state are judged after the run."""
+    return {
+        outside_flag(kind, name, validity.text): intervals.any(~hold[intervals.sample, k])
+        for k, (name, use) in enumerate(uses)
+        if (validity := LAWS[use.law].validity) and not states_of(use)
+    }
+
+
+def _read_from_log(
+    uses: list[tuple[LawUse, float]], values: dict[str, np.ndarray], n: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Laws with gains that read the log alone (n, len(uses)), zero where a law follows a state; and where they hold."""
+    fixed = [k for k, (use, _) in enumerate(uses) if not states_of(use)]
+    result, hold = np.zeros((n, len(uses))), np.ones((n, len(uses)), dtype=bool)
+    gains = np.array([uses[k][1] for k in fixed])
+    result[:, fixed] = gains * law_values([uses[k][0] for k in fixed], values, n)
+    published = [k for k in fixed if LAWS[uses[k][0].law].validity]
+    hold[:, published] = laws_hold([uses[k][0] for k in published], values, n)
+    return result, hold
 
 
 def _columns(columns: list[np.ndarray], n: int) -> np.ndarray:
@@ -105,7 +145,7 @@ def _clean(
         raise LogError("times do not increase strictly", "loads", "run `twin check` on the run folder")
     uses = [source.use for source in load_model.sources] + [film.use for film in load_model.films]
     needed = {name for use in uses for name in use.signals.values()}
-    needed |= {a.position for a in load_model.axes} | {s for _, s, _ in load_model.environments if s}
+    needed |= {a.position for a in load_model.axes} | {e.signal for e in load_model.environments if e.signal}
     absent = sorted(name for name in needed if name not in signals)
     if absent:
         raise LogError(f"missing signals: {', '.join(absent)}", "loads", "log them, or run `twin check` to see columns")
@@ -146,10 +186,13 @@ def _contacts(
         rest = intervals.constant(coordinate[:-1], coordinate[1:])
         use = ~rest[intervals.step]
         use[intervals.first] = True  # a pad at rest needs one interval, whose share is the whole step
-        points = path_points(stations, coordinate[:-1][use], coordinate[1:][use])
+        by_segment = pair.assignment == "segment"
+        assign = dwell_by_segment if by_segment else dwell
+        cuts = segment_borders(stations) if by_segment else stations
+        points = path_points(cuts, coordinate[:-1][use], coordinate[1:][use])
         step, sample = intervals.step[use][points.interval], intervals.sample[use][points.interval]
         share = points.share * np.where(rest[step], 1.0, intervals.share[use][points.interval])
-        means = dwell(stations, points.s, step, share, n_steps)
+        means = assign(stations, points.s, step, share, n_steps)
         weight[:, k, :n], square[:, k, :n], neighbour[:, k, : n - 1] = means.mean, means.square, means.neighbour
         for j, source in enumerate(load_model.sources):
             if source.contact != pair.contact:
@@ -157,7 +200,7 @@ def _contacts(
             power = powers[:, j] / in_contact[source.contact]
             mean = intervals.mean(power)
             here = np.where(rest[step], mean[step], power[sample])
-            under_pad = dwell(stations, points.s, step, share * here, n_steps)
+            under_pad = assign(stations, points.s, step, share * here, n_steps)
             port_heat[:, rail.first_port : rail.first_port + n] += source.rail_share * under_pad.mean
             port_heat[:, pair.pad_port] += (1.0 - source.rail_share) * mean
     return weight, square, neighbour, port_heat
@@ -173,7 +216,6 @@ def _flags(
     t: np.ndarray,
     values: dict[str, np.ndarray],
     missing: dict[str, np.ndarray],
-    films: np.ndarray,
     path: dict[str, np.ndarray],
     intervals: Intervals,
     dt: float,
@@ -195,8 +237,6 @@ def _flags(
             bounds(f"signals.{signal.name}", signal.unit, values[signal.name], signal.low, signal.high)
     for name, lost in missing.items():
         flags[f"signals.{name} missing, last value held"] = intervals.any(lost[intervals.sample])
-    for k, film in enumerate(load_model.films):
-        bounds(f"films.{film.name}", "W/(m^2*K)", films[:, k], film.low, film.high)
     for axis in load_model.axes:
         beyond(f"axes.{axis.name} beyond its stroke", path[axis.name], axis.low, axis.high)
     for pair in load_model.pairs:

@@ -15,6 +15,7 @@ from twin.rom.load_model import LawUse
 
 # Samples go through in blocks of one size, so that logs of any length share one compiled function.
 _BLOCK = 4096
+_BLOCK_OF_TABLES = 256  # of a table over states: as many numbers as in the other blocks
 
 
 def parameters_of(use: LawUse) -> dict[str, float]:
@@ -33,13 +34,60 @@ def parameters_of(use: LawUse) -> dict[str, float]:
     return {name: float(value) for name, value in values.items() if value is not None}
 
 
-@partial(jax.jit, static_argnames="wiring")
-def _evaluate(wiring: tuple, samples: jax.Array, parameters: tuple[dict[str, jax.Array], ...]) -> jax.Array:
+def states_of(use: LawUse) -> tuple[str, ...]:
+    """The arguments of a use of a law that the model fills in: its states that no signal is wired to."""
+    return tuple(name for name in LAWS[use.law].states if name not in use.signals)
+
+
+@partial(jax.jit, static_argnames=("wiring", "holds"))
+def _evaluate(
+    wiring: tuple, holds: bool, samples: jax.Array, states: tuple, parameters: tuple[dict[str, jax.Array], ...]
+) -> jax.Array:
+    """Results of laws stacked on axis 1; arguments from rows of `samples`, or from `states` of the same use."""
     columns = []
-    for (law, arguments), values in zip(wiring, parameters, strict=True):
-        result = LAWS[law].function(**{name: samples[column] for name, column in arguments}, **values)
-        columns.append(jnp.broadcast_to(result, samples.shape[1:]))
+    for (law, arguments), state, values in zip(wiring, states, parameters, strict=True):
+        given = {name: samples[column] for name, column in arguments}
+        shape = jnp.shape(samples[0])
+        if state:
+            given = {name: value[:, None] for name, value in given.items()}
+            shape = jnp.broadcast_shapes(*(jnp.shape(s) for s in state.values()), (shape[0], 1))
+        row = LAWS[law]
+        if holds:
+            result = row.validity.holds(**given, **state, **values) if row.validity else True
+        else:
+            result = row.function(**given, **state, **values)
+        columns.append(jnp.broadcast_to(result, shape))
     return jnp.stack(columns, axis=1)
+
+
+def _wiring(uses: Sequence[LawUse]) -> tuple[list[str], tuple]:
+    names = sorted({name for use in uses for name in use.signals.values()})
+    return names, tuple((u.law, tuple((a, names.index(s)) for a, s in sorted(u.signals.items()))) for u in uses)
+
+
+def _over_samples(
+    uses: Sequence[LawUse],
+    signals: Mapping[str, np.ndarray],
+    n_samples: int,
+    states: Sequence[Mapping[str, np.ndarray]],
+    holds: bool,
+    block: int,
+) -> list[np.ndarray]:
+    """Blocks of results; states of each use: (n_samples, m) or (1, m) arrays by argument."""
+    names, wiring = _wiring(uses)
+    parameters = tuple(parameters_of(use) for use in uses)
+    blocks = -(-n_samples // block)
+    padded = np.minimum(np.arange(blocks * block), n_samples - 1)
+    table = np.zeros((max(len(names), 1), blocks * block))
+    for row, name in enumerate(names):
+        table[row] = signals[name][padded]
+    results = []
+    for b in range(blocks):
+        part = slice(b * block, (b + 1) * block)
+        here = tuple({k: s if len(s) == 1 else s[padded[part]] for k, s in state.items()} for state in states)
+        results.append(np.asarray(_evaluate(wiring, holds, table[:, part], here, parameters)))
+    results[-1] = results[-1][: n_samples - (blocks - 1) * block]
+    return results
 
 
 def law_values(uses: Sequence[LawUse], signals: Mapping[str, np.ndarray], n_samples: int) -> np.ndarray:
@@ -49,13 +97,29 @@ def law_values(uses: Sequence[LawUse], signals: Mapping[str, np.ndarray], n_samp
     """
     if not uses:
         return np.zeros((n_samples, 0))
-    names = sorted({name for use in uses for name in use.signals.values()})
-    wiring = tuple((use.law, tuple((a, names.index(s)) for a, s in sorted(use.signals.items()))) for use in uses)
-    parameters = tuple(parameters_of(use) for use in uses)
-    blocks = -(-n_samples // _BLOCK)
-    table = np.zeros((len(names), blocks * _BLOCK))
-    for row, name in enumerate(names):
-        table[row, :n_samples] = signals[name]
-        table[row, n_samples:] = signals[name][-1]
-    results = [_evaluate(wiring, table[:, b * _BLOCK : (b + 1) * _BLOCK], parameters) for b in range(blocks)]
-    return np.concatenate([np.asarray(r) for r in results])[:n_samples]
+    return np.concatenate(_over_samples(uses, signals, n_samples, [{}] * len(uses), False, _BLOCK))
+
+
+def laws_hold(uses: Sequence[LawUse], signals: Mapping[str, np.ndarray], n_samples: int) -> np.ndarray:
+    """Whether laws are inside their validity (n_samples, len(uses)); True where none is published."""
+    if not uses:
+        return np.ones((n_samples, 0), dtype=bool)
+    blocks = _over_samples(uses, signals, n_samples, [{}] * len(uses), True, _BLOCK)
+    return np.concatenate(blocks).astype(bool)
+
+
+def law_table(
+    use: LawUse,
+    signals: Mapping[str, np.ndarray],
+    n_samples: int,
+    states: Mapping[str, np.ndarray],
+    holds: bool = False,
+) -> np.ndarray:
+    """One law over a grid of its states: (n_samples, m) values, or whether it holds.
+
+    states: argument -> (n_samples, m) or (1, m) [degC].
+    Raises DescriptionError for an unknown law or a missing parameter.
+    """
+    blocks = _over_samples([use], signals, n_samples, [states], holds, _BLOCK_OF_TABLES)
+    result = np.concatenate(blocks)[:, 0]
+    return result.astype(bool) if holds else result

@@ -33,8 +33,22 @@ class AxisWiring:
 
 
 @dataclass(frozen=True)
+class EnvironmentWiring:
+    """Air of a zone, a radiant surrounding, or a coolant at its inlet."""
+
+    name: str
+    signal: str  # "" where the temperature is constant
+    temperature: float  # degC, where no signal is given
+    gradient: float = 0.0  # K/m upwards from `height`
+    height: float = 0.0  # m, vertical machine coordinate
+
+
+@dataclass(frozen=True)
 class LawUse:
-    """A law of `twin.physics.laws.LAWS` with its parameters and the signals it reads."""
+    """A law of `twin.physics.laws.LAWS` with its parameters and the signals it reads.
+
+    Arguments of the law that the model fills in (`Law.states`) may be wired to a signal instead.
+    """
 
     law: str
     parameters: dict[str, float]
@@ -54,13 +68,16 @@ class Source:
 
 @dataclass(frozen=True)
 class Film:
-    """A film coefficient [W/(m^2 K)] of a group of surfaces against an environment."""
+    """The film coefficient [W/(m^2 K)] of a group of surfaces: convection to an environment, and radiation."""
 
     name: str
     use: LawUse
     environment: int
-    low: float  # W/(m^2 K), certified range
+    low: float  # W/(m^2 K), certified range, radiation included
     high: float
+    gain: float = 1.0  # calibration factor of the convection
+    emissivity: float = 0.0  # 0: no radiation
+    radiant: int = 0  # environment at the radiant temperature
 
 
 @dataclass(frozen=True)
@@ -71,6 +88,7 @@ class Joint:
     conductance: float
     low: float
     high: float
+    key: str = "conductance"  # in the description; of lumped machines also "total", which is in W/K
 
 
 @dataclass(frozen=True)
@@ -94,13 +112,15 @@ class Pair:
     rail_moves: bool  # True where the rail is on the carried body: the pad then sits at station - position
     area: float  # m^2 of the pad
     conductance: float  # W/(m^2 K)
+    assignment: str = "interpolated"  # heat and conductance, or "segment": to the one below the pad
+    key: str = "conductance"  # as of joints; a total belongs to an area of 1 m^2
 
 
 @dataclass(frozen=True)
 class LoadModel:
     signals: tuple[Signal, ...]
     axes: tuple[AxisWiring, ...]
-    environments: tuple[tuple[str, str, float], ...]  # (name, signal name or "", constant degC where no signal)
+    environments: tuple[EnvironmentWiring, ...]
     sources: tuple[Source, ...]
     films: tuple[Film, ...]
     joints: tuple[Joint, ...]
@@ -111,9 +131,7 @@ class LoadModel:
     @property
     def theta_names(self) -> tuple[str, ...]:
         """Coefficients of the affine terms: films first, then joints."""
-        return tuple(f"films.{f.name}" for f in self.films) + tuple(
-            f"contacts.{j.name}.conductance" for j in self.joints
-        )
+        return tuple(f"films.{f.name}" for f in self.films) + tuple(f"contacts.{j.name}.{j.key}" for j in self.joints)
 
     def to_json(self) -> dict:
         return asdict(self)
@@ -126,7 +144,7 @@ class LoadModel:
         return cls(
             signals=tuple(Signal(**s) for s in d["signals"]),
             axes=tuple(AxisWiring(**{**a, "direction": tuple(a["direction"])}) for a in d["axes"]),
-            environments=tuple((n, s, float(v)) for n, s, v in d["environments"]),
+            environments=tuple(EnvironmentWiring(**e) for e in d["environments"]),
             sources=tuple(Source(**{**s, "use": use(s["use"])}) for s in d["sources"]),
             films=tuple(Film(**{**f, "use": use(f["use"])}) for f in d["films"]),
             joints=tuple(Joint(**j) for j in d["joints"]),

@@ -3,10 +3,13 @@
 A *body* is the set of parts joined by fixed contacts: it moves as one. Bodies meet at moving contacts only.
 For every body (field temperatures relative to T_ref, x in K or in modal coordinates):
 
-    E x' = -(A0 + sum_k theta_k A_k) x + sum_k theta_k M_k (T_amb,k - T_ref) + B q + P q_port
+    E x' = -(A0 + sum_k theta_k A_k) x + sum_k theta_k (M_k (T_amb,k - T_ref) + H_k gamma_k) + B q + P q_port
     T_port = P^T x          (area average of a port; P also distributes port heat: sum over nodes 1)
     T_sensor = C x
     w(pose) = G[pose] x     (this body's share of the TCP displacement, m)
+    T_source = B^T x        (area average of a source's surface)
+
+gamma_k [K/m] is the rise of the environment's temperature with height, T_amb,k its value at height zero.
 
 Moving contacts couple port temperatures: q_port = -Gamma(t) T_port with a symmetric positive semidefinite Gamma
 (`twin.rom.contact`). E, A0, A_k are symmetric positive semidefinite for the full model and every Galerkin projection
@@ -45,12 +48,30 @@ class AffineBody:
     one: np.ndarray  # (n,) coordinates of the field that is 1 K everywhere
     energy: np.ndarray  # (n,) J/K: energy @ x is the heat stored relative to T_ref (= E one)
     P_out: np.ndarray | None = None  # (n, n_ports) where reading a port differs from feeding it (oblique projection)
+    B_out: np.ndarray | None = None  # (n, len(sources)) likewise of sources
+    H: np.ndarray | None = None  # (n, len(theta)) m^3: A_k @ height of film terms; None: zero
     F: Matrix | None = None  # (m, n) 1: temperatures of the surface vertices, for pictures
 
     @property
     def port_rows(self) -> np.ndarray:
         """(n_ports, n): T_port = port_rows @ x."""
         return (self.P if self.P_out is None else self.P_out).T
+
+    @property
+    def source_rows(self) -> np.ndarray:
+        """(n_sources, n): mean temperatures of the sources' surfaces = source_rows @ x."""
+        return (self.B if self.B_out is None else self.B_out).T
+
+    @property
+    def film_rows(self) -> np.ndarray:
+        """(len(theta), n) m^2: theta_k film_rows[k] @ x is the heat [W] that term k takes out at T_amb = T_ref."""
+        left = self.left_one
+        return np.stack([a.T @ left for a in self.A]) if self.A else np.zeros((0, self.n))
+
+    @property
+    def left_one(self) -> np.ndarray:
+        """(n,) the test vector that sums the rows of the heat equation: `one`, unless the projection is oblique."""
+        return self.one if self.symmetric else np.linalg.solve(self.E.T, self.energy)
 
     @property
     def symmetric(self) -> bool:
@@ -79,3 +100,8 @@ class MachineModel:
     @property
     def n(self) -> int:
         return sum(b.n for b in self.bodies)
+
+    @property
+    def moves(self) -> bool:
+        """Whether any temperature moves the tool; some lumped machines have no TCP."""
+        return any(np.any(b.G) for b in self.bodies)

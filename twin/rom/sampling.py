@@ -37,6 +37,19 @@ class Intervals:
         base = held[self.first]
         return base + np.add.reduceat((held - base[self.step]) * share, self.first, axis=0)
 
+    def part(self, begin: int, end: int) -> Intervals:
+        """The intervals of steps begin .. end, with steps and samples counted from the first of them."""
+        here = slice(self.first[begin], self.first[end] if end < self.n_steps else len(self.start))
+        sample = self.sample[here]
+        return Intervals(
+            self.start[here],
+            self.end[here],
+            sample - sample[0],
+            self.step[here] - begin,
+            self.share[here],
+            self.first[begin:end] - self.first[begin],
+        )
+
     def constant(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """True for steps (n_steps,) in which a path from `start` to `end` (k,) of each interval stays put."""
         low = np.minimum.reduceat(np.minimum(start, end), self.first)

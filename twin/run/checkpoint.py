@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import h5py
@@ -29,10 +29,14 @@ class Steps:
     z: np.ndarray  # (n, N) states at step ends, coordinates of twin.run.system
     film: np.ndarray  # (n, n_films) W into the machine
     stored: np.ndarray  # (n,) J
+    power: np.ndarray  # (n, n_sources) W
+    theta: np.ndarray  # (n, n_theta) W/(m^2 K)
+    surface: np.ndarray  # (n, n_films) degC at step starts
+    winding: np.ndarray  # (n, n_following_losses) degC at step starts
 
     @classmethod
     def join(cls, parts: Sequence[Steps]) -> Steps:
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("z", "film", "stored")))
+        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
 
 
 def chain(key: str, *arrays: np.ndarray) -> str:
@@ -59,6 +63,10 @@ class CheckpointFolder:
             put(f, "z", steps.z, "K", (), "states in normalised coordinates")
             put(f, "film", steps.film, "W")
             put(f, "stored", steps.stored, "J")
+            put(f, "power", steps.power, "W")
+            put(f, "theta", steps.theta, "W/(m^2*K)")
+            put(f, "surface", steps.surface, "degC")
+            put(f, "winding", steps.winding, "degC")
 
     def load(self) -> list[tuple[int, Steps, str]]:
         """(first step, steps, key) of all checkpoints in order. Raises TwinError for files that cannot be read."""
@@ -66,7 +74,7 @@ class CheckpointFolder:
         for path in sorted(self.folder.glob("*.h5")):
             try:
                 with h5py.File(path, "r") as f:
-                    steps = Steps(f["z"][...], f["film"][...], f["stored"][...])
+                    steps = Steps(**{field.name: f[field.name][...] for field in fields(Steps)})
                     found.append((int(f.attrs["first"]), steps, str(f.attrs["key"])))
             except (OSError, KeyError, RuntimeError) as e:
                 raise TwinError(f"not a checkpoint: {e}", str(path), "remove it, or run without --resume") from e

@@ -15,6 +15,7 @@ from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 from twin.rom.drive import Drive, evaluate
+from twin.rom.following_flags import following_flags
 from twin.rom.poses import Kind, pose_weights
 from twin.run.checkpoint import CheckpointFolder, Steps, chain
 from twin.run.results import Result
@@ -88,8 +89,9 @@ def replay_drive(
         # shorter steps excite faster modes than the certificate has seen
         shortest = float(certified) / float(artefact.certificate.get("substeps", substeps))
         flags[f"substep shorter than the certified {shortest:g} s"] = np.diff(drive.time) / substeps < 0.999 * shortest
-    throughput = np.diff(drive.time) * (np.abs(drive.power).sum(axis=1) + np.abs(steps.film).sum(axis=1))
-    residual = steps.stored - np.diff(drive.time) * (drive.power.sum(axis=1) + steps.film.sum(axis=1))
+    flags |= following_flags(model.load_model, drive, steps.theta, steps.surface, steps.winding)
+    throughput = np.diff(drive.time) * (np.abs(steps.power).sum(axis=1) + np.abs(steps.film).sum(axis=1))
+    residual = steps.stored - np.diff(drive.time) * (steps.power.sum(axis=1) + steps.film.sum(axis=1))
     return Result(
         time=drive.time,
         sensors=(*model.sensors, *(name for name, _ in model.ambient_sensors)),
@@ -101,9 +103,11 @@ def replay_drive(
         position=positions,
         tcp_actual=np.einsum("np,npc->nc", weights, tcp),
         sources=tuple(s.name for s in model.load_model.sources),
-        power=drive.power,
+        power=steps.power,
         films=tuple(f.name for f in model.load_model.films),
         film_heat=steps.film,
+        film_coefficient=steps.theta[:, : len(model.load_model.films)],
+        film_surface=steps.surface,
         stored=steps.stored,
         balance_error=np.abs(residual) / np.maximum(throughput, 1e-6 * prepared.heat_capacity),
         flags=np.column_stack([drive.flags, *flags.values()]),
@@ -151,7 +155,8 @@ def march(
         for begin in range(first, n_steps, BLOCK):
             end = min(begin + BLOCK, n_steps)
             states, heat = advance(prepared.layout, prepared.system, z, _block(inputs, begin, end))
-            steps = Steps(*(np.asarray(a)[: end - begin] for a in (states, heat.film, heat.stored)))
+            made = (states, heat.film, heat.stored, heat.power, heat.theta, heat.surface, heat.winding)
+            steps = Steps(*(np.asarray(a)[: end - begin] for a in made))
             done.append(steps)
             fresh.append(steps)
             z = steps.z[-1]

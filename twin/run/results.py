@@ -37,6 +37,8 @@ class Result:
     power: np.ndarray  # (n, n_sources) W
     films: tuple[str, ...]
     film_heat: np.ndarray  # (n, n_films) W from the environments into the machine
+    film_coefficient: np.ndarray  # (n, n_films) W/(m^2 K), radiation included
+    film_surface: np.ndarray  # (n, n_films) degC: mean temperature of the films' surfaces at step starts
     stored: np.ndarray  # (n,) J
     balance_error: np.ndarray  # (n,) |stored - in| of the throughput, or of 1 uK of the machine where that is more
     flags: np.ndarray  # (n, n_flags) bool: outside what was certified
@@ -136,6 +138,8 @@ def _write_hdf5(path: Path, result: Result) -> None:
         put(f, "position", result.position, "m", ("time", "axis"))
         put(f, "power", result.power, "W", ("step", "source"))
         put(f, "film_heat", result.film_heat, "W", ("step", "film"), "from environments into the machine")
+        put(f, "film_coefficient", result.film_coefficient, "W/(m^2*K)", ("step", "film"), "convection and radiation")
+        put(f, "film_surface", result.film_surface, "degC", ("step", "film"), "mean surface temperature")
         put(f, "stored", result.stored, "J", ("step",))
         put(f, "balance_error", result.balance_error, "1", ("step",))
         put(f, "flags", result.flags.astype(np.uint8), "", ("step", "flag"), "1: outside what was certified")

@@ -14,6 +14,8 @@ import twin.run.jax_setup  # noqa: F401  isort: skip
 import jax
 import numpy as np
 
+from twin.rom.following import FilmPlan
+from twin.rom.law_values import states_of
 from twin.rom.model import AffineBody, MachineModel
 from twin.run.block_factor import Elimination, plan
 
@@ -43,6 +45,8 @@ class Layout:
     couplings: tuple[Coupling, ...]
     elimination: Elimination  # of the coupled matrix, body by body
     n_films: int
+    following_films: tuple[int, ...]  # films tabulated over their surface temperature
+    following_losses: tuple[int, ...]  # sources tabulated over theirs
 
     @property
     def offsets(self) -> tuple[int, ...]:
@@ -59,11 +63,18 @@ class System:
     A: tuple[Array, ...]  # per body (n_terms, n, n)
     P: tuple[Array, ...]  # per body (n, n_ports): port heat in
     port_rows: tuple[Array, ...]  # per body (n_ports, n): port temperatures out
-    M: Array  # (N, n_theta): heat of 1 K of environment temperature; zero columns for joints
+    M: Array  # (N, n_films): heat of 1 K of outer temperature
+    H: Array  # (N, n_films): heat of 1 K/m of gradient
     B: Array  # (N, n_sources)
-    film_environment: Array  # (n_theta,) int: environment of each film; 0 for joints, whose M is zero
-    film_area: Array  # (n_theta,) m^2
-    film_rows: Array  # (n_theta, N) m^2: film_rows @ z = area times mean surface temperature rise
+    source_rows: Array  # (n_following_losses, N): mean temperature of their surfaces
+    film_environment: Array  # (n_films,) int
+    film_radiant: Array  # (n_films,) int
+    film_emissivity: Array  # (n_films,)
+    film_gradient: Array  # (n_films,) K/m
+    film_height: Array  # (n_films,) m
+    film_area: Array  # (n_films,) m^2
+    film_moment: Array  # (n_films,) m^3
+    film_rows: Array  # (n_films, N) m^2: film_rows @ z = area times mean surface temperature rise
     energy: Array  # (N,) stored heat [J] = energy @ z
     C: Array  # (n_sensors, N)
     G: Array  # (n_poses * 3, N)
@@ -98,6 +109,8 @@ def _normalised(body: AffineBody) -> tuple[AffineBody, np.ndarray]:
             one=np.linalg.solve(X, body.one),
             energy=X.T @ body.energy,
             P_out=None if body.symmetric else X.T @ body.port_rows.T,
+            B_out=None if body.symmetric else X.T @ body.source_rows.T,
+            H=None if body.H is None else left @ body.H,
         ),
         X,
     )
@@ -158,32 +171,46 @@ def prepare(model: MachineModel) -> Prepared:
         couplings=couplings,
         elimination=plan(len(bodies), {(c.rail_body, c.pad_body) for c in couplings}),
         n_films=len(load.films),
+        following_films=tuple(k for k, f in enumerate(load.films) if states_of(f.use)),
+        following_losses=tuple(k for k, s in enumerate(load.sources) if states_of(s.use)),
     )
-    N, n_theta, offsets = model.n, len(load.theta_names), layout.offsets
-    M, B, film_rows = np.zeros((N, n_theta)), np.zeros((N, len(load.sources))), np.zeros((n_theta, N))
+    N, n_films, offsets = model.n, len(load.films), layout.offsets
+    M, H, film_rows = np.zeros((N, n_films)), np.zeros((N, n_films)), np.zeros((n_films, N))
+    B, source_rows = np.zeros((N, len(load.sources))), np.zeros((len(load.sources), N))
     C, G = np.zeros((len(model.sensors), N)), np.zeros((3 * len(model.poses), N))
-    film_area = np.zeros(n_theta)
+    film_area, film_moment = np.zeros(n_films), np.zeros(n_films)
     for b, body in enumerate(bodies):
         rows = slice(offsets[b], offsets[b + 1])
         for column, k in enumerate(body.theta):
-            if k >= len(load.films):
+            if k >= n_films:
                 continue
             M[rows, k] = body.M[:, column]
+            if body.H is not None:
+                H[rows, k] = body.H[:, column]
+                film_moment[k] += body.energy @ body.H[:, column]
             film_rows[k, rows] = body.energy @ body.A[column]
             film_area[k] += body.energy @ body.M[:, column]
         B[rows, list(body.sources)] = body.B
+        source_rows[list(body.sources), rows] = body.source_rows
         C[list(body.sensors), rows] = body.C
         G[:, rows] = body.G.reshape(-1, body.n)
-    environment = [f.environment for f in load.films] + [0] * len(load.joints)
+    films = FilmPlan.of(load)
     system = System(
         A0=tuple(b.A0 for b in bodies),
         A=tuple(np.array(b.A).reshape(-1, b.n, b.n) for b in bodies),
         P=tuple(b.P[:, o] for b, o in zip(bodies, order, strict=True)),
         port_rows=tuple(b.port_rows[o] for b, o in zip(bodies, order, strict=True)),
         M=M,
+        H=H,
         B=B,
-        film_environment=np.array(environment, dtype=np.int64),
+        source_rows=source_rows[list(layout.following_losses)],
+        film_environment=films.environment,
+        film_radiant=films.radiant,
+        film_emissivity=films.emissivity,
+        film_gradient=films.gradient,
+        film_height=films.height,
         film_area=film_area,
+        film_moment=film_moment,
         film_rows=film_rows,
         energy=np.concatenate([b.energy for b in bodies]),
         C=C,

@@ -1,0 +1,278 @@
+"""Blocks dropped, repeated, reordered and damaged: every count exact, every delivered record once, nothing invented."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.logs.test_read import write
+from twin.cli.main import run
+from twin.errors import LogError
+from twin.logs.block_file import append, decode, encode, read_blocks
+from twin.logs.blocks import Block, Counts, Damaged, Resolver, group, in_order, resolve, tables
+from twin.logs.check import check_run
+from twin.logs.compress import compress_loads
+from twin.logs.read import read_run
+from twin.logs.unpack import unpack
+
+NAMES, UNITS = ("x", "i", "v"), ("m", "A", "m/s")
+T_CORE = 0.01
+START = 1.772e9  # POSIX
+
+
+def blocks(n: int, size: int = 5, start: float = START, stream: int = 7) -> list[Block]:
+    """Record k holds k, -k, k^2."""
+    k = np.arange(float(n * size))
+    return list(group([np.column_stack([k, -k, k**2])], NAMES, UNITS, start, T_CORE, size, stream))
+
+
+@given(st.lists(st.integers(0, 9), min_size=1, max_size=20), st.integers(1, 6))
+def test_grouping_loses_nothing(sizes: list[int], size: int):
+    rows = np.arange(float(sum(sizes)))[:, None]
+    chunks = np.split(rows, np.cumsum(sizes)[:-1])
+    made = list(group(chunks, ["a"], ["m"], 3.0, 0.5, size))
+    assert [b.sequence for b in made] == list(range(len(made)))
+    assert all(len(b.values) == size for b in made[:-1])
+    assert np.concatenate([b.values for b in made] or [rows]).tolist() == rows.tolist()
+    assert [b.time for b in made] == [3.0 + 0.5 * size * k for k in range(len(made))]
+
+
+@st.composite
+def transmissions(draw: st.DrawFn) -> list[tuple[int, bool]]:
+    """(sequence, sound) in order of arrival: each of n blocks arrives 0 to 3 times, damaged or not, in any order."""
+    n = draw(st.integers(1, 25))
+    copies = [(s, draw(st.booleans()) or draw(st.booleans())) for s in range(n) for _ in range(draw(st.integers(0, 3)))]
+    return draw(st.permutations(copies))
+
+
+@settings(max_examples=300)
+@given(transmissions())
+def test_counts_are_exact_and_records_appear_once(sent: list[tuple[int, bool]]):
+    """Through the frames themselves: a damaged copy has one byte of its values flipped."""
+    made = blocks(26)
+    frames = []
+    for s, sound in sent:
+        frame = bytearray(encode(made[s]))
+        if not sound:
+            frame[-12] ^= 0x40
+        frames.append(bytes(frame))
+    sound = [s for s, good in sent if good]
+    arrived = set(sound)
+    if not arrived:
+        with pytest.raises(LogError, match="no sound block"):
+            resolve(decode(b"".join(frames)))
+        return
+    resolved = resolve(decode(b"".join(frames)))
+    firsts = list(dict.fromkeys(sound))
+    assert resolved.counts == Counts(
+        delivered=len(arrived),
+        lost=max(arrived) + 1 - len(arrived),
+        repeated=len(sound) - len(arrived),
+        reordered=sum(any(b > a for b in firsts[:k]) for k, a in enumerate(firsts)),
+        damaged=len(sent) - len(sound),
+    )
+    table = resolved.table
+    assert np.all(np.diff(table.time) > 0)
+    there = np.isfinite(table.columns["x"])
+    expected = np.concatenate([made[s].values for s in sorted(arrived)])
+    assert np.column_stack([table.columns[n][there] for n in NAMES]).tolist() == expected.tolist()
+    assert table.time[there] == pytest.approx(START + T_CORE * expected[:, 0], abs=1e-6)
+    gaps = sum(b - a > 1 for a, b in zip(sorted(arrived), sorted(arrived)[1:], strict=False))
+    assert len(resolved.gaps) == gaps
+    assert np.count_nonzero(~there) == gaps
+    assert all(np.isnan(table.columns[n][~there]).all() for n in NAMES)
+    if gaps:
+        missing = max(arrived) - min(arrived) + 1 - len(arrived)
+        assert np.diff(resolved.gaps, axis=1).sum() == pytest.approx(missing * 5 * T_CORE, abs=1e-5)
+
+
+@given(st.permutations(range(20)), st.integers(0, 6))
+def test_a_window_bounds_what_waits(order: list[int], window: int):
+    """Live: what is out is in order and out once; what comes after it was given up is lost and late."""
+    made, resolver, out, waiting = blocks(20), Resolver(window), [], 0
+    for s in order:
+        out += resolver.push(made[s])
+        waiting = max(waiting, len(resolver._waiting))
+    out += resolver.finish()
+    numbers = [b.sequence for b in out]
+    assert numbers == sorted(set(numbers))
+    assert waiting <= window
+    lost, seen = set[int](), set[int]()
+    for s in order:  # given up when one `window` later has come
+        if s not in lost:
+            seen.add(s)
+        lost |= {m for m in range(max(seen) - window + 1) if m not in seen}
+    assert set(numbers) == seen
+    assert resolver.counts.delivered == len(seen)
+    assert resolver.counts.lost == resolver.counts.late == len(lost)
+
+
+def test_in_order_without_loss_nothing_is_counted():
+    resolver = Resolver()
+    assert [b.sequence for b in in_order(blocks(50), resolver)] == list(range(50))
+    assert resolver.counts == Counts(delivered=50)
+    assert str(resolver.counts) == "blocks: 50 delivered"
+
+
+def test_joining_in_midstream_counts_from_there():
+    made = blocks(20)
+    resolver = Resolver(window=4, first=None)
+    numbers = [b.sequence for b in in_order([made[12], made[11], made[14], made[13]], resolver)]
+    assert numbers == [12, 13, 14]
+    assert resolver.counts == Counts(delivered=3, late=1, reordered=1)
+    assert resolve(made[12:]).counts.lost == 12
+
+
+def test_a_sender_that_starts_anew_begins_another_stream():
+    first, second = blocks(4, stream=1), blocks(3, start=START + 100.0, stream=2)
+    resolved = resolve([*first[:3], second[0], first[3], second[2]])
+    assert resolved.counts == Counts(delivered=5, lost=1, late=1, restarts=1)
+    assert str(resolved.counts) == "blocks: 5 delivered, 1 lost, 1 late, 1 restarts"
+    assert resolved.gaps[0] - START == pytest.approx([0.15, 100.0], abs=1e-6)
+    assert len(resolved.gaps) == 2
+
+
+def test_a_number_far_ahead_costs_no_memory():
+    made = blocks(2)
+    resolver = Resolver(window=8)
+    out = [*resolver.push(made[0]), *resolver.push(replace(made[1], sequence=10**15))]
+    assert [b.sequence for b in out + resolver.finish()] == [0, 10**15]
+    assert resolver.counts == Counts(delivered=2, lost=10**15 - 1)
+
+
+def test_columns_may_not_change():
+    made = blocks(2)
+    with pytest.raises(LogError, match="other columns"):
+        list(tables([made[0], replace(made[1], names=("x", "i", "w"))]))
+    with pytest.raises(LogError, match="one column per name"):
+        list(group([np.zeros((3, 2))], NAMES, UNITS, 0.0, 0.01))
+
+
+def same(a: Block, b: Block) -> bool:
+    return replace(a, values=0) == replace(b, values=0) and np.array_equal(a.values, b.values, equal_nan=True)
+
+
+def test_a_file_reads_back(tmp_path: Path):
+    made = blocks(6)
+    made[2].values[1, 1] = np.nan
+    for block in made:
+        append(tmp_path / "shift.twb", block)
+    back = list(read_blocks(tmp_path / "shift.twb"))
+    assert len(back) == 6
+    assert all(same(a, b) for a, b in zip(made, back, strict=True))
+
+
+@given(st.data())
+def test_a_truncated_file_keeps_all_whole_blocks(data: st.DataObject):
+    made = blocks(4)
+    frames = [encode(b) for b in made]
+    whole = b"".join(frames)
+    cut = data.draw(st.integers(1, len(whole)))
+    back = list(decode(whole[:cut]))
+    ends = np.cumsum([len(f) for f in frames])
+    complete = int(np.searchsorted(ends, cut, side="right"))
+    assert [b.sequence for b in back if isinstance(b, Block)] == list(range(complete))
+    rest = [b for b in back if isinstance(b, Damaged)]
+    assert rest == ([] if cut in ends else [Damaged(truncated=True)])
+
+
+@given(st.data())
+def test_any_damaged_byte_costs_its_own_block_only(data: st.DataObject):
+    frames = [encode(b) for b in blocks(4)]
+    which = data.draw(st.integers(0, 3))
+    at = data.draw(st.integers(0, len(frames[which]) - 1))
+    broken = bytearray(frames[which])
+    broken[at] ^= data.draw(st.integers(1, 255))
+    back = list(decode(b"".join([*frames[:which], bytes(broken), *frames[which + 1 :]])))
+    assert [b.sequence for b in back if isinstance(b, Block)] == [s for s in range(4) if s != which]
+    assert sum(isinstance(b, Damaged) for b in back) == 1
+
+
+def test_writing_goes_on_after_a_crash(tmp_path: Path):
+    path, made = tmp_path / "shift.twb", blocks(4)
+    append(path, made[0])
+    with path.open("ab") as f:
+        f.write(encode(made[1])[:70])
+    for block in made[2:]:
+        append(path, block)
+    resolved = resolve(read_blocks(path))
+    assert resolved.counts == Counts(delivered=3, lost=1, damaged=1)
+
+
+@pytest.mark.parametrize(("content", "message"), [(b"", "empty"), (b"time [s],x [m]\n", "holds no blocks")])
+def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str):
+    (tmp_path / "a.twb").write_bytes(content)
+    with pytest.raises(LogError, match=message):
+        list(read_blocks(tmp_path / "a.twb"))
+    with pytest.raises(LogError, match="cannot read"):
+        list(read_blocks(tmp_path / "none.twb"))
+
+
+def sent(path: Path, made: list[Block]) -> Path:
+    path.write_bytes(b"".join(encode(b) for b in made))
+    return path
+
+
+def test_unpack_writes_a_run(tmp_path: Path, capsys):
+    made = blocks(200)
+    path = sent(tmp_path / "shift.twb", [*made[:60], *made[62:100], made[99], made[101], made[100], *made[102:]])
+    assert run(["unpack", str(path), "-o", str(tmp_path / "run")]) == 0
+    out = capsys.readouterr().out
+    assert "198 delivered, 2 lost, 1 repeated, 1 reordered" in out
+    assert "warning: 1 gap" in out
+    loads = read_run(tmp_path / "run")
+    assert loads.start.timestamp() == pytest.approx(START)
+    assert loads.sampling == T_CORE
+    assert loads.synthetic == ()
+    assert "2 lost, 1 repeated, 1 reordered; 1 gap" in loads.provenance
+    assert loads.loads.units == dict(zip(NAMES, UNITS, strict=True))
+    there = np.isfinite(loads.loads.columns["i"])
+    assert np.flatnonzero(~there).tolist() == [300]
+    assert loads.loads.time[there] == pytest.approx(T_CORE * loads.loads.columns["x"][there], abs=1e-6)
+    found = [p.what for p in check_run(loads)]
+    assert any("a gap" in what for what in found)
+    assert any("lacks 1 of" in what for what in found)
+    assert run(["unpack", str(path), "-o", str(tmp_path / "run")]) == 2  # measured data are never replaced
+    assert "measured data" in capsys.readouterr().err
+
+
+def test_unpack_to_means_is_the_compressed_log(tmp_path: Path):
+    path = sent(tmp_path / "shift.twb", blocks(200))
+    whole, counts, gaps = unpack(path)
+    means, _, _ = unpack(path, 0.5)
+    assert (counts, gaps) == (Counts(delivered=200), 0)
+    expected = compress_loads(whole.loads, 0.5)
+    assert means.sampling == 0.5
+    assert "means over 0.5 s" in means.provenance
+    for name in NAMES:
+        assert means.loads.columns[name] == pytest.approx(expected.columns[name], rel=1e-9)
+
+
+def test_stamps_that_are_no_dates_count_from_the_start(tmp_path: Path):
+    whole, _, _ = unpack(sent(tmp_path / "a.twb", blocks(3, start=12.5)))
+    assert whole.start is None
+    assert whole.loads.time[0] == 12.5
+
+
+@pytest.mark.parametrize(
+    ("change", "message"), [({"units": ("m", "mA", "m/s")}, "not SI"), ({"units": ("m", "ampere?", "m/s")}, "'i'")]
+)
+def test_unpack_names_units_that_are_not_si(tmp_path: Path, change: dict, message: str):
+    with pytest.raises(LogError, match=message):
+        unpack(sent(tmp_path / "a.twb", [replace(blocks(1)[0], **change)]))
+
+
+def test_unpack_of_a_short_log(tmp_path: Path):
+    with pytest.raises(LogError, match="shorter than 60 s"):
+        unpack(sent(tmp_path / "a.twb", blocks(3)), 60.0)
+
+
+def test_unpack_refuses_a_run_in_the_way_before_reading(tmp_path: Path, capsys):
+    folder = write(tmp_path / "run", "time [s],x [m]\n0,1\n1,1\n")
+    assert run(["unpack", str(tmp_path / "none.twb"), "-o", str(folder)]) == 2
+    assert "measured data" in capsys.readouterr().err

@@ -1,0 +1,318 @@
+"""Correction polynomials: the anchors of paper 001's errata, axis offsets, files, and the command."""
+
+import itertools
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from twin.cli.correction import command
+from twin.errors import ModelError, TwinError
+from twin.machine.bodies import bodies_of
+from twin.machine.kinematics import direction, linear_axes, moved_bodies
+from twin.machine.load import load_machine
+from twin.rom.artefact import read_artefact
+from twin.run.correction import PoseErrors, corrected_error, default_degrees, fit_correction, quality
+from twin.run.correction_axes import _tool_sign, offset_matrix, uncorrectable
+from twin.run.correction_file import read_correction, read_pose_errors, write_correction
+from twin.run.correction_polynomial import (
+    NormalisedAxis,
+    design_matrix,
+    fit_full,
+    fit_product,
+    fit_without_constant,
+    normalised_axes,
+)
+
+GRID = (np.array([0.0, 0.5, 1.0]),) * 3
+POSES = np.array(list(itertools.product(*GRID)))
+CARTESIAN = np.diag([1.0, -1.0, 1.0])  # the second axis carries the work
+
+
+def anchor() -> np.ndarray:
+    """The field 10 + 3x + 2y - 4z + xz of E-001-1 at 27 poses, x, y, z in [-1, 1]."""
+    x, y, z = (2.0 * POSES - 1.0).T
+    return 10.0 + 3.0 * x + 2.0 * y - 4.0 * z + x * z
+
+
+def bent(position: np.ndarray) -> np.ndarray:
+    """A TCP error (m, 3) [m] of some 40 um that no polynomial of low degree meets."""
+    x, y, z = position.T
+    return 1e-6 * np.column_stack(
+        [
+            20.0 * np.sin(2.0 * x) + 8.0 * y * z,
+            -15.0 + 10.0 * np.exp(x * y),
+            25.0 * np.cos(1.5 * z) + 5.0 * x,
+        ]
+    )
+
+
+def grid_errors(count: int) -> PoseErrors:
+    grid = (np.linspace(0.0, 1.0, count),) * 3
+    poses = np.array(list(itertools.product(*grid)))
+    return PoseErrors(("x", "y", "z"), grid, poses, bent(poses))
+
+
+def test_product_form_misses_the_anchor_that_the_full_form_meets():
+    axes = normalised_axes("xyz", POSES, (2, 2, 2))
+    values = anchor()[:, None]
+    full = fit_full(axes, POSES, values)
+    assert full.coefficients.size == 27
+    np.testing.assert_allclose(full(POSES), values, atol=1e-12)
+    product = fit_product(axes, POSES, values).expanded()
+    assert np.abs(product(POSES) - values).max() == pytest.approx(4.03, abs=0.005)
+    separable = np.prod(1.0 + POSES * np.array([0.5, -0.3, 2.0]), axis=1)[:, None]
+    np.testing.assert_allclose(fit_product(axes, POSES, separable).expanded()(POSES), separable, rtol=1e-8)
+
+
+def test_condition_of_normalised_axes_and_of_millimetres():
+    axes = normalised_axes("xyz", POSES, (2, 2, 2))
+    assert np.linalg.cond(design_matrix(axes, POSES)) == pytest.approx(33.56, abs=0.01)
+    raw = np.array([0.0, 500.0, 1000.0])[:, None] ** np.arange(3)
+    assert np.linalg.cond(raw) ** 3 == pytest.approx(1.1e18, rel=0.01)  # of the Kronecker product
+
+
+def test_values_of_the_polynomial_by_hand():
+    axes = normalised_axes("xyz", POSES, (2, 1, 0))
+    full = fit_full(axes, POSES, np.column_stack([POSES[:, 0] ** 2 * POSES[:, 1], 3.0 + 0.0 * POSES[:, 0]]))
+    place = np.array([[0.3, 0.8, 0.1], [1.0, 0.2, 0.9]])
+    np.testing.assert_allclose(full(place), [[0.3**2 * 0.8, 3.0], [0.2, 3.0]], atol=1e-12)
+    for p in place:
+        np.testing.assert_allclose(full.at(p), full(p[None])[0], rtol=1e-12, atol=1e-13)
+    beyond = np.array([[1.4, 0.8, 0.5]])  # held at the border
+    np.testing.assert_allclose(full(beyond), full(np.array([[1.0, 0.8, 0.5]])))
+    np.testing.assert_allclose(full.at(beyond[0]), full(beyond)[0])
+
+
+def test_least_squares_with_more_poses_than_coefficients():
+    errors = grid_errors(5)
+    correction = fit_correction(errors, CARTESIAN, (2, 2, 2))
+    found = quality(correction, errors)
+    assert correction.polynomial.coefficients.size == 81
+    misfit = errors.tcp - correction.polynomial(errors.poses)
+    normal = design_matrix(correction.polynomial.axes, errors.poses).T @ misfit
+    assert np.abs(normal).max() < 1e-16  # the misfit is orthogonal to what can be fitted
+    assert (found.residual_rms < found.residual).all()
+    assert found.residual.max() < 0.02 * found.before.max()
+
+
+def test_too_few_poses_name_the_degree_that_fits():
+    with pytest.raises(TwinError, match="needs 5 positions, the poses have 3") as caught:
+        fit_correction(grid_errors(3), CARTESIAN, (2, 4, 2))
+    assert "--degree 2" in str(caught.value)
+
+
+def test_along_one_screw_with_and_without_a_constant():
+    z = np.linspace(-0.4, 0.4, 5)[:, None]
+    bearing = -0.5
+    from_bearing = z - bearing
+    shape = 1e-6 * (60.0 * from_bearing - 30.0 * from_bearing**2 + 10.0 * from_bearing**4)
+    values = np.hstack([np.zeros((5, 2)), shape])
+    errors = PoseErrors(("z",), (z[:, 0],), z, values)
+    assert default_degrees(errors) == (4,)
+    (axis,) = normalised_axes("z", z, (4,))
+    held = fit_without_constant(axis, bearing, z, values)
+    np.testing.assert_allclose(held(z), values, atol=1e-17)  # four coefficients, five poses, the true shape
+    # four supporting positions are met exactly (paper 001, 1.16), and the bearing too
+    noisy = values[1:] + 1e-6 * np.random.default_rng(1).standard_normal((4, 3))
+    four = NormalisedAxis("z", 0.1, 0.3, 4)  # all of z[1:]
+    exact = fit_without_constant(four, bearing, z[1:], noisy)
+    np.testing.assert_allclose(exact(z[1:]), noisy, atol=1e-17)
+    s_zero = (bearing - four.centre) / four.half_range
+    np.testing.assert_allclose(exact.coefficients @ s_zero ** np.arange(5), 0.0, atol=1e-17)
+    # a bearing that moves by 7 um: with a constant nothing is left, without it something is (E-001-3)
+    moved = PoseErrors(("z",), (z[:, 0],), z, values + np.array([0.0, 0.0, 7e-6]))
+    along_z = np.array([[0.0], [0.0], [1.0]])
+    assert quality(fit_correction(moved, along_z), moved).residual[2] < 1e-15
+    assert quality(fit_correction(moved, along_z, (2,), zero_at=bearing), moved).residual[2] > 0.5e-6
+
+
+def test_no_constant_is_for_one_axis_and_the_full_form():
+    with pytest.raises(TwinError, match="along one axis"):
+        fit_correction(grid_errors(3), CARTESIAN, zero_at=0.0)
+
+
+def test_offsets_cancel_the_error_to_first_order(capsys):
+    errors = grid_errors(3)
+    correction = fit_correction(errors, CARTESIAN)
+    offsets = correction.offsets(errors.poses)
+    np.testing.assert_allclose(offsets, -errors.tcp * np.array([1.0, -1.0, 1.0]), atol=1e-18)
+    np.testing.assert_allclose([correction.offset(p) for p in errors.poses], offsets, atol=1e-18)
+    left = corrected_error(correction, errors, errors.poses)
+    gradient = 40e-6  # of the field per metre: the machine now stands up to 40 um elsewhere
+    assert 0.0 < np.abs(left).max() < 3.0 * gradient * np.abs(errors.tcp).max()  # nanometres, of second order
+    # first order: with the error scaled down by ten, a hundredth is left
+    small = PoseErrors(errors.axes, errors.grid, errors.poses, errors.tcp / 10.0)
+    less = corrected_error(fit_correction(small, CARTESIAN), small, small.poses)
+    np.testing.assert_allclose(np.abs(less).max(), np.abs(left).max() / 100.0, rtol=1e-3)
+    # in between the polynomial misses the true field; the poses cannot know
+    places = np.random.default_rng(0).uniform(0.0, 1.0, (200, 3))
+    moved = correction.offsets(places)
+    rest = bent(places + moved) + moved @ CARTESIAN.T
+    with capsys.disabled():
+        print(f"\n  left at the poses {1e9 * np.abs(left).max():.2g} nm, in between {1e6 * np.abs(rest).max():.2f} um "
+              f"of {1e6 * np.abs(errors.tcp).max():.0f} um")  # fmt: skip
+    assert np.abs(rest).max() < 0.05 * np.abs(errors.tcp).max()
+    again = quality(correction, errors)
+    np.testing.assert_allclose(again.after, np.abs(left).max(axis=0))
+
+
+def test_tilt_stays_and_is_reported():
+    rng = np.random.default_rng(3)
+    error = np.hstack([1e-5 * rng.standard_normal((4, 3)), 2e-5 * rng.standard_normal((4, 3))])  # m, rad
+    jacobian = np.vstack([CARTESIAN, np.zeros((3, 3))])  # linear axes turn nothing
+    rest = uncorrectable(jacobian, error)
+    np.testing.assert_allclose(rest[:, :3], 0.0, atol=1e-19)
+    np.testing.assert_allclose(rest[:, 3:], error[:, 3:])
+    np.testing.assert_allclose(offset_matrix(jacobian)[:, :3], -CARTESIAN)
+
+
+def test_missing_axes_leave_their_direction():
+    error = np.array([[3e-6, -4e-6, 5e-6]])
+    skew = np.array([[1.0, 0.0], [0.0, 0.0], [1.0, 1.0]]) / np.array([np.sqrt(2.0), 1.0])  # not at right angles
+    np.testing.assert_allclose(uncorrectable(skew, error), [[0.0, -4e-6, 0.0]], atol=1e-20)
+    offset = error @ offset_matrix(skew).T
+    np.testing.assert_allclose(error + offset @ skew.T, [[0.0, -4e-6, 0.0]], atol=1e-20)
+    with pytest.raises(ModelError, match="same way"):
+        offset_matrix(np.array([[1.0, -1.0], [0.0, 0.0], [0.0, 0.0]]))
+
+
+def test_rotary_axes_take_up_a_tilt():
+    # an x axis and a table that turns about y, 0.2 m below the TCP
+    jacobian = np.array([[1.0, 0.2], [0, 0], [0, 0], [0, 0], [0, 1.0], [0, 0]])
+    error = np.array([[4e-6, 0, 0, 0, 3e-5, 0]])
+    np.testing.assert_allclose(uncorrectable(jacobian, error, lever=0.5), 0.0, atol=1e-19)
+    np.testing.assert_allclose(error @ offset_matrix(jacobian, lever=0.5).T, [[-4e-6 + 0.2 * 3e-5, -3e-5]])
+
+
+@pytest.mark.parametrize("path", ["models/five_axis", "tests/machines/slide"])
+def test_axes_of_the_artefact_agree_with_the_kinematics_of_the_description(path, pytestconfig):
+    import tomllib
+
+    machine = load_machine(pytestconfig.rootpath / path)
+    written = tomllib.loads((pytestconfig.rootpath / path / "machine.toml").read_text(encoding="utf-8"))
+    body = {part: b.name for b in bodies_of(machine) for part in b.parts}
+    sides = [body[side.surface.split(".")[0]] for side in (machine.tcp.tool, machine.tcp.work)]
+    for axis in linear_axes(machine):
+        moved = moved_bodies(machine, axis)
+        assert _tool_sign(written, axis) == int(sides[0] in moved) - int(sides[1] in moved) != 0
+        assert np.linalg.norm(direction(machine, axis)) == pytest.approx(1.0)
+
+
+def test_side_of_a_lumped_machine():
+    written = {
+        "nodes": {"table": {}, "nut": {}},
+        "bars": {"screw": {}},
+        "axes": {"x": {"carries": ["nut"]}},
+        "contacts": {
+            "nut": {"kind": "moving", "axis": "x", "pairs": [["screw", "nut"]]},
+            "table": {"kind": "fixed", "surfaces": ["table", "nut"]},
+        },
+        "tcp": {"screws": {"screw": "tool"}},
+    }
+    assert _tool_sign(written, "x") == 1
+    written["tcp"]["screws"]["screw"] = "work"
+    assert _tool_sign(written, "x") == -1
+    written["axes"]["x"]["carries"] = ["screw"]  # the screw travels, the nut with the work stands still
+    assert _tool_sign(written, "x") == 1
+
+
+def test_file_comes_back(tmp_path):
+    errors = grid_errors(3)
+    for form in ("full", "product"):
+        correction = fit_correction(errors, CARTESIAN, form=form)
+        path = tmp_path / f"{form}.json"
+        write_correction(path, correction, quality(correction, errors), {"machine": "m"})
+        back = read_correction(path)
+        assert back.form == form
+        np.testing.assert_array_equal(back.offsets(errors.poses), correction.offsets(errors.poses))
+    told = json.loads((tmp_path / "full.json").read_text())
+    # as the file says how: by its numbers alone
+    place = np.array([0.2, 0.7, 0.4])
+    s = [(p - a["centre_m"]) / a["half_range_m"] for p, a in zip(place, told["axes"], strict=True)]
+    terms = [np.prod([v**e for v, e in zip(s, exponents, strict=True)]) for exponents in told["exponents"]]
+    error = [np.dot(terms, c) for c in told["coefficients_m"]]
+    full = fit_correction(errors, CARTESIAN)
+    np.testing.assert_allclose(np.dot(told["offset_per_error"], error), full.offset(place), atol=1e-18)
+    (tmp_path / "other.json").write_text("{}")
+    with pytest.raises(TwinError, match="not a correction"):
+        read_correction(tmp_path / "other.json")
+
+
+def call(*arguments):
+    return CliRunner().invoke(command, [str(a) for a in arguments], catch_exceptions=False)
+
+
+def test_command(slide_artefact, slide_result, tmp_path):
+    path = tmp_path / "correction.json"
+    told = call(slide_artefact, slide_result, "-o", path)
+    assert told.exit_code == 0
+    assert "15 coefficients in full form for x" in told.output
+    assert "in directions that no axis moves in" in told.output
+    digest = read_artefact(slide_artefact).digest
+    errors, at = read_pose_errors(slide_result, digest)
+    with h5py.File(slide_result / "result.h5") as f:
+        np.testing.assert_array_equal(errors.tcp, f["tcp"][-1])
+        assert at == f["time"][-1] - f["time"][0]
+    correction = read_correction(path)
+    written = json.loads(path.read_text())
+    assert written["tool_motion_per_axis_motion"] == [[1.0, 0.0, 0.0]]  # the plate with the tool is on the slide
+    assert written["artefact"] == digest
+    assert np.abs(errors.tcp[:, 0]).max() > 1e-7
+    # five poses, degree four: x is cancelled at every pose, y and z stay
+    left = corrected_error(correction, errors, errors.poses)
+    assert np.abs(left[:, 0]).max() < 1e-3 * np.abs(errors.tcp[:, 0]).max()
+    np.testing.assert_allclose(left[:, 1:], errors.tcp[:, 1:], atol=1e-3 * np.abs(errors.tcp).max())
+    np.testing.assert_allclose(written["uncorrectable_um"][1:], 1e6 * np.abs(errors.tcp[:, 1:]).max(axis=0))
+    assert written["uncorrectable_um"][0] < 1e-9
+
+
+def test_command_options(slide_artefact, slide_result, tmp_path):
+    path = tmp_path / "c.json"
+    with h5py.File(slide_result / "result.h5") as f:
+        times, tcp = f["time"][...], f["tcp"][...]
+    told = call(slide_artefact, slide_result, "-o", path, "--time", f"{times[3] - times[0]} s", "--degree", "x=2")
+    assert "9 coefficients" in told.output
+    written = json.loads(path.read_text())
+    assert written["time_s"] == times[3] - times[0]
+    assert written["before_um"] == pytest.approx((1e6 * np.abs(tcp[3]).max(axis=0)).tolist())
+    told = call(slide_artefact, slide_result, "-o", path, "--form", "product")
+    assert "compressed" in told.output
+    told = call(slide_artefact, slide_result, "-o", path, "--zero-at", "-350 mm")
+    c = json.loads(path.read_text())
+    s = (-0.35 - c["axes"][0]["centre_m"]) / c["axes"][0]["half_range_m"]
+    np.testing.assert_allclose(np.array(c["coefficients_m"]) @ s ** np.arange(5), 0.0, atol=1e-17)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--time", "900 h"), "the run lasts"),
+        (("--time", "-1 h"), "--time"),
+        (("--degree", "z=2"), "no axis 'z'"),
+        (("--degree", "two"), "no degree"),
+        (("--degree", "7"), "needs 8 positions"),
+        (("--zero-at", "3 kg"), "--zero-at"),
+        (("--zero-at", "0 mm", "--form", "product"), "along one axis"),
+    ],
+)
+def test_bad_options_say_what_to_write(options, told, slide_artefact, slide_result, tmp_path):
+    with pytest.raises(TwinError) as caught:
+        call(slide_artefact, slide_result, "-o", tmp_path / "c.json", *options)
+    assert told in str(caught.value)
+    assert not (tmp_path / "c.json").exists()
+
+
+def test_results_of_other_artefacts_are_refused(slide_artefact, slide_result, tmp_path):
+    with pytest.raises(TwinError, match="not a result"):
+        call(slide_artefact, slide_artefact, "-o", tmp_path / "c.json")
+    with pytest.raises(TwinError, match="not a result"):
+        call(slide_artefact, tmp_path, "-o", tmp_path / "c.json")
+    shutil.copy(slide_result / "result.h5", tmp_path / "result.h5")
+    with h5py.File(tmp_path / "result.h5", "a") as f:
+        f.attrs["artefact"] = "0" * 64
+    with pytest.raises(TwinError, match="another artefact"):
+        call(slide_artefact, tmp_path, "-o", tmp_path / "c.json")

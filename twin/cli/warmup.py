@@ -1,0 +1,114 @@
+"""twin warmup: when the machine of a result has warmed up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from twin.run.warmup import History, Settling, WarmUp
+
+
+@click.command(epilog="Example: twin warmup out/experiment_a --tolerance '2 um'")
+@click.argument("result", type=click.Path())
+@click.option("--tolerance", default="1 um", show_default=True, help="of the TCP displacement")
+@click.option("--temperature", default="0.1 K", show_default=True, help="tolerance of the sensors")
+@click.option("--horizon", default="1 h", show_default=True,
+              help="settled: at the rate of the end, the drift in this time is less than the tolerance")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="machine-readable")
+def command(result: str, tolerance: str, temperature: str, horizon: str, as_json: bool) -> None:
+    """Tell when the machine of RESULT, the folder or result.h5 of a `twin run`, has warmed up.
+
+    Per TCP component (at the actual position and at the pose where it changes most) and per sensor: the time from which
+    on the value stays within the tolerance of its final value; t63 and t95, from which on it stays within 37 % and 5 %
+    of its largest distance from the final value; the drift at the end, a line through the last ten minutes. Where the
+    drift at the end is more than the tolerance in the horizon, the machine has not settled and the time is "not
+    reached": the final value is only where the run was stopped.
+    """
+    import json
+    from pathlib import Path
+
+    from twin.cli.quantity import positive
+    from twin.run.warmup import read_history, warm_up
+
+    band, kelvin = positive("--tolerance", tolerance, "m"), positive("--temperature", temperature, "delta_degC")
+    ahead = positive("--horizon", horizon, "s")
+    history = read_history(Path(result))
+    found = warm_up(history, band, kelvin, ahead)
+    told = facts(history, found, {"tolerance_m": band, "tolerance_K": kelvin, "horizon_s": ahead})
+    click.echo(json.dumps(told, indent=2) if as_json else text(result, told))
+
+
+def facts(history: History, found: WarmUp, options: dict[str, float]) -> dict[str, Any]:
+    """Everything `twin warmup` tells, as JSON values: SI units in the names, null for "not reached"."""
+
+    def entry(s: Settling, unit: str) -> dict[str, Any]:
+        return {
+            f"change_{unit}": s.change,
+            f"final_{unit}": s.final,
+            "settled": s.settled,
+            "time_s": s.time,
+            "t63_s": s.t63,
+            "t95_s": s.t95,
+            f"end_rate_{unit}_per_s": s.rate,
+        }
+
+    def pose(index: int) -> dict[str, float]:
+        return dict(zip(history.pose_axes, history.poses[index].tolist(), strict=True))
+
+    return {
+        **options,
+        "duration_s": found.duration,
+        "rate_window_s": found.window,
+        "settled": found.settled,
+        "time_s": found.time,
+        "tcp_actual": {f"d{name}": entry(s, "m") for name, s in found.actual.items()},
+        "tcp_worst": {f"d{name}": {"pose_m": pose(k), **entry(s, "m")} for name, (k, s) in found.worst.items()},
+        "sensors": {name: entry(s, "K") for name, s in found.sensors.items()},
+    }
+
+
+def text(result: str, told: dict[str, Any]) -> str:
+    """The same as a table: minutes, um and K."""
+    poses = {
+        name: "at " + (", ".join(f"{a} {1e3 * v:.0f} mm" for a, v in entry["pose_m"].items()) or "the only pose")
+        for name, entry in told["tcp_worst"].items()
+    }
+    rows: list[tuple[str, ...]] = [("", "change", "warm", "t63", "t95", "drift at the end")]
+    rows += [_row(f"{name} at the actual position", e, "m", 1e6, "um") for name, e in told["tcp_actual"].items()]
+    rows += [_row(f"{name} {poses[name]}", e, "m", 1e6, "um") for name, e in told["tcp_worst"].items()]
+    rows += [_row(name, e, "K", 1.0, "K") for name, e in told["sensors"].items()]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    table = [
+        "  ".join([row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    ]
+    settled = told["settled"]
+    verdict = (
+        f"warm after {_minutes(told['time_s'])}" if settled else f"not settled after {told['duration_s'] / 60:.0f} min"
+    )
+    worst = max(told["tcp_worst"].items(), key=lambda item: abs(item[1]["end_rate_m_per_s"]))
+    drift = 3.6e9 * worst[1]["end_rate_m_per_s"]
+    return "\n".join(
+        [
+            f"{result}: {verdict} (within {1e6 * told['tolerance_m']:g} um and {told['tolerance_K']:g} K, for "
+            f"{told['horizon_s'] / 3600:g} h); fastest drift of the TCP at the end d{worst[0][1:]} {drift:+.2f} um/h",
+            *(line.rstrip() for line in table),
+        ]
+    )
+
+
+def _row(name: str, entry: dict[str, Any], unit: str, factor: float, shown: str) -> tuple[str, ...]:
+    return (
+        name,
+        f"{factor * entry[f'change_{unit}']:.2f} {shown}",
+        _minutes(entry["time_s"]),
+        _minutes(entry["t63_s"]),
+        _minutes(entry["t95_s"]),
+        f"{3600 * factor * entry[f'end_rate_{unit}_per_s']:+.2f} {shown}/h",
+    )
+
+
+def _minutes(seconds: float | None) -> str:
+    return "not reached" if seconds is None else f"{seconds / 60.0:.0f} min"

@@ -1,0 +1,113 @@
+"""Laws that follow the machine: film coefficients by surface temperature, winding losses by winding temperature.
+
+A law that reads a temperature of the model is tabulated per step over that temperature, with all load samples of the
+step averaged (powers and coefficients, never speeds before a nonlinear law). Inside the step the table is read at the
+temperature at the step's start: lagged one step (paper 004, Fig. 5), while the film itself stays implicit (erratum
+E-000-3). Evaluating the law at mean loads inside the step was rejected: 20 % duty is not a fifth of the speed.
+
+Functions take numpy and JAX arrays alike (`xp` is numpy or jax.numpy): the full model, the compact model and the
+runtime read the very same tables.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from twin.physics.radiation import radiation_coefficient
+from twin.rom.load_model import LoadModel
+
+Array = Any
+
+# Surface minus ambient: uniform in the fourth root, in which free convection (Nu ~ Ra^(1/4)) is a straight line.
+WIDEST = 100.0  # K
+_HALF = 32
+DIFFERENCES = np.sign(np.arange(-_HALF, _HALF + 1)) * (np.arange(-_HALF, _HALF + 1) / _HALF) ** 4 * WIDEST
+# Temperature of a source's surface: copper is linear in it, viscosity changes by 1 % between two points.
+TEMPERATURES = np.linspace(-50.0, 250.0, 121)
+
+
+@dataclass(frozen=True)
+class Following:
+    """Laws tabulated per step; k laws, n steps."""
+
+    index: tuple[int, ...]  # of the films or sources, in the order of LoadModel
+    grid: np.ndarray  # (m,) DIFFERENCES [K] or TEMPERATURES [degC]
+    value: np.ndarray  # (n, k, m) W/(m^2 K) or W, gains included
+    outside: np.ndarray  # (n, k, m) bool: outside the validity of the law at some sample of the step
+
+    @classmethod
+    def none(cls, n_steps: int, grid: np.ndarray) -> Following:
+        """Nothing follows."""
+        shape = (n_steps, 0, len(grid))
+        return cls((), grid, np.zeros(shape), np.zeros(shape, dtype=bool))
+
+
+def difference_place(xp: Any, difference: Array) -> Array:
+    """Place in DIFFERENCES (0 .. 64) of a surface minus ambient temperature [K], held at the ends."""
+    root = xp.sign(difference) * xp.sqrt(xp.sqrt(xp.abs(difference) / WIDEST))
+    return xp.clip(_HALF * (1.0 + root), 0.0, 2.0 * _HALF)
+
+
+def temperature_place(xp: Any, temperature: Array) -> Array:
+    """Place in TEMPERATURES of a temperature [degC], held at the ends."""
+    step = TEMPERATURES[1] - TEMPERATURES[0]
+    return xp.clip((temperature - TEMPERATURES[0]) / step, 0.0, len(TEMPERATURES) - 1.0)
+
+
+def read_table(xp: Any, table: Array, place: Array) -> Array:
+    """Linear interpolation: table (..., k, m) at places (..., k) -> (..., k)."""
+    left = xp.clip(xp.floor(place), 0, table.shape[-1] - 2).astype(int)
+    weight = place - left
+    a = xp.take_along_axis(table, left[..., None], axis=-1)[..., 0]
+    b = xp.take_along_axis(table, left[..., None] + 1, axis=-1)[..., 0]
+    return a + weight * (b - a)
+
+
+@dataclass(frozen=True)
+class FilmPlan:
+    """What the films of a load model need besides their tables; f films, k of them following."""
+
+    environment: Array  # (f,) index
+    radiant: Array  # (f,) index
+    emissivity: Array  # (f,)
+    gradient: Array  # (f,) K/m of the air
+    height: Array  # (f,) m where the air's temperature is measured
+
+    @classmethod
+    def of(cls, load: LoadModel) -> FilmPlan:
+        air = [load.environments[f.environment] for f in load.films]
+        return cls(
+            environment=np.array([f.environment for f in load.films], dtype=np.int64),
+            radiant=np.array([f.radiant for f in load.films], dtype=np.int64),
+            emissivity=np.array([f.emissivity for f in load.films]),
+            gradient=np.array([e.gradient for e in air]),
+            height=np.array([e.height for e in air]),
+        )
+
+
+@dataclass(frozen=True)
+class FilmState:
+    """Films of a step; f films."""
+
+    total: Array  # (f,) W/(m^2 K), convection and radiation: what multiplies the affine term
+    outer: Array  # (f,) degC: the temperature outside that both together see, at height zero
+    lift: Array  # (f,) W/(m^3 K) times K: convection times gradient, multiplies H
+
+
+def film_state(
+    xp: Any, plan: FilmPlan, convection: Array, surface: Array, environment: Array, radiation: Array | float
+) -> FilmState:
+    """Coefficients of films with convection (f,) [W/(m^2 K)] at mean surface temperatures (f,) [degC].
+
+    environment (n_environments,) [degC]; radiation: 1, or 0 to switch it off. With h_c (T - T_air) + h_r (T - T_rad) =
+    (h_c + h_r)(T - T_outer), a surface needs one affine term for both.
+    """
+    air, radiant = environment[plan.environment], environment[plan.radiant]
+    radiated = radiation * radiation_coefficient(surface, radiant, plan.emissivity)
+    at_zero = air - plan.gradient * plan.height
+    total = convection + radiated
+    share = radiated / xp.where(total > 0.0, total, 1.0)
+    return FilmState(total, at_zero + share * (radiant - at_zero), convection * plan.gradient)
