@@ -7,6 +7,18 @@ from contextlib import AbstractContextManager, contextmanager
 
 import click
 
+# An interrupt that arrives inside a callback of the garbage collector (JAX has one) is printed and lost: the bar looks
+# here too.
+_interrupted = False
+
+
+def interrupt(signal: int, frame: object) -> None:
+    """A handler of SIGINT: KeyboardInterrupt now, and once more with the next advance of a bar if it got lost."""
+    global _interrupted
+    _interrupted = True
+    raise KeyboardInterrupt
+
+
 Advance = Callable[[str], None]
 Progress = Callable[[str, int], AbstractContextManager[Advance]]
 
@@ -25,6 +37,8 @@ def bar(label: str, steps: int) -> Iterator[Advance]:
     ) as progress:
 
         def advance(detail: str) -> None:
+            if _interrupted:
+                raise KeyboardInterrupt
             progress.update(1, detail[:60])
 
         yield advance

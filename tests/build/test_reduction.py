@@ -147,7 +147,11 @@ def test_the_start_of_a_scenario_is_the_air_of_the_first_measured_environment():
     load = replace(
         load,
         signals=load.signals + tuple(Signal(p, p, "degC", "value", 5.0, 35.0) for p in pits),
-        environments=(EnvironmentWiring("floor", "", 19.0), *load.environments, *(EnvironmentWiring(p, p, 20.0) for p in pits)),
+        environments=(
+            EnvironmentWiring("floor", "", 19.0),
+            *load.environments,
+            *(EnvironmentWiring(p, p, 20.0) for p in pits),
+        ),
     )
     for seed in range(3):
         scenario = draw(load, seed, hours=0.2, dt=1.0)

@@ -15,7 +15,7 @@ from twin.build.mesh import load_body_meshes
 from twin.build.surface import mass, patch
 from twin.build.thermal import assemble_thermal, part_matrices, pose_grid
 from twin.errors import DescriptionError
-from twin.machine.description import Machine, Sensor
+from twin.machine.description import Environment, Machine, Sensor
 from twin.machine.load import load_machine
 from twin.rom.model import AffineBody, MachineModel
 
@@ -158,3 +158,17 @@ def test_broken_descriptions_are_refused_before_they_are_assembled():
     said = " | ".join(p.what for p in e.value.problems)
     assert "unknown environment 'hal'" in said
     assert "'foot_1.*' is also in films.floor" in said
+
+
+def test_air_that_is_warmer_above_heats_by_the_height_of_the_surface():
+    shop = Environment(signal="shop_air", gradient=0.5, height=1.0)
+    machine = SLIDE.model_copy(update={"environment": {**SLIDE.environment, "shop": shop}})
+    model = assemble_thermal(machine, load_body_meshes(machine))
+    assert model.load_model.environments[0].gradient == 0.5
+    for body in model.bodies:
+        nodes = next(b for b in load_body_meshes(machine) if b.name == body.name).nodes
+        assert body.H is not None
+        for column, a in enumerate(body.A):
+            film = body.theta[column] < len(model.load_model.films)
+            np.testing.assert_allclose(body.H[:, column], a @ nodes[:, 2] if film else 0.0, atol=1e-15)
+    assert assemble_thermal(SLIDE, load_body_meshes(SLIDE)).bodies[0].H is None

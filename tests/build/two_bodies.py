@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.rom.load_model import AxisWiring, EnvironmentWiring, Film, Joint, LawUse, LoadModel, Pair, Rail, Signal, Source
+from twin.rom.load_model import (
+    AxisWiring,
+    EnvironmentWiring,
+    Film,
+    Joint,
+    LawUse,
+    LoadModel,
+    Pair,
+    Rail,
+    Signal,
+    Source,
+)
 from twin.rom.model import AffineBody, MachineModel
 
 STATIONS = (-0.4, -0.2, 0.0, 0.2, 0.4)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import struct
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +17,7 @@ from tests.logs.test_read import write
 from twin.cli.main import run
 from twin.errors import LogError
 from twin.logs.block_file import append, decode, encode, read_blocks
-from twin.logs.blocks import Block, Counts, Damaged, Resolver, group, in_order, resolve, tables
+from twin.logs.blocks import LEAP, Block, Counts, Damaged, Resolver, group, in_order, resolve, tables
 from twin.logs.check import check_run
 from twin.logs.compress import compress_loads
 from twin.logs.read import read_run
@@ -140,9 +143,70 @@ def test_a_sender_that_starts_anew_begins_another_stream():
 def test_a_number_far_ahead_costs_no_memory():
     made = blocks(2)
     resolver = Resolver(window=8)
-    out = [*resolver.push(made[0]), *resolver.push(replace(made[1], sequence=10**15))]
-    assert [b.sequence for b in out + resolver.finish()] == [0, 10**15]
-    assert resolver.counts == Counts(delivered=2, lost=10**15 - 1)
+    out = [*resolver.push(made[0]), *resolver.push(replace(made[1], sequence=LEAP))]
+    assert [b.sequence for b in out + resolver.finish()] == [0, LEAP]
+    assert resolver.counts == Counts(delivered=2, lost=LEAP - 1)
+
+
+@pytest.mark.parametrize("at", [0, 3, 6])
+@pytest.mark.parametrize("window", [None, 2])
+def test_one_absurd_number_is_damaged_and_loses_nothing(at: int, window: int | None):
+    made = blocks(6)
+    absurd = replace(blocks(7)[6], sequence=2**63)
+    resolved = resolve([*made[:at], absurd, absurd, *made[at:]], window)
+    assert resolved.counts == Counts(delivered=6, damaged=2)
+    assert resolved.table.columns["x"].tolist() == list(range(30))
+
+
+def test_two_numbers_from_elsewhere_are_where_the_sender_counts():
+    """A log that begins in midstream, and a sender that starts its numbers anew within a stream: nothing is lost."""
+    made = [replace(b, sequence=b.sequence + 3 * LEAP) for b in blocks(5)]
+    assert resolve(made).counts == Counts(delivered=5)
+    assert resolve([made[1], made[0], *made[2:]]).counts == Counts(delivered=5, reordered=1)
+    anew = blocks(4, start=START + 10.0)
+    resolved = resolve([*made, *anew])
+    assert resolved.counts == Counts(delivered=9, restarts=1)
+    assert len(resolved.gaps) == 1
+
+
+def test_a_repeat_from_an_ended_stream_is_repeated():
+    first, second = blocks(4, stream=1), blocks(2, start=START + 100.0, stream=2)
+    resolved = resolve([first[0], first[2], *second, first[0], first[1], first[2], first[3]])
+    assert resolved.counts == Counts(delivered=4, lost=1, repeated=2, late=2, restarts=1)
+
+
+@pytest.mark.parametrize("stream", [7, 8])
+@pytest.mark.parametrize("back", [0.02, 0.12, 0.5])
+def test_a_clock_that_steps_back_leaves_times_in_order(stream: int, back: float):
+    """Within a stream, and where a restarted sender has an earlier stamp: what was given stays, the rest is counted."""
+    made = blocks(8)
+    cut = 0 if stream == 8 else 4
+    set_back = [replace(b, stream=stream, time=b.time - back, sequence=b.sequence - 4 + cut) for b in made[4:]]
+    dropped = min(round(back / T_CORE), 20)
+    resolved = resolve([*made[:4], *set_back])
+    restarts = int(stream == 8)
+    assert resolved.counts == Counts(delivered=8, overlapping=dropped, restarts=restarts)
+    assert f"; {dropped} overlapping records left out" in str(resolved.counts)
+    assert np.all(np.diff(resolved.table.time) > 0.9 * T_CORE)
+    assert resolved.table.columns["x"].tolist() == [*range(20), *range(20 + dropped, 40)]
+    assert len(resolved.gaps) == 0
+    resolver = Resolver(window=2)  # live, piece by piece
+    pieces = list(tables(in_order([*made[:4], *set_back], resolver)))
+    assert np.array_equal(np.concatenate([p.time for p in pieces]), resolved.table.time)
+
+
+@given(st.lists(st.floats(-0.2, 0.2), min_size=8, max_size=8))
+def test_no_clock_makes_times_go_back(errors: list[float]):
+    resolved = resolve([replace(b, time=b.time + e) for b, e in zip(blocks(8), errors, strict=True)])
+    there = np.isfinite(resolved.table.columns["x"])
+    assert np.all(np.diff(resolved.table.time) > 0)
+    assert np.count_nonzero(there) + resolved.counts.overlapping == 40
+    assert np.all(np.diff(resolved.table.columns["x"][there]) > 0)
+
+
+def test_a_trembling_clock_costs_nothing():
+    trembling = [replace(b, time=b.time + (-0.4 if b.sequence % 2 else 0.0) * T_CORE) for b in blocks(6)]
+    assert resolve(trembling).counts == Counts(delivered=6)
 
 
 def test_columns_may_not_change():
@@ -193,6 +257,38 @@ def test_any_damaged_byte_costs_its_own_block_only(data: st.DataObject):
     assert sum(isinstance(b, Damaged) for b in back) == 1
 
 
+def framed(text: bytes, records: int = 2, columns: int = 2, time: float = START, interval: float = T_CORE) -> bytes:
+    """A frame with right checksums, whatever it says."""
+    head = struct.pack("<QQddIHI", 7, 1, time, interval, records, columns, len(text))
+    body = text + np.zeros(records * columns).tobytes()
+    return b"TWB1" + head + struct.pack("<I", zlib.crc32(head)) + body + struct.pack("<I", zlib.crc32(body))
+
+
+GOOD = json.dumps([["x", "m"], ["i", "A"]]).encode()
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        framed(b"5"), framed(b"null"), framed(b""), framed(b"{}"), framed(b'"ab"'), framed(b"[5, 6]"), framed(b"\xff"),
+        framed(b"[" * 100_000 + b"]" * 100_000), framed(b"9" * 5000), framed(b'["xm", "iA"]'), framed(b"[[], []]"),
+        framed(b'[["x", "m"], ["i", null]]'), framed(b'[["x", "m"], ["\\ud800", "A"]]'),
+        framed(b'[["x", "m"], ["x", "A"]]'), framed(b'[["x", "m"]]'), framed(b'[["x", "m"], ["i", "A"], ["v", "A"]]'),
+        framed(b"[]", columns=0), framed(GOOD, records=0), framed(GOOD, time=1e300), framed(GOOD, time=np.nan),
+        framed(GOOD, interval=0.0), framed(GOOD, interval=1e300), framed(GOOD, interval=np.nan),
+    ],
+    ids=lambda frame: "frame",
+)  # fmt: skip
+def test_sound_frames_without_sense_are_one_damaged_block_each(tmp_path: Path, frame: bytes):
+    made = blocks(3)
+    (tmp_path / "shift.twb").write_bytes(encode(made[0]) + frame + encode(made[1]) + frame + encode(made[2]))
+    whole, counts, _ = unpack(tmp_path / "shift.twb")
+    assert counts == Counts(delivered=3, damaged=2)
+    assert whole.loads.columns["x"].tolist() == list(range(15))
+    assert len(list(decode(framed(GOOD)))) == 1
+    assert isinstance(next(decode(framed(GOOD))), Block)
+
+
 def test_writing_goes_on_after_a_crash(tmp_path: Path):
     path, made = tmp_path / "shift.twb", blocks(4)
     append(path, made[0])
@@ -239,6 +335,20 @@ def test_unpack_writes_a_run(tmp_path: Path, capsys):
     assert any("lacks 1 of" in what for what in found)
     assert run(["unpack", str(path), "-o", str(tmp_path / "run")]) == 2  # measured data are never replaced
     assert "measured data" in capsys.readouterr().err
+
+
+def test_unpack_tells_of_a_clock_set_back(tmp_path: Path, capsys):
+    made = blocks(20)
+    set_back = [replace(b, time=b.time - 0.32) for b in made[10:]]
+    path = sent(tmp_path / "shift.twb", [*made[:10], *set_back])
+    assert run(["unpack", str(path), "-o", str(tmp_path / "run")]) == 0
+    said = "20 delivered; 32 overlapping records left out"
+    assert said in capsys.readouterr().out
+    loads = read_run(tmp_path / "run")
+    assert said in loads.provenance
+    assert np.all(np.diff(loads.loads.time) > 0)
+    assert len(loads.loads.time) == 100 - 32
+    assert not [p.what for p in check_run(loads) if "increase" in p.what]
 
 
 def test_unpack_to_means_is_the_compressed_log(tmp_path: Path):

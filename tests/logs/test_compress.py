@@ -104,6 +104,17 @@ def test_dwell_of_an_even_sweep_and_of_rest():
     assert beyond.sum() == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("at", [0.0, 0.3, 0.5, 1.0])
+def test_a_rest_on_a_border_keeps_its_share(at: float):
+    """On the last one too, where an axis rests at the end of its stroke."""
+    borders = np.array([0.0, 0.3, 0.5, 1.0])
+    time = np.array([0.0, 1.0, 3.0])
+    share = dwell_shares(time, np.array([0.1, at, at]), np.array([0.0, 1.0, 3.0, 4.0]), borders)
+    assert share.sum(axis=1) == pytest.approx(np.ones(3), abs=1e-15)
+    assert share[1].max() == share[2].max() == 1.0
+    assert np.argmax(share[1]) == {0.0: 0, 0.3: 1, 0.5: 2, 1.0: 2}[at]
+
+
 def test_dwell_is_the_mean_along_the_path():
     rng = np.random.default_rng(1)
     time = np.cumsum(rng.uniform(0.01, 0.1, 400))

@@ -42,3 +42,18 @@ def test_unused_entries_are_warned_of(tmp_path: Path):
     (problem,) = check_machine(load_machine(path))
     assert problem.warning
     assert "signals.spare" in problem.where
+
+
+def test_a_joint_law_outside_its_validity_is_warned_of(tmp_path: Path):
+    joint = (
+        'surfaces = ["bed.z_min", "foot_1.z_max"]\n[contacts.foot_1.joint]\nlaw = "bolted_joint"\n'
+        "[contacts.foot_1.joint.parameters]\n"
+        'conductivity_1 = "50 W/(m*K)"\nconductivity_2 = "45 W/(m*K)"\nroughness_1 = "1.6 um"\n'
+        'roughness_2 = "1.6 um"\nslope_1 = 0.15\nslope_2 = 0.15\nhardness = "2.6 GPa"\npressure = "5 MPa"'
+    )
+    old = 'surfaces = ["bed.z_min", "foot_1.z_max"]\nconductance = "2000 W/(m^2*K)"'
+    assert check_machine(load_machine(edited(tmp_path, (old, joint)))) == []
+    (problem,) = check_machine(load_machine(edited(tmp_path, (old, joint.replace("5 MPa", "500 MPa")))))
+    assert problem.warning
+    assert "contacts.foot_1" in problem.where
+    assert "p/H" in problem.what

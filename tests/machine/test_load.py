@@ -102,6 +102,37 @@ def test_each_mistake_is_one_problem_at_its_place(tmp_path, old, new, place, say
     assert problem.remedy
 
 
+_SWITCHED = (
+    "[environment.shop]",
+    '[signals.cabinet]\nunit = "1"\nrange = [0, 1]\n\n[sources.cabinet]\nsurface = "bed.x_min"\n'
+    'law = "switched_heat"\nparameters = { power = "80 W" }\nsignals = { switch = "cabinet" }\n\n[environment.shop]',
+)
+
+
+@pytest.mark.parametrize("wide", ["[0, 100]", "[-1, 1]"])
+def test_signals_stay_within_what_an_argument_can_be(tmp_path, wide):
+    """A switch in percent would make a hundred times the heat."""
+    assert load_machine(edited(tmp_path, _SWITCHED)).sources["cabinet"].law == "switched_heat"
+    percent = (_SWITCHED[0], _SWITCHED[1].replace("[0, 1]", wide))
+    (problem,) = problems_of(edited(tmp_path, percent))
+    assert "sources.cabinet.signals.switch (line" in problem.where
+    assert "outside 0 .. 1" in problem.what
+    assert "signals.cabinet.range" in problem.remedy
+
+
+def test_temperatures_that_are_wired_stay_above_absolute_zero(tmp_path):
+    """A range in the wrong unit: kelvin below zero."""
+    warm = ('law = "motor_copper"', 'law = "motor_winding"')
+    wired = ('{ current = "x_current" }', '{ current = "x_current", temperature = "winding" }')
+    for low, found in (("-273.15", 0), ("-300", 1)):
+        sensor = f'[signals.winding]\nunit = "degC"\nrange = [{low}, 150]\n\n[environment.shop]'
+        path = edited(tmp_path, warm, wired, ("[environment.shop]", sensor))
+        problems = problems_of(path) if found else load_machine(path) and []
+        assert len(problems) == found
+        assert all("sources.x_motor.signals.temperature" in p.where for p in problems)
+        assert all("outside -273.15" in p.what for p in problems)
+
+
 def test_missing_mesh_file_names_the_one_beside_it(tmp_path):
     (tmp_path / "plate.msh").write_text("")
     path = edited(

@@ -2,12 +2,13 @@
 
 import math
 
+import jax
 import numpy as np
 import pytest
 
 from twin.physics import forced_convection as forced
 from twin.physics import free_convection as free
-from twin.physics import nusselt_free
+from twin.physics import nusselt_forced, nusselt_free
 from twin.physics.air import air
 from twin.physics.laws import LAWS
 
@@ -116,6 +117,57 @@ def test_mixed_flow_at_rest_is_free_and_fast_is_forced():
     assert np.all(np.diff(np.asarray(forced.mixed_plate(speeds, 30.0, 20.0, 0.2, 0.5))) >= 0.0)
 
 
+@pytest.mark.parametrize("way", ["up", "down"])
+@pytest.mark.parametrize(("surface", "ambient"), [(40.0, 20.0), (20.0, 40.0)])
+def test_mixed_flow_along_horizontal_surfaces(way, surface, ambient):
+    """By hand at a film of 30 degC; warm or cold, the free part is that of the free law."""
+    mixed, alone = LAWS[f"mixed_horizontal_{way}"].function, LAWS[f"free_horizontal_{way}"].function
+    free_part = float(alone(surface, ambient, 0.1))
+    still = mixed(0.0, surface, ambient, 0.3, 0.1)
+    assert still == pytest.approx(free_part, rel=1e-12)
+    speed = -0.3  # either part counts
+    forced_part = float(forced.forced_plate(speed, surface, ambient, 0.3))
+    assert 0.4 < forced_part / free_part < 3.0
+    h = mixed(speed, surface, ambient, 0.3, 0.1)
+    assert h == pytest.approx((forced_part**3 + free_part**3) ** (1 / 3), rel=1e-9)
+    gas = air(30.0)
+    pr = float(gas.prandtl)
+    f1, f2 = (1 + (0.492 / pr) ** (9 / 16)) ** (-16 / 9), (1 + (0.322 / pr) ** (11 / 20)) ** (-20 / 11)
+    ra = 9.80665 / 303.15 * 20.0 * 0.1**3 / float(gas.viscosity * gas.diffusivity)
+    hot_up = (surface > ambient) == (way == "up")
+    nu = 0.15 * (ra * f2) ** (1 / 3) if hot_up else 0.6 * (ra * f1) ** 0.2
+    assert free_part == pytest.approx(nu * float(gas.conductivity) / 0.1, rel=1e-6)
+
+
+def test_mixed_flow_across_a_cylinder():
+    free_part = float(free.free_horizontal_cylinder(30.0, 20.0, 0.05))
+    assert forced.mixed_cylinder(0.0, 30.0, 20.0, 0.05) == pytest.approx(free_part, rel=2e-3)
+    forced_part = float(forced.forced_cylinder(0.2, 30.0, 20.0, 0.05))
+    assert 0.4 < forced_part / free_part < 3.0
+    for speed in (0.2, -0.2):
+        h = forced.mixed_cylinder(speed, 30.0, 20.0, 0.05)
+        assert h == pytest.approx((forced_part**3 + free_part**3) ** (1 / 3), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("law", "correlation", "sizes"),
+    [
+        (forced.forced_plate, nusselt_forced.plate, (0.1,)),
+        (forced.forced_cylinder, nusselt_forced.cylinder, (0.1,)),
+        (forced.forced_bar, lambda re, pr: nusselt_forced.bar(re, pr, 0.102, 0.675), (0.1, 0.102, 0.675)),
+    ],
+)
+def test_forced_laws_are_their_correlation_down_to_the_end_of_its_range(law, correlation, sizes):
+    gas = air(25.0)
+    nu, k, pr = float(gas.viscosity), float(gas.conductivity), float(gas.prandtl)
+    for re, counted in ((20.0, 20.0), (10.0, 10.0), (5.0, 10.0), (0.0, 10.0)):
+        h = law(re * nu / 0.1, 30.0, 20.0, *sizes)
+        assert h == pytest.approx(float(correlation(counted, pr)) * k / 0.1, rel=1e-9)
+    gradient = jax.vmap(jax.grad(lambda v: law(v, 30.0, 20.0, *sizes)))(np.array([0.0, 10.0, 1e3]) * nu / 0.1)
+    assert np.all(np.isfinite(gradient))
+    assert gradient[0] == 0.0 < gradient[2]
+
+
 def test_a_small_difference_does_not_matter():
     """The rounding at 0.01 K is below 1e-5 of the coefficient at 1 K."""
     gas = air(22.5)
@@ -146,6 +198,15 @@ def test_a_small_difference_does_not_matter():
         ("rotating_cylinder", {"speed": 20.0, "surface": 30.0, "ambient": 20.0, "diameter": 0.1}, {"speed": -150.0}),
         ("mixed_plate",
          {"speed": 0.0, "surface": 30.0, "ambient": 20.0, "length": 0.5, "height": 1.0}, {"speed": 350.0}),
+        *((f"mixed_horizontal_{way}",
+           {"speed": 0.0, "surface": 30.0, "ambient": 20.0, "length": 0.5, "area_over_perimeter": 0.1}, change)
+          for way, change in (("up", {"speed": 350.0}), ("down", {"speed": 350.0}), ("down", {"surface": 150.0}),
+                              ("down", {"area_over_perimeter": 0.01}))),
+        ("mixed_horizontal_up",
+         {"speed": 0.0, "surface": 10.0, "ambient": 20.0, "length": 0.5, "area_over_perimeter": 0.1},
+         {"area_over_perimeter": 0.01}),
+        ("mixed_cylinder", {"speed": 0.0, "surface": 30.0, "ambient": 20.0, "diameter": 0.1}, {"speed": -2000.0}),
+        ("mixed_cylinder", {"speed": 0.0, "surface": 30.0, "ambient": 20.0, "diameter": 0.1}, {"diameter": 12.0}),
         ("mixed_rotating_cylinder",
          {"speed": 0.0, "surface": 30.0, "ambient": 20.0, "diameter": 0.1}, {"speed": 150.0}),
     ],

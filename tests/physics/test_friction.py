@@ -7,6 +7,7 @@ import pytest
 
 from tests.physics.points import BEARING, SCREW
 from twin.physics import bearings, guides, heat, screws, spindle
+from twin.physics.laws import LAWS
 
 
 def test_guide_friction():
@@ -80,6 +81,18 @@ def test_screws_with_preload():
 def test_self_locking_screws_are_flagged():
     assert bool(screws.screw_back_driven_holds(0.2, 500.0, 0.0, **SCREW))
     assert not bool(screws.screw_back_driven_holds(0.2, 500.0, 0.0, 0.025, 0.01, 0.2))
+
+
+def test_screws_without_efficiency_are_flagged():
+    """L = 2 pi d, tan(phi) = 2: from mu = 1 / 2 on no torque turns the screw, and the formula gives negative heat."""
+    steep = {"speed": 0.2, "force": 500.0, "preload": 0.0, "diameter": 0.01, "lead": 0.02 * math.pi}
+    holds = LAWS["screw_friction"].validity.holds
+    for friction, inside in ((0.49, True), (0.51, False)):
+        assert bool(holds(**steep, friction=friction)) == inside
+        assert bool(screws.screw_back_driven_holds(**steep, friction=friction)) == inside
+        assert (screws.screw_friction(**steep, friction=friction) > 0.0) == inside
+        assert (0.0 < screws.screw_efficiency(0.01, 0.02 * math.pi, friction) <= 1.0) == inside
+    assert bool(holds(0.2, 500.0, 0.0, **(SCREW | {"friction": 0.0})))
 
 
 def test_bearing_friction():

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from synthetic import oblique
 
 from tests.build import two_bodies
 from twin.build.stepper import CoupledStepper
+from twin.errors import ModelError
 from twin.physics.laws import LAWS
 from twin.physics.radiation import radiation_coefficient
 from twin.rom.drive import evaluate
@@ -25,6 +27,7 @@ from twin.run.system import prepare
 
 PLATE = LawUse("free_vertical_plate", {"height": 0.4}, {})
 MIXED = LawUse("mixed_plate", {"length": 0.3, "height": 0.4}, {"speed": "speed"})
+HEIGHT = np.zeros(2)
 WINDING = LawUse("motor_winding", {"resistance": 1.2, "coefficient": 0.00393}, {"current": "current"})
 
 
@@ -216,9 +219,11 @@ def loads(model, hours=2.0):
     return evaluate(model.load_model, time, signals, 60.0)
 
 
+@pytest.mark.parametrize("projection", ["galerkin", "oblique"])
 @pytest.mark.parametrize(("follow", "tolerance"), [(0.0, 1e-9), (0.2, 2e-3)])
-def test_both_steppers_alike_with_every_law_following(follow, tolerance):
+def test_both_steppers_alike_with_every_law_following(follow, tolerance, projection):
     model = following_machine()
+    model = oblique(model) if projection == "oblique" else model
     drive = loads(model)
     assert drive.films.index == (0, 1)
     assert drive.losses.index == (0,)
@@ -258,12 +263,74 @@ def test_coefficients_outside_the_certificate_and_the_law_are_flagged():
     drive = loads(model)
     prepared = prepare(model)
     steps = march(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(19.0))
-    flags = following_flags(model.load_model, drive, steps.theta, steps.surface, steps.winding)
+    flags = following_flags(model.load_model, drive, steps.theta, steps.surface, HEIGHT, steps.winding)
     assert flags["films.bed below 12 W/(m^2*K)"].any()
     assert not flags["films.bed above 40 W/(m^2*K)"].any()
     text = LAWS["free_vertical_plate"].validity.text
     assert not flags[f"films.bed: law outside {text}"].any()
     hot = replace(drive, films=replace(drive.films, outside=np.ones_like(drive.films.outside)))
-    assert following_flags(model.load_model, hot, steps.theta, steps.surface, steps.winding)[
+    assert following_flags(model.load_model, hot, steps.theta, steps.surface, HEIGHT, steps.winding)[
         f"films.bed: law outside {text}"
     ].any()
+
+
+def test_a_steady_state_is_found_where_plain_iteration_diverges():
+    """A warm bearing: its loss falls so steeply with temperature that the map from state to state swings."""
+    still = LawUse("constant_film", {"natural": 10.0}, {})
+    oil = {"f0": 2.0, "viscosity_40": 68e-6, "viscosity_100": 9e-6, "diameter": 0.1, "f1": 2.5e-4, "load": 500.0}
+    bearing = LawUse("bearing_friction_warm", oil, {"speed": "speed"})
+    model = plate([Film("plate", still, 0, 1.0, 50.0)], [Source("bearing", bearing, 1.0, "", 0.0)])
+    time = np.arange(0.0, 40 * 3600.0, 60.0)
+    signals = {"air": np.full(len(time), 20.0), "speed": np.full(len(time), 100.0), "current": np.zeros(len(time))}
+    drive = evaluate(model.load_model, time, signals, 60.0)
+    stepper = CoupledStepper(model)
+    *_, (_, x, _) = stepper.run(drive, stepper.uniform(20.0))
+    assert 40.0 < 20.0 + x[0][0] < 120.0
+    np.testing.assert_allclose(stepper.steady_state(drive, 0)[0], x[0], atol=1e-3)
+
+
+def test_no_steady_state_is_told():
+    from twin.build.fixed_point import fixed_point
+
+    with pytest.raises(ModelError, match="no steady state within 30 turns"):
+        fixed_point(lambda x: x + 1.0, np.zeros(3), lambda r: float(np.abs(r).max()), 1e-6, 30)
+
+
+@pytest.mark.parametrize("wired", ["surface", "ambient"])
+def test_a_measured_temperature_may_stand_in_for_a_state(wired):
+    use = replace(PLATE, signals={wired: "measured"})
+    both = (Film("plate", use, 0, 1.0, 50.0), Film("other", PLATE, 0, 1.0, 50.0))
+    model = plate(both)
+    time = np.arange(0.0, 1800.0, 10.0)
+    measured = np.full(len(time), 45.0)
+    signals = {"air": np.full(len(time), 20.0), "measured": measured, "current": 0 * time, "speed": 0 * time}
+    drive = evaluate(model.load_model, time, signals, 60.0)
+    prepared = prepare(model)
+    steps = march(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(50.0))
+    surface, ambient = (45.0, 20.0) if wired == "surface" else (50.0, 45.0)
+    # the table lies around the environment's air, not around the measured one: coarse where the law has its kink
+    assert steps.theta[0, 0] == pytest.approx(free(surface, ambient), rel=0.03)
+    assert steps.theta[0, 1] == pytest.approx(free(50.0, 20.0), rel=2e-3)
+
+
+@pytest.mark.parametrize(("start", "flagged"), [(60.0, False), (190.0, True), (500.0, True), (3000.0, True)])
+def test_a_surface_beyond_the_table_is_flagged(start, flagged):
+    model = plate([Film("plate", PLATE, 0, 1.0, 50.0)])
+    time = np.arange(0.0, 600.0, 10.0)
+    drive = evaluate(model.load_model, time, {"air": 0 * time + 20.0, "current": 0 * time, "speed": 0 * time}, 60.0)
+    prepared = prepare(model)
+    steps = march(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(start))
+    flags = following_flags(model.load_model, drive, steps.theta, steps.surface, HEIGHT[:1], steps.winding)
+    (law,) = (flag for name, flag in flags.items() if "law outside" in name)
+    assert law[0] == law.any() == flagged
+
+
+def test_a_law_sees_the_air_at_the_height_of_its_surface():
+    room = (EnvironmentWiring("room", "air", 20.0, gradient=2.0),)
+    model = plate([Film("plate", PLATE, 0, 0.1, 50.0)], environments=room, heights=(3.0,))
+    time = np.arange(0.0, 120.0, 10.0)
+    drive = evaluate(model.load_model, time, {"air": 0 * time + 20.0, "current": 0 * time, "speed": 0 * time}, 60.0)
+    stepper, prepared = CoupledStepper(model), prepare(model)
+    assert stepper.loads(drive, 0, stepper.uniform(26.5)).theta[0] == pytest.approx(free(26.5, 26.0), rel=0.02)
+    steps = march(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(26.5))
+    assert steps.theta[0, 0] == pytest.approx(free(26.5, 26.0), rel=0.02)

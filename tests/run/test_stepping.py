@@ -118,7 +118,8 @@ def test_heat_in_is_heat_stored_at_every_position(model):
 
 
 def test_a_machine_at_the_temperature_of_its_surroundings_stays_there(model):
-    load = replace(model.load_model, environments=(EnvironmentWiring("hall", "ambient", 20.0), EnvironmentWiring("pit", "", 26.0)))
+    air = (EnvironmentWiring("hall", "ambient", 20.0), EnvironmentWiring("pit", "", 26.0))
+    load = replace(model.load_model, environments=air)
     model = replace(model, load_model=load)
     still = {name: np.zeros_like(values) for name, values in SIGNALS.items()} | {"ambient": np.full(len(TIME), 26.0)}
     still |= {axis.position: SIGNALS[axis.position] for axis in load.axes}

@@ -164,7 +164,8 @@ def oblique(model: MachineModel, seed: int = 2) -> MachineModel:
         bodies.append(
             replace(
                 body, E=left @ body.E, A0=left @ body.A0, A=tuple(left @ a for a in body.A), M=left @ body.M,
-                B=left @ body.B, P=left @ body.P, P_out=body.P,
+                B=left @ body.B, P=left @ body.P, P_out=body.P, B_out=body.B,
+                H=None if body.H is None else left @ body.H,
             )
         )  # fmt: skip
     return replace(model, bodies=tuple(bodies))

@@ -95,7 +95,9 @@ def galerkin(rich: MachineModel, snapshots: list[np.ndarray], states: int, unit:
     modes, values = [], []
     for body, X in zip(rich.bodies, snapshots, strict=True):
         L = np.linalg.cholesky(_weight(body, unit))
-        U, s, _ = np.linalg.svd(L.T @ _without_mean(body, X), full_matrices=False)
+        # there are many more snapshots than states, and their coefficients are not asked for
+        (R,) = scipy.linalg.qr((L.T @ _without_mean(body, X)).T, mode="r", overwrite_a=True, check_finite=False)
+        U, s, _ = np.linalg.svd(R[: X.shape[0]].T, full_matrices=False)
         modes.append(scipy.linalg.solve_triangular(L.T, U, lower=False))
         values.append(s / np.sqrt(X.shape[1]))
     bodies = []

@@ -38,7 +38,7 @@ class CoupledMachine:
 
     def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
         """TCP rows (3, n_nodes_b) [m/K] per body, by one factorisation and three adjoint solves."""
-        X = factorize(self.stiffness(positions)).solve(self.U @ self.system.tcp_rows(positions).T)
+        X = factorize(self.stiffness(positions), refine=2).solve(self.U @ self.system.tcp_rows(positions).T)
         rows = tuple(np.split((self.KT.T @ X).T, self.first_nodes[1:-1], axis=1))
         for b, nodes, growth in self.system.scale_rows(positions):
             rows[b][:, nodes] += growth
@@ -47,7 +47,7 @@ class CoupledMachine:
     def field(self, positions: Positions, fields: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
         """Displacements (n_nodes_b, 3) [m] per body of T - T_ref (n_nodes_b,) [K] per body, nuts as datum."""
         load = self.KT @ np.concatenate(fields)
-        u = factorize(self.stiffness(positions)).solve(load[:, None])[:, 0]
+        u = factorize(self.stiffness(positions), refine=2).solve(load[:, None])[:, 0]
         return tuple(np.split(u.reshape(-1, 3), self.first_nodes[1:-1]))
 
     def displacement(self, positions: Positions, fields: Sequence[np.ndarray]) -> np.ndarray:

@@ -13,6 +13,7 @@ import os
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -54,13 +55,19 @@ class Factor(ABC):
 
 
 def factorize(
-    A: sp.csr_array, rhs_hint: int | None = None, solver: str | None = None, null_space: np.ndarray | None = None
+    A: sp.csr_array,
+    rhs_hint: int | None = None,
+    solver: str | None = None,
+    null_space: np.ndarray | None = None,
+    refine: int = 0,
 ) -> Factor:
     """Factor a symmetric positive definite matrix (n, n), both triangles stored.
 
     rhs_hint: how many right-hand sides are expected, which decides between SuperLU and iterations where neither
     CHOLMOD nor PARDISO is installed. null_space: (n, k) vectors with little energy, for the iterative solver (six rigid
-    motions of an elastic body, whose unknowns are 3 * node + component); the constant by default.
+    motions of an elastic body, whose unknowns are 3 * node + component); the constant by default. refine: steps of
+    iterative refinement of PARDISO, for ill-conditioned systems (bodies held at three nodes gain two digits); each
+    costs more than a solution. A thermal system is solved to the last digits without.
 
     Raises ModelError for matrices that are not positive definite, and solvers that are unknown or not installed.
     """
@@ -76,7 +83,7 @@ def factorize(
         return _Amg(A, null_space)
     direct: dict[str, Callable[[sp.csr_array], Factor]] = {
         "cholmod": _Cholmod,
-        "pardiso": _Pardiso,
+        "pardiso": partial(_Pardiso, refine=refine),
         "superlu": _SuperLU,
     }
     return direct[name](A)
@@ -157,7 +164,7 @@ class _Pardiso(Factor):
 
     solver = "pardiso"
 
-    def __init__(self, A: sp.csr_array):
+    def __init__(self, A: sp.csr_array, refine: int = 0):
         # Same input, same bits: MKL otherwise picks kernels by memory alignment, which changes from run to run.
         os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")
         from pypardiso.pardiso_wrapper import PyPardisoError, PyPardisoSolver
@@ -172,7 +179,7 @@ class _Pardiso(Factor):
         os.environ.setdefault("PYPARDISO_MKL_RT", str(self._pardiso.libmkl._name))
         self._pardiso.set_iparm(1, 1)  # the following are ours, zeros would all mean "default"
         self._pardiso.set_iparm(2, 2)  # METIS, serial: the parallel ordering is not reproducible
-        self._pardiso.set_iparm(8, 2)  # steps of iterative refinement at most
+        self._pardiso.set_iparm(8, refine)  # steps of iterative refinement
         self._finalizer = weakref.finalize(self, self._pardiso.free_memory, everything=True)
         self._pardiso.set_phase(12)
         try:

@@ -44,7 +44,7 @@ class SupportedBody:
         self.fixed = isostatic_supports(points)
         self.free = np.setdiff1d(np.arange(3 * len(points)), self.fixed)
         modes = rigid_modes(points - points.mean(axis=0))[self.free]  # for the iterative solver only
-        self._factor = factorize(elasticity.K[self.free][:, self.free], null_space=modes)
+        self._factor = factorize(elasticity.K[self.free][:, self.free], null_space=modes, refine=1)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Displacements (3n, m) [m] of loads (3n, m) [N], zero at the supports."""

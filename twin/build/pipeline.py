@@ -34,7 +34,7 @@ VERIFY_SEED = 9000  # held-out scenarios of `twin verify`: not even the build ha
 @dataclass(frozen=True)
 class BuildOptions:
     method: Literal["galerkin", "balanced"] = "galerkin"
-    states: int = 400  # of the whole machine
+    states: int = 500  # of the whole machine
     rich: RichOptions = RichOptions()
     training: int = 90  # scenarios: two thirds long ones at twice the step, one third short ones at the substep
     held_out: int = 19

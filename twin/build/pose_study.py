@@ -45,7 +45,9 @@ def fields_of_run(
     load = full.thermal.load_model
     drive = evaluate(load, run.loads.time, signal_values(run, load.signals), dt, max(wanted))
     stepper = CoupledStepper(full.thermal)
-    start = run.initial_temperature if run.initial_temperature is not None else float(drive.environment[0, 0])
+    start = run.initial_temperature
+    if start is None:
+        start = float(drive.environment[0, load.surroundings])
     kept: dict[int, list[np.ndarray]] = {}
     with progress("full model", max(wanted)) as advance:
         for step, x, _ in stepper.run(drive, stepper.uniform(start)):
@@ -112,7 +114,7 @@ def study_grids(
     grids = []
     for counts in product(range(2, most + 1), repeat=len(low)):
         index = [np.searchsorted(share, np.arange(n) / (n - 1)) for n in counts]
-        values = table[np.ix_(range(len(exact)), *index, range(3))].reshape(len(exact), -1, 3)
+        values = table[np.ix_(np.arange(len(exact)), *index, np.arange(3))].reshape(len(exact), -1, 3)
         grid = [axis[i] for axis, i in zip(nodes, index, strict=True)]
         worst = {kind: _errors(grid, drawn, values, exact, kind) for kind in KINDS}
         grids.append(

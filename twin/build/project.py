@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse
 
 from twin.rom.model import AffineBody, Matrix
 
@@ -25,7 +26,11 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
     left = V if W is None else W
 
     def congruent(X: Matrix) -> np.ndarray:
-        R = left.T @ (X @ V)
+        if scipy.sparse.issparse(X):  # films and joints touch few nodes
+            rows = np.flatnonzero(np.diff(X.tocsr().indptr))
+            R = left[rows].T @ (X[rows] @ V)
+        else:
+            R = left.T @ (X @ V)
         return (R + R.T) / 2 if W is None else R
 
     one = left.T @ (body.E @ body.one)

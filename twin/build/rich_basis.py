@@ -33,7 +33,7 @@ class RichOptions:
     samples: int = 16  # points in (shift, films)
     shift_low: float = 1e-6  # 1/s: eleven days
     shift_high: float = 1 / 15.0  # 1/s: the shortest substep
-    tolerance: float = 3e-3  # directions below this share of a response (E-norm) are dropped
+    tolerance: float = 8e-3  # directions below this share of a response (E-norm) are dropped
     seed: int = 0
 
 

@@ -53,8 +53,8 @@ def draw(load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still
             signals[signal.name] = np.clip(centre + rng.uniform(-0.5, 0.5), signal.low, signal.high)
         else:
             signals[signal.name] = _load(rng, time, signal.low, signal.high, pattern)
-    drive = evaluate(load, time, signals, dt)
-    if film != "laws":  # whole coefficients anywhere in the box, radiation included
+    drive = evaluate(load if film == "laws" else replace(load, films=()), time, signals, dt)
+    if film != "laws":  # whole coefficients anywhere in the box, radiation included: the laws need no tables
         n = drive.n_steps
         drive = replace(
             drive, theta=_films(rng, load, n, film, dt), films=Following.none(n, DIFFERENCES), radiation=False

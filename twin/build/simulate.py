@@ -108,7 +108,7 @@ def simulate_run(
 
     mesh_size [m]: mesh anew with the model's geometry.py. TCP rows lie at the times and positions of the run's tcp.csv,
     else every `tcp_every` [s] at the logged axis positions. The machine starts at the run's initial temperature, else
-    at the first ambient value.
+    at that of the air around it.
     """
     machine = load_machine(machine_path)
     if mesh_size is not None:
@@ -128,7 +128,9 @@ def simulate_run(
         order = [[a.name for a in load.axes].index(a) for a in axes]
         tcp_time, positions = drive.time[steps + 1], drive.position[steps][:, order]
     inside = tcp_time <= drive.time[-1]
-    start = run.initial_temperature if run.initial_temperature is not None else float(drive.environment[0, 0])
+    start = run.initial_temperature
+    if start is None:
+        start = float(drive.environment[0, load.surroundings])
     result = simulate(full, drive, tcp_time[inside], positions[inside], start, substeps, noise, progress)
     kept = run.loads.time <= drive.time[-1]
     loads = Table(run.loads.time[kept], {k: v[kept] for k, v in run.loads.columns.items()}, run.loads.units)

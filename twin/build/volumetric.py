@@ -52,19 +52,16 @@ def displacements(
     fields: per field and body T - T_ref (n_nodes_b,) [K]. A pose costs one small dense system whatever the mesh: the
     fields enter through the port displacements H_b T_b, found once.
     """
-    if isinstance(structure, LumpedStructure):
-        at_positions = zip(structure.pose_rows(positions), zip(*fields, strict=True), strict=True)
-        return sum(np.einsum("pci,fi->fpc", G, np.array(T)) for G, T in at_positions)
-    ports = [
-        body.H @ np.column_stack([field[b] for field in fields]) for b, body in enumerate(structure.bodies)
-    ]  # (n_ports_b, n_fields)
+    columns = [np.column_stack(body) for body in zip(*fields, strict=True)]  # (n_nodes_b, n_fields)
+    ports = columns
+    if isinstance(structure, Structure):
+        ports = [body.H @ T for body, T in zip(structure.bodies, columns, strict=True)]
     result = np.empty((len(fields), len(positions), 3))
     for i, position in enumerate(positions):
         result[:, i] = sum((z @ w).T for z, w in zip(structure.rows(position), ports, strict=True))
-        for b, nodes, growth in structure.system.scale_rows(position):
-            result[:, i] += np.array([field[b][nodes] for field in fields]) @ growth.T
-        for b, nodes, growth in structure.system.scale_rows(position):
-            result[:, i] += np.array([growth @ field[b][nodes] for field in fields])
+        if isinstance(structure, Structure):
+            for b, nodes, growth in structure.system.scale_rows(position):
+                result[:, i] += (growth @ columns[b][nodes]).T
     return result
 
 

@@ -15,7 +15,7 @@ import click
     show_default=True,
     help="galerkin is stable by construction; balanced is more accurate per state, admitted by a stability check",
 )
-@click.option("--states", default=400, show_default=True, help="reduced states of the whole machine")
+@click.option("--states", default=500, show_default=True, help="reduced states of the whole machine")
 @click.option("--samples", default=16, show_default=True, type=click.IntRange(2), help="points of the rich basis")
 @click.option("--training", default=90, show_default=True, type=click.IntRange(1), help="training scenarios")
 def command(machine: str, output: str, method: str, states: int, samples: int, training: int) -> int:

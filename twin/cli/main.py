@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import importlib
 import os
+import signal
 import sys
 import traceback
 
@@ -15,6 +16,7 @@ import click
 
 from twin import __version__
 from twin.errors import TwinError
+from twin.progress import interrupt
 
 # name -> what `twin --help` says about it; the command object is twin.cli.NAME.command
 COMMANDS = {
@@ -80,6 +82,7 @@ def cli(traceback: bool) -> None:
 
 def main() -> None:
     """Run the command line and exit."""
+    signal.signal(signal.SIGINT, interrupt)
     sys.exit(run(sys.argv[1:]))
 
 

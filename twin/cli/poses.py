@@ -74,7 +74,9 @@ def facts(
     """Everything `twin poses` tells, as JSON values (SI)."""
 
     def row(g: GridError | None) -> dict[str, Any] | None:
-        return g and {"counts": list(g.counts), "poses": g.poses, "max_m": dict(g.maximum), "p95_m": dict(g.p95)}
+        if g is None:
+            return None
+        return {"counts": list(g.counts), "poses": g.poses, "max_m": dict(g.maximum), "p95_m": dict(g.p95)}
 
     return {
         "axes": list(study.axes),

@@ -12,7 +12,7 @@ import click
 @click.option("--dt", default="60 s", show_default=True, help="time step")
 @click.option("--substeps", default=4, show_default=True, type=click.IntRange(1), help="implicit Euler steps per step")
 @click.option("--initial", help="temperature at the start, e.g. '20 degC', or a result.h5 to go on from  "
-              "[default: the run's own, else its first ambient value]")  # fmt: skip
+              "[default: the run's own, else of the air around it]")  # fmt: skip
 @click.option("--checkpoint", default=1440, show_default=True, type=click.IntRange(1), help="steps between checkpoints")
 @click.option("--resume", is_flag=True, help="go on after an interruption, with exactly the same numbers")
 def command(

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 def command(result: str, tolerance: str, temperature: str, horizon: str, as_json: bool) -> None:
     """Tell when the machine of RESULT, the folder or result.h5 of a `twin run`, has warmed up.
 
-    Per TCP component (at the actual position and at the pose where it changes most) and per sensor: the time from which
-    on the value stays within the tolerance of its final value; t63 and t95, from which on it stays within 37 % and 5 %
-    of its largest distance from the final value; the drift at the end, a line through the last ten minutes. Where the
-    drift at the end is more than the tolerance in the horizon, the machine has not settled and the time is "not
-    reached": the final value is only where the run was stopped.
+    Per TCP component (at the actual position, which moves with the axes, and at the pose where it changes most) and per
+    sensor: the time from which on the value stays within the tolerance of its final value; t63 and t95, from which on
+    it stays within 37 % and 5 % of its largest distance from the final value; the drift at the end, a line through the
+    last ten minutes. Where the drift at the end is more than the tolerance in the horizon, the machine has not settled
+    and the time is "not reached": the final value is only where the run was stopped.
     """
     import json
     from pathlib import Path

@@ -27,6 +27,7 @@ import numpy as np
 from twin.errors import LogError
 from twin.logs.blocks import Block, Damaged
 
+LATEST = 253402300800.0  # s, POSIX: the year 10000, beyond which calendars end
 MARK = b"TWB1"
 _HEAD = struct.Struct("<QQddIHI")
 _CRC = struct.Struct("<I")
@@ -102,14 +103,24 @@ def _frame(data: bytes | mmap.mmap, at: int) -> tuple[Block, int] | bool:
         return True
     if _CRC.unpack(crc)[0] != zlib.crc32(body):
         return False
-    if not (np.isfinite(time) and 0.0 < interval < np.inf):
+    named = _columns(body[:length])
+    timed = abs(time) < LATEST and 0.0 < interval * records < LATEST - time
+    if not (records and columns and columns == len(named) and timed):
         return False
+    values = np.frombuffer(body, dtype="<f8", offset=length).reshape(records, columns).astype(float)
+    return Block(stream, sequence, time, interval, tuple(named), tuple(named.values()), values), end + _CRC.size
+
+
+def _columns(text: bytes) -> dict[str, str]:
+    """Units by name; none where a sender does not keep to the format, though its checksums are right."""
     try:
-        names, units = zip(*((str(name), str(unit)) for name, unit in json.loads(body[:length])), strict=True)
-        values = np.frombuffer(body, dtype="<f8", offset=length).reshape(records, columns).astype(float)
-    except ValueError:  # a sender that does not keep to the format; json and numpy raise it
-        return False
-    return (Block(stream, sequence, time, interval, names, units, values), end + _CRC.size) if records else False
+        pairs = json.loads(text)
+        if not all(len(pair) == 2 and isinstance(pair, list) for pair in pairs):
+            return {}
+        named = {name: unit for name, unit in pairs if name.isprintable() and unit.isprintable()}
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        return {}
+    return named if len(named) == len(pairs) else {}
 
 
 def _next_frame(data: bytes | mmap.mmap, at: int) -> int:

@@ -8,6 +8,7 @@ starts anew.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -16,6 +17,8 @@ import numpy as np
 
 from twin.errors import LogError
 from twin.logs.run import Table
+
+LEAP = 10**6  # blocks: 11 days of blocks of one second. A number further away than that from all others is an error
 
 
 @dataclass(frozen=True)
@@ -56,11 +59,14 @@ class Counts:
     late: int = 0  # arrivals of what had been given up as lost
     damaged: int = 0  # arrivals that were no sound block; their blocks are lost unless they come again
     truncated: int = 0  # of the damaged, ends of files
-    restarts: int = 0  # further streams
+    restarts: int = 0  # further streams, and leaps of the numbers within one
+    overlapping: int = 0  # records of the delivered that were left out: their time had been given already
 
     def __str__(self) -> str:
-        told = [f"{getattr(self, k)} {k}" for k in self.__dataclass_fields__ if k == "delivered" or getattr(self, k)]
-        return "blocks: " + ", ".join(told)
+        of_blocks = [k for k in self.__dataclass_fields__ if k != "overlapping"]
+        told = ", ".join(f"{getattr(self, k)} {k}" for k in of_blocks if k == "delivered" or getattr(self, k))
+        n = self.overlapping
+        return f"blocks: {told}" + (f"; {n} overlapping record{'s' * (n > 1)} left out" if n else "")
 
 
 @dataclass(frozen=True)
@@ -110,85 +116,134 @@ def group(
 
 
 @dataclass
+class _Numbers:
+    """Which numbers of a stream have gone out or were given up: all from `start` on that are below `next`."""
+
+    start: int = 0  # of counting
+    next: int = 0  # number of the next block to go out
+    largest: int = -1  # seen
+    lost: list[range] = field(default_factory=list)
+
+    def given_up(self, s: int) -> bool:
+        return s < self.start or any(s in numbers for numbers in self.lost)
+
+    def far(self, s: int) -> bool:
+        return not self.start - LEAP <= s <= max(self.next, self.largest) + LEAP
+
+
+@dataclass
 class Resolver:
     """Puts blocks in order as they arrive; a missing one is given up when one `window` numbers later has arrived.
 
     window None: nothing is given up before `finish`. Memory is bounded by the window. A stream that another has
-    followed is over: what still arrives of it is late.
+    followed is over: what still arrives of it is repeated or late.
+
+    A number that leaps by more than LEAP counts as damaged, and nothing as lost, unless another one near it arrives
+    too: then the sender does count there. Both are taken, and counting starts again from the smaller one.
+
+    Stamps of what goes out increase, whatever the clock of the sender does: records less than half an interval after
+    the last one given are left out and counted. So after a clock was set back the log goes on where it had been.
     """
 
     window: int | None = 16
     first: int | None = 0  # number of the first block expected; None: that of the first arrival, to join in midstream
     counts: Counts = Counts()
     _stream: int | None = None
-    _over: set[int] = field(default_factory=set)
-    _start: int = 0  # of counting
-    _next: int = 0  # number of the next block to go out
-    _largest: int = -1  # seen
+    _numbers: _Numbers = field(default_factory=_Numbers)
+    _over: dict[int, _Numbers] = field(default_factory=dict)
     _waiting: dict[int, Block] = field(default_factory=dict)
-    _lost: list[range] = field(default_factory=list)
+    _leapt: Block | None = None  # the last whose number was too far away
+    _given: Block | None = None  # the last that went out
 
     def push(self, arrival: Block | Damaged) -> list[Block]:
         """Blocks that may go out now, in order."""
         if isinstance(arrival, Damaged):
             self._count(damaged=1, truncated=int(arrival.truncated))
             return []
-        out: list[Block] = []
         s = arrival.sequence
         if arrival.stream in self._over:
-            self._count(late=1)
-            return out
+            over = self._over[arrival.stream]
+            had = s < over.next and not over.given_up(s)
+            self._count(repeated=int(had), late=int(not had))
+            return []
+        out: list[Block] = []
         if self._stream is None:
             self._begin(arrival.stream, s if self.first is None else self.first)
         elif arrival.stream != self._stream:
             out = self.finish()
-            self._over.add(self._stream)
+            self._over[self._stream] = self._numbers
             self._count(restarts=1)
             self._begin(arrival.stream, 0)
-        if s < self._start or any(s in given_up for given_up in self._lost):
-            self._count(late=1)
-        elif s < self._next or s in self._waiting:
-            self._count(repeated=1)
-        else:
-            self._count(reordered=int(s < self._largest))
-            self._largest = max(self._largest, s)
-            self._waiting[s] = arrival
-            out += self._due()
-        return out
+        return out + (self._leap(arrival) if self._numbers.far(s) else self._take(arrival))
 
     def finish(self) -> list[Block]:
         """What still waits, in order; what is missing in between is lost."""
-        out = []
+        out: list[Block] = []
         for s in sorted(self._waiting):
             self._give_up(s)
-            out.append(self._waiting.pop(s))
-            self._next = s + 1
-        self._count(delivered=len(out))
+            out += self._go(s)
         return out
 
     def _begin(self, stream: int, first: int) -> None:
-        self._stream, self._start, self._next, self._largest = stream, first, first, -1
-        self._lost.clear()
+        self._stream, self._numbers, self._leapt = stream, _Numbers(first, first), None
+
+    def _leap(self, block: Block) -> list[Block]:
+        """Counts from elsewhere once a second number says so."""
+        before, self._leapt = self._leapt, block
+        if before is None or not 0 < abs(before.sequence - block.sequence) <= LEAP:
+            self._count(damaged=1)
+            return []
+        out = self.finish()
+        self._count(damaged=-1, restarts=int(self._numbers.largest >= 0))
+        self._begin(block.stream, min(before.sequence, block.sequence))
+        return out + self._take(before) + self._take(block)
+
+    def _take(self, block: Block) -> list[Block]:
+        s, numbers = block.sequence, self._numbers
+        if numbers.given_up(s):
+            self._count(late=1)
+        elif s < numbers.next or s in self._waiting:
+            self._count(repeated=1)
+        else:
+            self._count(reordered=int(s < numbers.largest))
+            numbers.largest = max(numbers.largest, s)
+            self._waiting[s] = block
+        return self._due()
 
     def _due(self) -> list[Block]:
-        out = []
+        out: list[Block] = []
+        numbers = self._numbers
         while self._waiting:
-            if self._next in self._waiting:
-                out.append(self._waiting.pop(self._next))
-                self._next += 1
-            elif self.window is not None and self._largest - self._next >= self.window:
-                self._give_up(min(min(self._waiting), self._largest - self.window + 1))
+            if numbers.next in self._waiting:
+                out += self._go(numbers.next)
+            elif self.window is not None and numbers.largest - numbers.next >= self.window:
+                self._give_up(min(min(self._waiting), numbers.largest - self.window + 1))
             else:
                 break
-        self._count(delivered=len(out))
         return out
+
+    def _go(self, s: int) -> list[Block]:
+        """A waiting block, without the records whose time has been given; none where nothing is left of it."""
+        block, before = self._waiting.pop(s), self._given
+        self._numbers.next = s + 1
+        self._count(delivered=1)
+        again = (before.end - 0.5 * before.interval - block.time) / block.interval if before is not None else 0.0
+        if again > 0.0:
+            n = math.ceil(min(again, len(block.values)))
+            self._count(overlapping=n)
+            block = replace(block, time=block.time + n * block.interval, values=block.values[n:])
+        if not len(block.values):
+            return []
+        self._given = block
+        return [block]
 
     def _give_up(self, until: int) -> None:
         """Everything from the next number up to `until`, exclusive, is lost."""
-        if until > self._next:
-            self._lost.append(range(self._next, until))
-            self._count(lost=until - self._next)
-            self._next = until
+        numbers = self._numbers
+        if until > numbers.next:
+            numbers.lost.append(range(numbers.next, until))
+            self._count(lost=until - numbers.next)
+            numbers.next = until
 
     def _count(self, **more: int) -> None:
         self.counts = replace(self.counts, **{k: getattr(self.counts, k) + n for k, n in more.items()})
@@ -202,7 +257,7 @@ def in_order(arrivals: Iterable[Block | Damaged], resolver: Resolver) -> Iterato
 
 
 def tables(blocks: Iterable[Block], zero: float = 0.0) -> Iterator[Table]:
-    """Blocks in order as pieces of one log, times since `zero` [s]; a row of NaN at the start of every gap.
+    """Blocks, as a Resolver lets them go, as pieces of one log, times since `zero` [s]; gaps start with a row of NaN.
 
     Raises LogError where the columns change.
     """

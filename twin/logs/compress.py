@@ -110,7 +110,8 @@ def dwell_shares(time: np.ndarray, position: np.ndarray, edges: np.ndarray, bord
     """Share of each interval that an axis spends between borders of its way, (k, n): exact for linear motion.
 
     time (m,) [s] increasing; position (m,); edges (k + 1,) [s] within the log or after it (the last position holds);
-    borders (n + 1,) increasing. Rows sum to 1 less the time beyond the outer borders.
+    borders (n + 1,) increasing. A rest on a border counts above it, on the last one below it. Rows sum to 1 less the
+    time beyond the outer borders.
     """
     knots = np.union1d(time[(time > edges[0]) & (time < edges[-1])], edges)
     way = np.interp(knots, time, position)
@@ -119,7 +120,8 @@ def dwell_shares(time: np.ndarray, position: np.ndarray, edges: np.ndarray, bord
     below = np.empty((len(low), len(borders)))  # share of each piece spent below each border
     for j, border in enumerate(borders):
         crossing = (border - low) / np.where(length > 0, length, 1.0)
-        below[:, j] = np.where(length > 0, np.clip(crossing, 0.0, 1.0), border > low)
+        rests_below = border >= low if j == len(borders) - 1 else border > low
+        below[:, j] = np.where(length > 0, np.clip(crossing, 0.0, 1.0), rests_below)
     duration = np.diff(knots)
     first = np.searchsorted(knots[:-1], edges[:-1])
     return np.add.reduceat(np.diff(below, axis=1) * duration[:, None], first, axis=0) / np.diff(edges)[:, None]

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from twin.errors import Problem
 from twin.machine.check_lumped import lumped_oddities
 from twin.machine.description import Machine, Material
+from twin.machine.wiring import law_use
+from twin.physics.laws import LAWS
 
 # From polymers and foams to copper, diamond tools and Invar: wide enough for what machines are made of, narrow enough
 # to catch a factor 1000 (W/(mm K) for W/(m K), t/mm^3, MPa for Pa). Metals are bounded more closely.
@@ -35,8 +37,23 @@ def check_machine(machine: Machine) -> list[Problem]:
     for name, material in machine.materials.items():
         problems += _material(name, material)
     problems += lumped_oddities(machine) if machine.lumped else []
+    problems += _joints(machine)
     problems += _unused(machine)
     return problems
+
+
+def _joints(machine: Machine) -> Iterator[Problem]:
+    """Joint laws outside their validity: a joint is evaluated once, so no step of a run can flag it."""
+    for name, contact in machine.contacts.items():
+        if contact.joint is None:
+            continue
+        law, where = LAWS[contact.joint.law], f"contacts.{name}.joint"
+        use = law_use(contact.joint.law, "joint", contact.joint.parameters, {}, where, machine)
+        values = {n: use.parameters.get(n, a.default) for n, a in law.parameters.items()}
+        if law.validity and not bool(law.validity.holds(**values)):
+            remedy = f"check its parameters with twin losses --explain contacts.{name}, or give a conductance"
+            what = f"outside the validity of its law: {law.validity.text}"
+            yield Problem(what, f"machine.toml: {where}", remedy, warning=True)
 
 
 def _material(name: str, material: Material) -> Iterator[Problem]:

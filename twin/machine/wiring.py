@@ -14,7 +14,6 @@ from twin.physics.laws import LAWS, Argument
 from twin.rom.load_model import AxisWiring, EnvironmentWiring, LawUse, Signal, Source
 from twin.units import parse_unit, to_si
 
-
 PAINT = 0.9  # emissivity of painted and of rough oxidised surfaces (VDI-Waermeatlas, K3: 0.85 to 0.95)
 
 
@@ -128,7 +127,9 @@ def joint_conductance(name: str, machine: Machine) -> float:
         return entry.total
     if (entry.conductance is None) == (entry.joint is None):
         raise DescriptionError(
-            "give either a conductance or a joint law", where, 'conductance = "2000 W/(m^2*K)", or joint = { law = ... }'
+            "give either a conductance or a joint law",
+            where,
+            'conductance = "2000 W/(m^2*K)", or joint = { law = "bolted_joint", parameters = { ... } }',
         )
     if entry.joint is None:
         return float(entry.conductance or 0.0)
@@ -178,13 +179,31 @@ def law_use(
     readable = {**law.signals, **law.states}
     for name, argument in readable.items():
         if name in signals:
+            at = f"{where}.signals.{name}"
             try:
-                expect_signal(signals[name], argument.unit, f"{where}.signals.{name}", machine)
+                expect_signal(signals[name], argument.unit, at, machine)
             except TwinError as e:
                 problems += e.problems
+                continue
+            problems += _beyond(argument, signals[name], at, machine)
     if problems:
         raise DescriptionError.collect(problems)
     return LawUse(law_name, values, {name: signals[name] for name in readable if name in signals})
+
+
+def _beyond(argument: Argument, name: str, where: str, machine: Machine) -> list[Problem]:
+    """Whether the certified range of a signal goes outside what an argument of a law can be."""
+    entry = machine.signals[name]
+    try:
+        wired = signal(name, entry) if entry else None
+    except TwinError:
+        return []  # reported with the signal itself
+    if wired is None or (argument.low <= wired.low and wired.high <= argument.high):
+        return []
+    reaches = f"signal '{name}' ranges from {wired.low:g} to {wired.high:g} {wired.unit}"
+    bounds = f"{argument.low:g} .. {argument.high:g} {argument.unit}"
+    remedy = f"{argument.meaning}: mend signals.{name}.range or its unit, or wire another signal"
+    return [Problem(f"{reaches}, outside {bounds}", where, remedy)]
 
 
 def _names(
@@ -193,7 +212,7 @@ def _names(
     arguments: Mapping[str, Argument],
     where: str,
     what: str,
-    optional: Mapping[str, Argument] = {},  # noqa: B006  never written to
+    optional: Mapping[str, Argument] = {},
 ) -> list[Problem]:
     """Unknown names, and names without a default that are not given."""
     given, known = list(given), {**arguments, **optional}

@@ -18,6 +18,10 @@ _ACROSS = {"length": Argument("m", "area over perimeter, a b / (2 (a + b))", Non
 _DIAMETER = {"diameter": Argument("m", "diameter", None, _TINY)}
 _ALONG = {"length": Argument("m", "length along the flow", None, _TINY)}
 _MIXED = "h^3 = h_forced^3 + h_free^3"
+_LEVEL = {
+    "length": Argument("m", "length along the motion", None, _TINY),
+    "area_over_perimeter": Argument("m", "area over perimeter, a b / (2 (a + b))", None, _TINY),
+}
 _AIR = "film 0 to 80 degC"
 _SLIGHT = "(lower limits from 0.5 K on)"
 
@@ -161,6 +165,31 @@ FILMS: dict[str, Law] = {
         _WIND, {"length": Argument("m", "length along the motion", None, _TINY), **_HEIGHT}, _STATES,
         f"{_MIXED} of forced_plate and free_vertical_plate",
         Validity(forced_convection.mixed_plate_holds, f"Re < 1e7, 0.1 < Ra < 1e12 {_SLIGHT}, {_AIR}"),
+    ),
+    "mixed_horizontal_up": Law(
+        forced_convection.mixed_horizontal_up, "film", "VDI-Waermeatlas; forced_plate and free_horizontal_up",
+        _WIND, _LEVEL, _STATES,
+        f"{_MIXED} of forced_plate and free_horizontal_up",
+        Validity(
+            forced_convection.mixed_horizontal_up_holds,
+            f"Re < 1e7; hot: Ra f2 < 1e12; cold: 1e3 < Ra f1 < 1e10 {_SLIGHT}, {_AIR}",
+        ),
+    ),
+    "mixed_horizontal_down": Law(
+        forced_convection.mixed_horizontal_down, "film", "VDI-Waermeatlas; forced_plate and free_horizontal_down",
+        _WIND, _LEVEL, _STATES,
+        f"{_MIXED} of forced_plate and free_horizontal_down",
+        Validity(
+            forced_convection.mixed_horizontal_down_holds,
+            f"Re < 1e7; hot: 1e3 < Ra f1 < 1e10; cold: Ra f2 < 1e12 {_SLIGHT}, {_AIR}",
+        ),
+    ),
+    "mixed_cylinder": Law(
+        forced_convection.mixed_cylinder, "film",
+        "VDI-Waermeatlas; forced_cylinder and free_horizontal_cylinder",
+        _WIND, _DIAMETER, _STATES,
+        f"{_MIXED} of forced_cylinder and free_horizontal_cylinder",
+        Validity(forced_convection.mixed_cylinder_holds, f"Re < 1e7, Ra <= 1e12, {_AIR}"),
     ),
     "mixed_rotating_cylinder": Law(
         forced_convection.mixed_rotating_cylinder, "film",

@@ -2,8 +2,10 @@
 
 All take the size of a speed (its sign does not matter), `surface` and `ambient` [degC] and lengths [m], and look up air
 at the film temperature. A part moving through still air and a part at rest swept by air are alike if the speed is
-theirs; the length of a plate is its extent along the motion. The forced laws stand for moving air alone and keep, at
-rest, the value of Re = 10, the lower end of their range: a part that also stands still wants a mixed law.
+theirs; the length of a plate is its extent along the motion. The forced laws stand for moving air alone and keep, below
+Re = 10, the lower end of their range, its value: a part that also stands still wants a mixed law. Mixed laws have the
+plus sign of crossing and assisting flows only: with the minus of opposing flows h would reach zero where both are of
+one strength.
 Each law has its `_holds` with the same arguments.
 Source: papers 000 eq (7) and 004 eqs (11)-(13); the correlations replace the lost Table 3 of paper 004.
 """
@@ -15,8 +17,16 @@ import jax.numpy as jnp
 from twin.physics import nusselt_forced as nusselt
 from twin.physics import nusselt_free
 from twin.physics.air import air, in_table
-from twin.physics.free_convection import free_flow, within
-from twin.physics.powers import magnitude
+from twin.physics.free_convection import (
+    free_flow,
+    free_horizontal_cylinder,
+    free_horizontal_cylinder_holds,
+    free_horizontal_down,
+    free_horizontal_down_holds,
+    free_horizontal_up,
+    free_horizontal_up_holds,
+    within,
+)
 
 LEAST_REYNOLDS = 10.0
 
@@ -31,7 +41,7 @@ def reynolds(speed, surface, ambient, length):
 
 
 def _never_at_rest(re):
-    return magnitude(re, LEAST_REYNOLDS)
+    return jnp.maximum(re, LEAST_REYNOLDS)
 
 
 def _in_range(speed, surface, ambient, length, low, high):
@@ -114,6 +124,59 @@ def mixed_plate_holds(speed, surface, ambient, length, height):
     """Re < 1e7 along the motion, 0.1 < Ra < 1e12 over the height."""
     ra = free_flow(surface, ambient, height).ra
     return within(surface, ambient, ra, 0.1, 1e12) & _in_range(speed, surface, ambient, length, 0.0, 1e7)
+
+
+def mixed_horizontal_up(speed, surface, ambient, length, area_over_perimeter):
+    """h of a surface that faces up in free and forced flow: h^3 = h_forced^3 + h_free^3. Correlation G9 of G3 with F4
+    where it is warmer than the air, F5 where it is colder.
+
+    length [m] along the motion; area_over_perimeter [m] of the free flow, a b / (2 (a + b)) of a rectangle. The air
+    flows along the surface and rises or sinks across that.
+    """
+    free = free_horizontal_up(surface, ambient, area_over_perimeter)
+    return nusselt.mixed(_along_plate(speed, surface, ambient, length), free)
+
+
+def mixed_horizontal_up_holds(speed, surface, ambient, length, area_over_perimeter):
+    """Re < 1e7 along the motion, and the ranges of free_horizontal_up."""
+    free = free_horizontal_up_holds(surface, ambient, area_over_perimeter)
+    return free & _in_range(speed, surface, ambient, length, 0.0, 1e7)
+
+
+def mixed_horizontal_down(speed, surface, ambient, length, area_over_perimeter):
+    """h of a surface that faces down in free and forced flow: F5 where it is warmer than the air, F4 where it is
+    colder. Otherwise as mixed_horizontal_up.
+    """
+    free = free_horizontal_down(surface, ambient, area_over_perimeter)
+    return nusselt.mixed(_along_plate(speed, surface, ambient, length), free)
+
+
+def mixed_horizontal_down_holds(speed, surface, ambient, length, area_over_perimeter):
+    """Re < 1e7 along the motion, and the ranges of free_horizontal_down."""
+    free = free_horizontal_down_holds(surface, ambient, area_over_perimeter)
+    return free & _in_range(speed, surface, ambient, length, 0.0, 1e7)
+
+
+def _along_plate(speed, surface, ambient, length):
+    """G3 down to rest, where it is zero."""
+    gas = _film(surface, ambient)
+    return gas.conductivity / length * nusselt.plate(reynolds(speed, surface, ambient, length), gas.prandtl)
+
+
+def mixed_cylinder(speed, surface, ambient, diameter):
+    """h of a horizontal cylinder in free and cross flow: Nu^3 = Nu_forced^3 + Nu_free^3. Correlation G9 of G5 and F6.
+
+    speed [m/s] across the axis, level. At rest the 0.3 of G5 remains: below 1 % of h from Nu_free = 1 on.
+    """
+    gas = _film(surface, ambient)
+    forced = nusselt.cylinder(reynolds(speed, surface, ambient, diameter), gas.prandtl)
+    return nusselt.mixed(gas.conductivity / diameter * forced, free_horizontal_cylinder(surface, ambient, diameter))
+
+
+def mixed_cylinder_holds(speed, surface, ambient, diameter):
+    """Re < 1e7 and Ra <= 1e12."""
+    free = free_horizontal_cylinder_holds(surface, ambient, diameter)
+    return free & _in_range(speed, surface, ambient, diameter, 0.0, 1e7)
 
 
 def mixed_rotating_cylinder(speed, surface, ambient, diameter):

@@ -31,7 +31,7 @@ _BEARING = {
     "load": Argument("N", "load P1 in operation", 0.0),
 }
 _SCREW = {
-    "force": Argument("N", "mean axial force", low=_ANY),
+    "force": Argument("N", "mean axial force; its size counts, as driven by the screw in both directions", low=_ANY),
     "preload": Argument("N", "preload of the nut", 0.0),
     "diameter": Argument("m", "pitch circle diameter", None, 1e-4),
     "lead": Argument("m", "lead", None, 1e-5),
@@ -133,13 +133,15 @@ LOSSES: dict[str, Law] = {
         _AXIS_SPEED, _SCREW,
         formula="P = 2 pi n (M_d + M_pl), n = |v| / L, M_d = F L (1 - eta) / (2 pi eta), "
         "M_pl = F_p L (1 - eta^2) / (2 pi eta), eta = tan(phi) / tan(phi + rho)",
+        validity=Validity(screws.screw_friction_holds, "0 < eta <= 1: mu L / (pi d) < 1"),
     ),
     "screw_back_driven": Law(
         screws.screw_back_driven, "loss", "paper 002 eqs (7)-(10) with erratum E-002-2",
-        _AXIS_SPEED, _SCREW,
+        _AXIS_SPEED,
+        {**_SCREW, "force": Argument("N", "mean axial force; its size counts, as driving the screw", low=_ANY)},
         formula="P = 2 pi n (M_d + M_pl), n = |v| / L, M_d = F L (1 - eta) / (2 pi), "
         "M_pl = F_p L (1 - eta^2) / (2 pi), eta = tan(phi) / tan(phi + rho)",
-        validity=Validity(screws.screw_back_driven_holds, "L / (pi d) > mu: not self-locking"),
+        validity=Validity(screws.screw_back_driven_holds, "L / (pi d) > mu: not self-locking; mu L / (pi d) < 1"),
     ),
     "bearing_friction": Law(
         bearings.bearing_friction, "loss", "paper 002 eqs (4)-(6), ISO 15312, with errata E-002-1, E-002-4 and E-002-5",

@@ -76,6 +76,10 @@ class FilmPlan:
     gradient: Array  # (f,) K/m of the air
     height: Array  # (f,) m where the air's temperature is measured
 
+    def air(self, environment: Array, mean_height: Array) -> Array:
+        """degC (f,) of the air at the mean height (f,) [m] of the films' surfaces: what their laws see."""
+        return environment[self.environment] + self.gradient * (mean_height - self.height)
+
     @classmethod
     def of(cls, load: LoadModel) -> FilmPlan:
         air = [load.environments[f.environment] for f in load.films]
@@ -95,6 +99,7 @@ class FilmState:
     total: Array  # (f,) W/(m^2 K), convection and radiation: what multiplies the affine term
     outer: Array  # (f,) degC: the temperature outside that both together see, at height zero
     lift: Array  # (f,) W/(m^3 K) times K: convection times gradient, multiplies H
+    radiated: Array  # (f,) W/m^2 into the surfaces by radiation
 
 
 def film_state(
@@ -110,4 +115,5 @@ def film_state(
     at_zero = air - plan.gradient * plan.height
     total = convection + radiated
     share = radiated / xp.where(total > 0.0, total, 1.0)
-    return FilmState(total, at_zero + share * (radiant - at_zero), convection * plan.gradient)
+    outer = at_zero + share * (radiant - at_zero)
+    return FilmState(total, outer, convection * plan.gradient, radiated * (radiant - surface))

@@ -129,6 +129,12 @@ class LoadModel:
     pairs: tuple[Pair, ...]
 
     @property
+    def surroundings(self) -> int:
+        """The environment a machine at rest is as warm as: the first whose films radiate, hence no coolant."""
+        films = [f for f in self.films if f.emissivity > 0.0] or list(self.films)
+        return min((f.environment for f in films), default=0)
+
+    @property
     def theta_names(self) -> tuple[str, ...]:
         """Coefficients of the affine terms: films first, then joints."""
         return tuple(f"films.{f.name}" for f in self.films) + tuple(f"contacts.{j.name}.{j.key}" for j in self.joints)

@@ -17,38 +17,44 @@ def following_films(
     load_model: LoadModel, values: dict[str, np.ndarray], environments: np.ndarray, intervals: Intervals
 ) -> Following:
     """Films over DIFFERENCES; values (n_samples,) by signal, environments (n_samples, n_environments) [degC]."""
-    index, tables = [], []
-    for k, film in enumerate(load_model.films):
-        if free := states_of(film.use):
-            air = environments[:, film.environment]
-            states = {"surface": air[:, None] + DIFFERENCES, "ambient": air[:, None]}
-            index.append(k)
-            tables.append(_tabulate(film.use, film.gain, values, {name: states[name] for name in free}, intervals))
-    return _stack(index, tables, DIFFERENCES, intervals.n_steps)
+    uses = {k: film.use for k, film in enumerate(load_model.films) if states_of(film.use)}
+    tables = [
+        _tabulate(use, load_model.films[k].gain, values, environments[:, load_model.films[k].environment], intervals)
+        for k, use in uses.items()
+    ]
+    return _stack(tuple(uses), tables, DIFFERENCES, intervals.n_steps)
 
 
 def following_losses(load_model: LoadModel, values: dict[str, np.ndarray], intervals: Intervals) -> Following:
     """Sources over TEMPERATURES."""
-    index, tables = [], []
-    for k, source in enumerate(load_model.sources):
-        if free := states_of(source.use):
-            index.append(k)
-            states = dict.fromkeys(free, TEMPERATURES[None, :])
-            tables.append(_tabulate(source.use, source.gain, values, states, intervals))
-    return _stack(index, tables, TEMPERATURES, intervals.n_steps)
+    uses = {k: source.use for k, source in enumerate(load_model.sources) if states_of(source.use)}
+    tables = [_tabulate(use, load_model.sources[k].gain, values, None, intervals) for k, use in uses.items()]
+    return _stack(tuple(uses), tables, TEMPERATURES, intervals.n_steps)
+
+
+def _states(use: LawUse, air: np.ndarray | None) -> dict[str, np.ndarray]:
+    """The states of a law that no signal is wired to, on their grid: (n, m), (n, 1) or (1, m) [degC]."""
+    if air is None:
+        return dict.fromkeys(states_of(use), TEMPERATURES[None, :])
+    grid = {"surface": air[:, None] + DIFFERENCES, "ambient": air[:, None]}
+    return {name: grid[name] for name in states_of(use)}
 
 
 def _tabulate(
-    use: LawUse, gain: float, values: dict[str, np.ndarray], states: dict[str, np.ndarray], intervals: Intervals
+    use: LawUse, gain: float, values: dict[str, np.ndarray], air: np.ndarray | None, intervals: Intervals
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Step means (n_steps, m) of gain times a law over a grid of its states, and where it is outside its validity."""
+    """Step means (n_steps, m) of gain times a law over the grid of its state, and where it is outside its validity.
+
+    air (n_samples,) [degC] of a film, None for a loss.
+    """
+    m = len(TEMPERATURES if air is None else DIFFERENCES)
+    judged = LAWS[use.law].validity is not None
     if not use.signals:  # nothing nonlinear varies within a step: the mean state will do
-        means = {name: s if len(s) == 1 else intervals.mean(s) for name, s in states.items()}
         n = intervals.n_steps
-        held = law_table(use, {}, n, means, holds=True) if LAWS[use.law].validity else True
-        value = gain * law_table(use, {}, n, means)
-        return value, np.broadcast_to(np.logical_not(held), value.shape)
-    mean, outside = [], []
+        states = _states(use, None if air is None else intervals.mean(air))
+        outside = ~law_table(use, {}, n, states, holds=True) if judged else np.zeros((1, 1), dtype=bool)
+        return np.broadcast_to(gain * law_table(use, {}, n, states), (n, m)), np.broadcast_to(outside, (n, m))
+    parts = []
     begin = 0
     last = np.append(intervals.first[1:], len(intervals.start)) - 1  # last interval of each step
     while begin < intervals.n_steps:
@@ -58,20 +64,21 @@ def _tabulate(
         part = intervals.part(begin, end)
         here = slice(first_sample, intervals.sample[last[end - 1]] + 1)
         signals = {name: values[name][here] for name in use.signals.values()}
-        grid = {name: s if len(s) == 1 else s[here] for name, s in states.items()}
+        states = _states(use, None if air is None else air[here])
         count = here.stop - here.start
-        value = gain * law_table(use, signals, count, grid)
-        mean.append(part.mean(value))
-        if LAWS[use.law].validity:
-            outside.append(part.any(~law_table(use, signals, count, grid, holds=True)[part.sample]))
-        else:
-            outside.append(np.zeros(mean[-1].shape, dtype=bool))
+        mean = part.mean(gain * law_table(use, signals, count, states))
+        outside = np.zeros((1, 1), dtype=bool)
+        if judged:
+            outside = part.any(~law_table(use, signals, count, states, holds=True)[part.sample])
+        # a law whose surface is measured has one value for the whole grid
+        parts.append((np.broadcast_to(mean, (len(mean), m)), np.broadcast_to(outside, (len(mean), m))))
         begin = end
-    return np.concatenate(mean), np.concatenate(outside)
+    value, beyond = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return value, beyond
 
 
-def _stack(index: list[int], tables: list[tuple[np.ndarray, np.ndarray]], grid: np.ndarray, n: int) -> Following:
+def _stack(index: tuple[int, ...], tables: list[tuple[np.ndarray, np.ndarray]], grid: np.ndarray, n: int) -> Following:
     if not index:
         return Following.none(n, grid)
     value, outside = (np.stack(part, axis=1) for part in zip(*tables, strict=True))
-    return Following(tuple(index), grid, value, outside)
+    return Following(index, grid, value, outside)

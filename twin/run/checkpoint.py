@@ -28,6 +28,7 @@ class Steps:
 
     z: np.ndarray  # (n, N) states at step ends, coordinates of twin.run.system
     film: np.ndarray  # (n, n_films) W into the machine
+    gross: np.ndarray  # (n,) W: all that films exchange
     stored: np.ndarray  # (n,) J
     power: np.ndarray  # (n, n_sources) W
     theta: np.ndarray  # (n, n_theta) W/(m^2 K)
@@ -62,6 +63,7 @@ class CheckpointFolder:
             put_attributes(f, {"format": FORMAT, "first": first, "key": key})
             put(f, "z", steps.z, "K", (), "states in normalised coordinates")
             put(f, "film", steps.film, "W")
+            put(f, "gross", steps.gross, "W")
             put(f, "stored", steps.stored, "J")
             put(f, "power", steps.power, "W")
             put(f, "theta", steps.theta, "W/(m^2*K)")

@@ -56,12 +56,11 @@ class Polynomial:
     def at(self, position: Sequence[float]) -> np.ndarray:
         """Values (n_components,) at one position [m]: the shortest way, as a control goes it."""
         value = self.coefficients
-        for axis, p in zip(reversed(self.axes), reversed(position), strict=True):
-            s = min(max((p - axis.centre) / axis.half_range, -1.0), 1.0)
-            if axis.degree == 2:  # the usual case, without the detour over a list
-                value = value @ np.array((1.0, s, s * s))
-            else:
-                value = value @ np.array([s**k for k in range(axis.degree + 1)])
+        for axis, p in zip(self.axes[::-1], position[::-1], strict=True):
+            s = (p - axis.centre) / axis.half_range
+            s = 1.0 if s > 1.0 else -1.0 if s < -1.0 else s
+            powers = (1.0, s, s * s) if axis.degree == 2 else tuple(s**k for k in range(axis.degree + 1))
+            value = value.reshape(-1, len(powers)).dot(np.array(powers))
         return value
 
 

@@ -41,7 +41,7 @@ def replay(
 
     dt [s] and substeps: implicit Euler with dt/substeps, outputs every dt. initial: temperature of the whole machine
     [degC], or a state (N,) in artefact coordinates (`Result.state`, `twin.run.results.read_final_state`); by default
-    the run's own initial temperature, else the first mean of the first environment. interpolation: between poses, for
+    the run's own initial temperature, else the first mean of its surroundings. interpolation: between poses, for
     the TCP error at the actual position.
 
     Raises LogError for missing signals and bad times, TwinError for checkpoints of another run.
@@ -50,7 +50,11 @@ def replay(
     signals = signal_values(run, model.load_model.signals)
     drive = evaluate(model.load_model, run.loads.time, signals, dt)
     if initial is None:
-        initial = run.initial_temperature if run.initial_temperature is not None else float(drive.environment[0, 0])
+        initial = (
+            run.initial_temperature
+            if run.initial_temperature is not None
+            else float(drive.environment[0, model.load_model.surroundings])
+        )
     first = [signals[axis.position] for axis in model.load_model.axes]
     position = np.array([values[np.argmax(np.isfinite(values))] for values in first])
     return replay_drive(artefact, drive, position, substeps, initial, checkpoints, progress, interpolation)
@@ -89,8 +93,13 @@ def replay_drive(
         # shorter steps excite faster modes than the certificate has seen
         shortest = float(certified) / float(artefact.certificate.get("substeps", substeps))
         flags[f"substep shorter than the certified {shortest:g} s"] = np.diff(drive.time) / substeps < 0.999 * shortest
-    flags |= following_flags(model.load_model, drive, steps.theta, steps.surface, steps.winding)
-    throughput = np.diff(drive.time) * (np.abs(steps.power).sum(axis=1) + np.abs(steps.film).sum(axis=1))
+        # laws that follow a temperature read it at the step's start: over hours they would swing to and fro
+        longest = float(certified)
+        flags[f"step longer than the certified {longest:g} s"] = np.diff(drive.time) > 1.001 * longest
+    system = prepared.system
+    height = np.asarray(system.film_moment) / np.maximum(np.asarray(system.film_area), 1e-30)
+    flags |= following_flags(model.load_model, drive, steps.theta, steps.surface, height, steps.winding)
+    throughput = np.diff(drive.time) * (np.abs(steps.power).sum(axis=1) + steps.gross)
     residual = steps.stored - np.diff(drive.time) * (steps.power.sum(axis=1) + steps.film.sum(axis=1))
     return Result(
         time=drive.time,
@@ -155,7 +164,7 @@ def march(
         for begin in range(first, n_steps, BLOCK):
             end = min(begin + BLOCK, n_steps)
             states, heat = advance(prepared.layout, prepared.system, z, _block(inputs, begin, end))
-            made = (states, heat.film, heat.stored, heat.power, heat.theta, heat.surface, heat.winding)
+            made = (states, heat.film, heat.gross, heat.stored, heat.power, heat.theta, heat.surface, heat.winding)
             steps = Steps(*(np.asarray(a)[: end - begin] for a in made))
             done.append(steps)
             fresh.append(steps)

@@ -11,8 +11,9 @@ Paper 000 eqs (4)-(6) with the films implicit (erratum E-000-3). Gamma, the dwel
 assembled by body, never as an n_ports x n_ports product.
 
 theta follows surface temperature and speed in every step (`twin.rom.following`). The factor is kept until a conductance
-or a dwell weight changes, or theta leaves the values held in it by a share of FOLLOW; what is left of theta then goes
-explicitly to the right side: of first order like the scheme, stable as |theta - held| <= held, exact in the balance.
+or a dwell weight changes, or theta leaves the values held in it by a share of FOLLOW. What is left of theta goes to the
+right side, first with the state before and once more with the state so found: what then remains is of second order in
+the deviation, stable as |theta - held| < held, and the balance counts what was solved.
 """
 
 from __future__ import annotations
@@ -64,6 +65,7 @@ class StepHeat:
     """Heat of a step and what made it. Balance: stored = dt * (sum of power + sum of film)."""
 
     film: Array  # (n_films,) W, mean over the step, positive into the machine
+    gross: Array  # () W: all that films exchange, radiation and convection of one film each counted
     stored: Array  # () J
     power: Array  # (n_sources,) W
     theta: Array  # (n_theta,) W/(m^2 K), radiation included
@@ -167,26 +169,30 @@ class _Loads:
     power: jax.Array  # (n_sources,)
     surface: jax.Array  # (n_films,)
     winding: jax.Array  # (n_following_losses,)
+    radiated: jax.Array  # (n_films,) W
 
 
 def _loads(layout: Layout, system: System, z: jax.Array, inputs: Inputs) -> _Loads:
     n, T_ref = layout.n_films, system.reference_temperature
     theta, power = jnp.asarray(inputs.theta), jnp.asarray(inputs.power)
-    surface = T_ref + (system.film_rows @ z) / system.film_area
-    if layout.following_films:
-        own = np.array(layout.following_films)
-        air = inputs.environment[system.film_environment[own]]
-        theta = theta.at[own].set(read_table(jnp, inputs.film_table, difference_place(jnp, surface[own] - air)))
     plan = FilmPlan(
         system.film_environment, system.film_radiant, system.film_emissivity, system.film_gradient, system.film_height
     )
+    area = jnp.where(system.film_area > 0.0, system.film_area, 1.0)
+    surface = T_ref + (system.film_rows @ z) / area
+    if layout.following_films:
+        own = np.array(layout.following_films)
+        air = plan.air(inputs.environment, system.film_moment / area)[own]
+        theta = theta.at[own].set(read_table(jnp, inputs.film_table, difference_place(jnp, surface[own] - air)))
     films = film_state(jnp, plan, theta[:n], surface, inputs.environment, inputs.radiation)
     theta = theta.at[:n].set(films.total)
     winding = T_ref + system.source_rows @ z
     if layout.following_losses:
         own = np.array(layout.following_losses)
         power = power.at[own].set(read_table(jnp, inputs.power_table, temperature_place(jnp, winding)))
-    return _Loads(theta, films.outer - T_ref, films.lift, power, jnp.asarray(surface), jnp.asarray(winding))
+    return _Loads(
+        theta, films.outer - T_ref, films.lift, power, jnp.asarray(surface), jnp.asarray(winding), area * films.radiated
+    )
 
 
 def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[State, tuple[jax.Array, StepHeat]]:
@@ -207,15 +213,19 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
     film_in = system.M @ (loads.theta[:n] * loads.rise) + system.H @ loads.lift
     forcing = film_in + system.B @ loads.power + jnp.concatenate(port_heat)
 
+    def solved(known: jax.Array, seen: jax.Array, rest: tuple[jax.Array, ...]) -> jax.Array:
+        if rest:
+            known = known - jnp.concatenate([R @ zb for R, zb in zip(rest, jnp.split(seen, borders), strict=True)])
+        return jnp.concatenate(solve(factor, layout.elimination, jnp.split(known, borders), layout.symmetric))
+
     def substeps(rest: tuple[jax.Array, ...]) -> tuple[jax.Array, jax.Array, jax.Array]:
         def substep(_: int, sums: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array, jax.Array]:
             z, old, new = sums
-            right = inputs.rate * z + forcing
+            known, seen = jnp.asarray(inputs.rate * z + forcing), z
+            after = solved(known, seen, rest)
             if rest:
-                right = right - jnp.concatenate([R @ zb for R, zb in zip(rest, jnp.split(z, borders), strict=True)])
-            parts = solve(factor, layout.elimination, jnp.split(right, borders), layout.symmetric)
-            after = jnp.concatenate(parts)
-            return after, old + z, new + after
+                seen, after = after, solved(known, after, rest)
+            return after, old + seen, new + after
 
         zero = jnp.zeros_like(start)
         return lax.fori_loop(0, inputs.substeps, substep, (start, zero, zero))
@@ -228,7 +238,8 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
     )
     film = loads.theta[:n] * system.film_area * loads.rise + system.film_moment * loads.lift
     film = film - (held[:n] * (system.film_rows @ new) + more[:n] * (system.film_rows @ old)) / inputs.substeps
-    heat = StepHeat(film, system.energy @ (z - start), loads.power, loads.theta, loads.surface, loads.winding)
+    gross = jnp.abs(film - loads.radiated).sum() + jnp.abs(loads.radiated).sum()
+    heat = StepHeat(film, gross, system.energy @ (z - start), loads.power, loads.theta, loads.surface, loads.winding)
     return State(z, factor, held), (z, heat)
 
 
