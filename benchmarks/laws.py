@@ -22,16 +22,13 @@ from twin.run.stepping import advance, inputs_of
 from twin.run.system import prepare
 
 STILL = LawUse("constant_film", {"natural": 10.0}, {})
+HEAT = LawUse("constant_heat", {"power": 100.0}, {})
 
 
 def constant(load: LoadModel) -> LoadModel:
-    """The same machine with literature values for all films, no radiation, and cold windings."""
+    """The same machine with literature values for all films, no radiation, and constant heat where a source follows."""
     films = tuple(replace(f, use=STILL, gain=1.0, emissivity=0.0) for f in load.films)
-    cold = LawUse("motor_copper", {"resistance": 1.0}, {})
-    sources = tuple(
-        replace(s, use=replace(cold, signals={"current": s.use.signals["current"]})) if states_of(s.use) else s
-        for s in load.sources
-    )
+    sources = tuple(replace(s, use=HEAT) if states_of(s.use) else s for s in load.sources)
     return replace(load, films=films, sources=sources)
 
 

@@ -59,7 +59,8 @@ class Layout:
 class System:
     """Numbers of a machine in coordinates with E = 1; N states of all bodies one after the other."""
 
-    A0: tuple[Array, ...]  # per body (n, n) 1/s
+    A0: tuple[Array, ...]  # per body (n, n) 1/s, joints at their nominal conductances included
+    nominal: Array  # (n_theta,) W/(m^2 K): what A0 includes; zero for films
     A: tuple[Array, ...]  # per body (n_terms, n, n)
     P: tuple[Array, ...]  # per body (n, n_ports): port heat in
     port_rows: tuple[Array, ...]  # per body (n_ports, n): port temperatures out
@@ -195,8 +196,10 @@ def prepare(model: MachineModel) -> Prepared:
         C[list(body.sensors), rows] = body.C
         G[:, rows] = body.G.reshape(-1, body.n)
     films = FilmPlan.of(load)
+    nominal = np.array([0.0] * n_films + [j.conductance for j in load.joints])
     system = System(
-        A0=tuple(b.A0 for b in bodies),
+        A0=tuple(b.A0 + np.tensordot(nominal[list(b.theta)], np.array(b.A).reshape(-1, b.n, b.n), 1) for b in bodies),
+        nominal=nominal,
         A=tuple(np.array(b.A).reshape(-1, b.n, b.n) for b in bodies),
         P=tuple(b.P[:, o] for b, o in zip(bodies, order, strict=True)),
         port_rows=tuple(b.port_rows[o] for b, o in zip(bodies, order, strict=True)),
