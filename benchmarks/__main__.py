@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import resource
 import time
+
+# as the command line does; both are read when numpy is imported
+for variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
 
 NAMES = (
     "machines", "certificate", "case", "poses", "moved", "step", "laws", "replay", "load_pipeline",

@@ -146,3 +146,42 @@ def test_limits_of_an_axis_ask_for_a_sampling(tmp_path, capsys):
     fast = limits.replace('jerk = "200 m/s^3"\n', "").replace('acceleration = "10 m/s^2"\n', "")
     status, found = check(capsys, RUN, "--machine", edited(tmp_path, ('position = "x_position"\n', fast)))
     assert any("7 ms (position of axis 'x')" in p["what"] for p in found["problems"])
+
+
+JOINT = (
+    'surfaces = ["bed.z_min", "foot_1.z_max"]\nconductance = "2000 W/(m^2*K)"',
+    'surfaces = ["bed.z_min", "foot_1.z_max"]\n{joint}',
+)
+
+
+@pytest.mark.parametrize(
+    ("joint", "place", "what"),
+    [
+        ('joint = { law = "bolted_joints", parameters = {} }', "contacts.foot_1.joint", "no joint law"),
+        ('joint = { law = "bolted_joint", parameters = {} }', "contacts.foot_1.joint.parameters", "needs"),
+        ("", "contacts.foot_1", "give either a conductance or a joint law"),
+        ('conductance = 2000.0\njoint = { law = "bolted_joint" }', "contacts.foot_1", "give either"),
+    ],
+)
+def test_a_joint_without_a_sound_conductance_is_an_error_with_its_place(capsys, tmp_path, joint, place, what):
+    path = edited(tmp_path, (JOINT[0], JOINT[1].format(joint=joint)))
+    status, found = check(capsys, path)
+    assert status == 2
+    problems = [p for p in found["problems"] if not p["warning"]]
+    assert all(place in p["where"] and "line" in p["where"] for p in problems)
+    assert any(what in p["what"] for p in problems)
+
+
+def test_a_film_needs_surfaces_and_a_scale_an_expansion_of_a_material(capsys, tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    empty = edited(tmp_path / "a", ('surfaces = ["foot_1.*", "foot_2.*", "foot_3.*"]', "surfaces = []"))
+    status, found = check(capsys, empty)
+    assert status == 2
+    assert "films.floor.surfaces" in found["problems"][0]["where"]
+    scale = 'scale = "bed.z_max", reader = "slide.y_max", fixed_at = "0 mm", expansion = 10.0'
+    position = 'position = "x_position"'
+    encoded = edited(tmp_path / "b", (position, position + "\nencoder = { kind = 'linear', " + scale + " }"))
+    status, found = check(capsys, "--no-meshes", encoded)
+    assert status == 2
+    assert any("axes.x.encoder.expansion" in p["where"] for p in found["problems"])

@@ -41,12 +41,13 @@ def test_settled_table(tmp_path, capsys):
     result(tmp_path / "result.h5", hours=4.0)
     assert run(["warmup", str(tmp_path)]) == 0
     out = capsys.readouterr().out
-    assert f"warm after {TAU / 60 * np.log(80.0):.0f} min" in out  # 80 exp(-t/tau) = 1 at pose 1
-    rows = {line.split("  ")[0]: line for line in out.splitlines()[2:]}
+    assert f": TCP warm after {TAU / 60 * np.log(80.0):.0f} min" in out  # 80 exp(-t/tau) = 1 at pose 1
+    rows = {line.split("  ")[0]: line for line in out.splitlines()[3:]}
     assert rows["dx at the actual position"].split()[5:8] == ["40.00", "um", "55"]
     assert "x 200 mm" in out
     assert rows["motor"].split()[1:7] == ["10.00", "K", "69", "min", "15", "min"]
     assert "not reached" in rows["bed"]
+    assert "1 of 2 sensors settled within 0.1 K" in out.splitlines()[0]  # the verdict is that of the TCP only
     assert "+0.36 K/h" in rows["bed"]
 
 
@@ -55,8 +56,23 @@ def test_stopped_too_early_is_said(tmp_path, capsys):
     assert run(["warmup", str(path)]) == 0
     out = capsys.readouterr().out
     assert "not settled after 30 min" in out
-    assert "dx +" in out.splitlines()[0]
+    name, drift = out.splitlines()[1].removeprefix("fastest drift at the end: ").rsplit(": ", 1)
+    assert name == "dx at its worst pose, x 200 mm"
+    (row,) = (line for line in out.splitlines()[2:] if line.startswith(name))
+    assert row.endswith(f"  {drift}")  # the same number as in the table
+    assert float(drift.split()[0]) > 10.0
     assert out.count("not reached") >= 4
+
+
+def test_within_the_tolerance_at_the_last_sample_only_is_not_warm(tmp_path, capsys):
+    path = result(tmp_path / "result.h5", hours=4.0)
+    with h5py.File(path, "r+") as f:
+        f["tcp"][-1, 1, 0] += 5e-6
+    assert run(["warmup", str(path), "--horizon", "1 s"]) == 0
+    out = capsys.readouterr().out
+    assert "TCP not settled after 240 min" in out.splitlines()[0]
+    (row,) = (line for line in out.splitlines() if line.startswith("dx at its worst pose"))
+    assert "not reached" in row
 
 
 def test_json(tmp_path, capsys):

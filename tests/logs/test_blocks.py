@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.logs.test_read import write
+from tests.support import synthetic
 from twin.cli.main import run
 from twin.errors import LogError
 from twin.logs.block_file import append, decode, encode, read_blocks
@@ -22,6 +23,8 @@ from twin.logs.check import check_run
 from twin.logs.compress import compress_loads
 from twin.logs.read import read_run
 from twin.logs.unpack import unpack
+from twin.logs.write import write_run
+from twin.rom.drive import evaluate
 
 NAMES, UNITS = ("x", "i", "v"), ("m", "A", "m/s")
 T_CORE = 0.01
@@ -356,11 +359,48 @@ def test_unpack_to_means_is_the_compressed_log(tmp_path: Path):
     whole, counts, gaps = unpack(path)
     means, _, _ = unpack(path, 0.5)
     assert (counts, gaps) == (Counts(delivered=200), 0)
-    expected = compress_loads(whole.loads, 0.5)
+    expected = compress_loads(whole.loads, 0.5, end=10.0001)  # stamps are rounded
     assert means.sampling == 0.5
     assert "means over 0.5 s" in means.provenance
     for name in NAMES:
-        assert means.loads.columns[name] == pytest.approx(expected.columns[name], rel=1e-9)
+        assert means.loads.columns[name][:-1] == pytest.approx(expected.columns[name], rel=1e-6)
+    assert means.loads.time[-1] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(("mean", "rows"), [(10.0, 61), (420.0, 3), (599.0, 3), (600.0, 2), (0.5, 1201)])
+def test_means_of_a_sent_log_heat_the_machine_as_its_records_do(tmp_path: Path, mean: float, rows: int):
+    """Ten minutes of records every half second; through `evaluate`, over steps that end with the log and after it."""
+    load = synthetic.load_model()
+    units = {s.name: s.unit for s in load.signals}
+    rng = np.random.default_rng(3)
+    values = np.column_stack([
+        {"degC": 20.0 + noise, "A": 15.0 * noise * (noise > 0.7), "m/s": noise - 0.5}.get(unit, 0.4 + 0.1 * noise)
+        for unit, noise in ((unit, rng.random(1200)) for unit in units.values())
+    ])  # fmt: skip
+    path = sent(tmp_path / "a.twb", list(group([values], tuple(units), tuple(units.values()), START, 0.5, 7)))
+    records, means = unpack(path)[0].loads, unpack(path, mean)[0]
+    assert len(means.loads.time) == rows
+    assert means.loads.time[-1] == pytest.approx(600.0)
+    assert means.sampling in (mean, None)
+    for dt in (60.0, 450.0):
+        ours = evaluate(load, means.loads.time, means.loads.columns, dt)
+        exact = evaluate(load, records.time, records.columns, dt)
+        assert ours.n_steps == exact.n_steps
+        np.testing.assert_allclose(ours.power.sum(axis=0), exact.power.sum(axis=0), rtol=1e-9)
+    write_run(tmp_path / "run", means)
+    assert not [p for p in check_run(read_run(tmp_path / "run")) if "gap" in p.what or "apart" in p.what]
+
+
+@pytest.mark.parametrize("mean", [0.001, 0.0099])
+def test_means_over_less_than_a_record_are_refused(tmp_path: Path, mean: float, capsys):
+    path = sent(tmp_path / "a.twb", blocks(3))
+    with pytest.raises(LogError, match=r"records 0\.01 s apart"):
+        unpack(path, mean)
+    assert run(["unpack", str(path), "-o", str(tmp_path / "run"), "--mean", f"{mean} s"]) == 2
+    assert "--mean '0.01 s' or longer" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+    same = unpack(path, 0.01)[0].loads.columns["i"]
+    assert same == pytest.approx([*range(15), 14], rel=1e-4)  # stamps are rounded
 
 
 def test_stamps_that_are_no_dates_count_from_the_start(tmp_path: Path):

@@ -85,12 +85,37 @@ def test_a_stream_gives_the_same(sizes: list[int]):
     pieces = [
         Table(loads.time[a:b], {n: v[a:b] for n, v in loads.columns.items()}, UNITS) for a, b in pairwise(borders)
     ]
-    parts = list(compress_stream(pieces, 0.25))
+    parts = list(compress_stream(pieces, 0.25, lambda: 0.01))
     whole = compress_loads(loads, 0.25)
-    assert np.concatenate([p.time for p in parts]) == pytest.approx(whole.time, abs=1e-12)
+    assert np.concatenate([p.time for p in parts]) == pytest.approx([*whole.time, 10.0], abs=1e-12)
     for name in UNITS:
         ours = np.concatenate([p.columns[name] for p in parts])
-        assert ours == pytest.approx(whole.columns[name], rel=1e-9, abs=1e-12)
+        assert ours[:-1] == pytest.approx(whole.columns[name], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("interval", [0.01, 0.3, 0.995, 6.0, 9.999, 10.0])
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_a_stream_keeps_the_heat_to_its_last_sample(interval: float, size: int):
+    loads = log()
+    pieces = [
+        Table(loads.time[a : a + size], {n: v[a : a + size] for n, v in loads.columns.items()}, UNITS)
+        for a in range(0, 1000, size)
+    ]
+    parts = list(compress_stream(pieces, interval, lambda: 0.01))
+    time = np.concatenate([p.time for p in parts])
+    assert time[-1] == pytest.approx(10.0, abs=1e-9)
+    assert len(time) == np.ceil(10.0 / interval - 1e-9) + 1
+    assert np.diff(time).min() > 1e-4
+    c = {n: np.concatenate([p.columns[n] for p in parts]) for n in UNITS}
+    held = np.diff(time)
+    for heat, ours in ((loads.columns["i"] ** 2, c["i"] ** 2), (abs(loads.columns["v"]), c["v"])):
+        assert ours[:-1] @ held == pytest.approx(heat.sum() * 0.01, rel=1e-9)
+        assert ours[-1] == pytest.approx(heat[-1])
+    assert c["x"] == pytest.approx(np.interp(time, loads.time, loads.columns["x"]), abs=1e-9)
+
+
+def test_nothing_comes_of_a_stream_shorter_than_an_interval():
+    assert list(compress_stream([log()], 10.1, lambda: 0.01)) == []
 
 
 def test_dwell_of_an_even_sweep_and_of_rest():
@@ -150,4 +175,4 @@ def test_times_must_increase():
 def test_columns_may_not_change_in_a_stream():
     a, b = log(10), Table(np.arange(10, 20) * 0.01, {"i": np.ones(10)}, {"i": "A"})
     with pytest.raises(LogError, match="columns change"):
-        list(compress_stream([a, b], 1.0))
+        list(compress_stream([a, b], 1.0, lambda: 0.01))

@@ -1,5 +1,6 @@
 """The worked example of docs/how_to_add_a_law.md runs, and what it says of the table holds."""
 
+import importlib
 import inspect
 import re
 import tomllib
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.physics import points
 from twin.physics.laws import LAWS, Law
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how_to_add_a_law.md").read_text(encoding="utf-8")
@@ -50,3 +52,17 @@ def test_its_description_gives_every_argument_and_no_other(example):
     assert set(source["parameters"]) == set(row.parameters)
     assert set(source["signals"]) == set(row.signals)
     assert set(source["signals"].values()) <= set(description["signals"])
+
+
+def test_the_tables_and_the_point_it_names_are_those_of_the_project(example):
+    for table, names in (("loss_table", ("LOSSES",)), ("film_table", ("FILMS", "JOINTS"))):
+        module = importlib.import_module(f"twin.physics.{table}")
+        assert f"`twin/physics/{table}.py`" in PAGE
+        for name in names:
+            assert f"`{name}`" in PAGE
+            assert set(getattr(module, name)) == set(getattr(points, name))  # the points have the same keys
+    ((name, point),) = example["point"].items()
+    assert name == example["row"].function.__name__
+    assert f'"{name}": Law(\n        motors.{name}, ' in PAGE
+    assert example["row"].function(**point) > 0.0
+    assert example["row"].validity.holds(**point)

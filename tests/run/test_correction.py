@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from twin.cli.correction import command
+from twin.cli.main import run
 from twin.errors import ModelError, TwinError
 from twin.machine.bodies import bodies_of
 from twin.machine.kinematics import direction, linear_axes, moved_bodies
@@ -283,7 +284,7 @@ def test_command_options(slide_artefact, slide_result, tmp_path):
     assert "compressed" in told.output
     told = call(slide_artefact, slide_result, "-o", path, "--zero-at", "-350 mm")
     c = json.loads(path.read_text())
-    s = (-0.35 - c["axes"][0]["centre_m"]) / c["axes"][0]["half_range_m"]
+    s = (-0.15 - c["axes"][0]["centre_m"]) / c["axes"][0]["half_range_m"]
     np.testing.assert_allclose(np.array(c["coefficients_m"]) @ s ** np.arange(5), 0.0, atol=1e-17)
 
 
@@ -295,6 +296,10 @@ def test_command_options(slide_artefact, slide_result, tmp_path):
         (("--degree", "z=2"), "no axis 'z'"),
         (("--degree", "two"), "no degree"),
         (("--degree", "7"), "needs 8 positions"),
+        (("--degree", "99"), "degree 99 along axis 'x' needs 100 positions, the poses have 5"),
+        (("--degree", "9" * 5000), "no degree"),
+        (("--zero-at", "-600.1 mm"), "far outside the stroke of axis 'x', -200 to 200 mm"),
+        (("--zero-at", "5 m"), "far outside the stroke"),
         (("--zero-at", "3 kg"), "--zero-at"),
         (("--zero-at", "0 mm", "--form", "product"), "along one axis"),
     ],
@@ -316,3 +321,16 @@ def test_results_of_other_artefacts_are_refused(slide_artefact, slide_result, tm
         f.attrs["artefact"] = "0" * 64
     with pytest.raises(TwinError, match="another artefact"):
         call(slide_artefact, tmp_path, "-o", tmp_path / "c.json")
+
+
+@pytest.mark.parametrize("content", [b"time [s],x [m]\n0,1\n", b"{}", b"[1]", b"", b"\xff\x00"])
+def test_other_files_are_not_replaced(content, tmp_path, capsys):
+    """Told before anything is read: there is neither an artefact nor a result."""
+    path = tmp_path / "loads.csv"
+    path.write_bytes(content)
+    assert run(["correction", str(tmp_path / "a.h5"), str(tmp_path / "result"), "-o", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert "loads.csv" in told
+    assert "not replaced" in told
+    assert "Traceback" not in told
+    assert path.read_bytes() == content

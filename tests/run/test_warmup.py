@@ -70,6 +70,19 @@ def test_a_ramp_is_never_warm():
     assert s.t95 == pytest.approx(0.95 * TIME[-1], rel=1e-9)
 
 
+def test_the_end_of_the_run_is_no_time_to_be_warm():
+    """Only the last sample lies within the tolerance: of itself, whatever the rate."""
+    time = np.arange(0.0, 7201.0, 60.0)
+    cycle = 5e-6 * np.sin(np.pi * np.arange(len(time)) / 2 + 0.1)  # four samples a cycle, no drift
+    assert abs(end_rate(time, cycle, 600.0)) < 1e-8
+    s = settling(time, cycle, 1e-6, horizon=60.0)
+    assert (s.settled, s.time) == (False, None)
+    step = np.where(time < time[-1], 0.0, 2e-6)
+    assert settling(time, step, 1e-6, horizon=1.0).time is None
+    earlier = np.where(time < time[-2], 0.0, 2e-6)
+    assert settling(time, earlier, 1e-6, horizon=1.0).time == pytest.approx(time[-2] - 30.0)
+
+
 def test_end_rate_reads_its_window_only():
     time = np.arange(0.0, 3601.0, 60.0)
     value = np.where(time < 3000.0, 7.0, 0.0) + 2e-3 * time

@@ -192,3 +192,18 @@ def test_full_model_closes_its_heat_balance_at_every_position():
     x = stepper.uniform(20.0)
     for _, _, heat in stepper.run(drive, x, substeps=2):
         assert heat.balance_error < 1e-8
+
+
+def test_a_build_does_not_replace_what_is_no_artefact(tmp_path, capsys):
+    notes = tmp_path / "notes.md"
+    notes.write_text("mine")
+    assert run(["build", str(SLIDE), "-o", str(notes)]) == 2
+    assert "is no artefact" in capsys.readouterr().err
+    assert notes.read_text() == "mine"
+
+
+def test_simulate_does_not_go_on_beyond_the_log(tmp_path, capsys):
+    log = SLIDE / "runs" / "short"
+    assert run(["simulate", str(SLIDE), str(log), "-o", str(tmp_path / "truth"), "--hours", "900"]) == 2
+    assert "the log covers" in capsys.readouterr().err
+    assert not (tmp_path / "truth").exists()

@@ -59,8 +59,9 @@ class Comparison:
     def scaled(self, limits: Limits) -> tuple[np.ndarray, np.ndarray]:
         """Maximum error per sensor (n_sensors,) K and TCP row (n_poses, 3) m with every scenario scaled to the case.
 
-        Exact for each scenario, because the models are linear in loads and air temperatures at given films and
-        positions: the scenario with all of them scaled has all responses and errors scaled.
+        Exact for scenarios with given films, because the models are linear in loads and air temperatures then: the
+        scenario with all of them scaled has all responses and errors scaled. An estimate where films follow the
+        surface: scaled loads have other films, in both models alike.
         """
         T = self.temperature_error * (limits.at_temperature_range / np.maximum(self.temperature_case, TINY))[:, None]
         u = (

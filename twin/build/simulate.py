@@ -14,6 +14,7 @@ from twin.build.full_model import FullModel
 from twin.build.pipeline import full_model
 from twin.build.remesh import remesh
 from twin.build.stepper import CoupledStepper, sensor_temperatures
+from twin.errors import LogError
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.logs.signals import signal_values
@@ -116,6 +117,9 @@ def simulate_run(
     full = full_model(machine, progress)
     run = read_run(run_folder)
     load = full.thermal.load_model
+    span = float(run.loads.time[-1] - run.loads.time[0]) / 3600.0
+    if hours is not None and hours > span + dt / 3600.0:
+        raise LogError(f"the log covers {span:g} h, not {hours:g} h", str(run_folder), "give --hours within the log")
     n_steps = None if hours is None else int(np.ceil(hours * 3600.0 / dt))
     drive = evaluate(load, run.loads.time, signal_values(run, load.signals), dt, n_steps)
     axes = full.thermal.pose_axes

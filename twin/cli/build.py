@@ -23,6 +23,8 @@ def command(machine: str, output: str, method: str, states: int, samples: int, t
     from dataclasses import replace
     from pathlib import Path
 
+    import h5py
+
     from twin.atomic import check_file
     from twin.build.pipeline import BuildOptions
     from twin.build.product import build_artefact
@@ -36,6 +38,8 @@ def command(machine: str, output: str, method: str, states: int, samples: int, t
     check_file(Path(output))
     if Path(output).suffix in (".toml", ".msh", ".csv"):
         raise TwinError("would replace an input", output, "name an artefact with -o, for example -o out/machine.h5")
+    if Path(output).is_file() and Path(output).stat().st_size and not h5py.is_hdf5(output):
+        raise TwinError("exists and is no artefact", output, "name a new file with -o; it would be replaced")
     require_sound(Path(machine))
     result = build_artefact(Path(machine), Path(output), options, bar)
     hint = f"twin verify {output}" if result.passed else "more --states, or larger [limits] in the description"

@@ -13,6 +13,7 @@ import click
 def command(file: str, output: str, mean: str | None, machine: str | None) -> None:
     """Put the load blocks of FILE in order and write them to OUTPUT as the loads of a run.
 
+    With --mean the last interval may be shorter; a closing row stands where the last record ceases to hold.
     Blocks that are damaged, lost, repeated or out of order are counted; a gap is a row without values, which runs flag.
     """
     from pathlib import Path

@@ -23,8 +23,9 @@ def command(result: str, tolerance: str, temperature: str, horizon: str, as_json
     Per TCP component (at the actual position, which moves with the axes, and at the pose where it changes most) and per
     sensor: the time from which on the value stays within the tolerance of its final value; t63 and t95, from which on
     it stays within 37 % and 5 % of its largest distance from the final value; the drift at the end, a line through the
-    last ten minutes. Where the drift at the end is more than the tolerance in the horizon, the machine has not settled
-    and the time is "not reached": the final value is only where the run was stopped.
+    last ten minutes. Where the drift at the end is more than the tolerance in the horizon, or only the last value lies
+    within the tolerance, it has not settled and the time is "not reached": the final value is only where the run was
+    stopped. The verdict in the first line is that of the TCP at its worst poses; sensors are counted beside it.
     """
     import json
     from pathlib import Path
@@ -71,29 +72,31 @@ def facts(history: History, found: WarmUp, options: dict[str, float]) -> dict[st
 
 def text(result: str, told: dict[str, Any]) -> str:
     """The same as a table: minutes, um and K."""
-    poses = {
-        name: "at " + (", ".join(f"{a} {1e3 * v:.0f} mm" for a, v in entry["pose_m"].items()) or "the only pose")
+    labels = {
+        name: f"{name} at its worst pose" + "".join(f", {a} {1e3 * v:.0f} mm" for a, v in entry["pose_m"].items())
         for name, entry in told["tcp_worst"].items()
     }
     rows: list[tuple[str, ...]] = [("", "change", "warm", "t63", "t95", "drift at the end")]
     rows += [_row(f"{name} at the actual position", e, "m", 1e6, "um") for name, e in told["tcp_actual"].items()]
-    rows += [_row(f"{name} {poses[name]}", e, "m", 1e6, "um") for name, e in told["tcp_worst"].items()]
+    rows += [_row(labels[name], e, "m", 1e6, "um") for name, e in told["tcp_worst"].items()]
     rows += [_row(name, e, "K", 1.0, "K") for name, e in told["sensors"].items()]
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     table = [
         "  ".join([row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:], strict=True))])
         for row in rows
     ]
-    settled = told["settled"]
-    verdict = (
-        f"warm after {_minutes(told['time_s'])}" if settled else f"not settled after {told['duration_s'] / 60:.0f} min"
-    )
-    worst = max(told["tcp_worst"].items(), key=lambda item: abs(item[1]["end_rate_m_per_s"]))
-    drift = 3.6e9 * worst[1]["end_rate_m_per_s"]
+    if told["settled"]:
+        verdict = f"TCP warm after {_minutes(told['time_s'])}"
+    else:
+        verdict = f"TCP not settled after {told['duration_s'] / 60:.0f} min"
+    name, worst = max(told["tcp_worst"].items(), key=lambda item: abs(item[1]["end_rate_m_per_s"]))
+    sensors = told["sensors"].values()
     return "\n".join(
         [
-            f"{result}: {verdict} (within {1e6 * told['tolerance_m']:g} um and {told['tolerance_K']:g} K, for "
-            f"{told['horizon_s'] / 3600:g} h); fastest drift of the TCP at the end d{worst[0][1:]} {drift:+.2f} um/h",
+            f"{result}: {verdict} (worst poses, within {1e6 * told['tolerance_m']:g} um for "
+            f"{told['horizon_s'] / 3600:g} h); {sum(e['settled'] for e in sensors)} of {len(sensors)} sensors settled "
+            f"within {told['tolerance_K']:g} K",
+            f"fastest drift at the end: {labels[name]}: {_drift(worst, 'm', 1e6, 'um')}",
             *(line.rstrip() for line in table),
         ]
     )
@@ -106,8 +109,12 @@ def _row(name: str, entry: dict[str, Any], unit: str, factor: float, shown: str)
         _minutes(entry["time_s"]),
         _minutes(entry["t63_s"]),
         _minutes(entry["t95_s"]),
-        f"{3600 * factor * entry[f'end_rate_{unit}_per_s']:+.2f} {shown}/h",
+        _drift(entry, unit, factor, shown),
     )
+
+
+def _drift(entry: dict[str, Any], unit: str, factor: float, shown: str) -> str:
+    return f"{3600 * factor * entry[f'end_rate_{unit}_per_s']:+.2f} {shown}/h"
 
 
 def _minutes(seconds: float | None) -> str:

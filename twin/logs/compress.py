@@ -9,7 +9,7 @@ which `dwell_shares` keeps what heat needs to know. Loads hold until the next sa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,11 +67,16 @@ def compress_loads(
     count = int(np.floor((end - time[0]) / interval * (1.0 + 1e-12)))
     if count < 1:
         raise LogError(f"no interval of {interval:g} s is complete", "loads", "log longer, or average over less")
-    edges = time[0] + interval * np.arange(count + 1)
+    return _over(loads, time[0] + interval * np.arange(count + 1), products or {})
+
+
+def _over(loads: Table, edges: np.ndarray, products: Mapping[str, tuple[str, str]]) -> Table:
+    """The log over the intervals between `edges` (k + 1,) [s], the first of them not before the log."""
+    time = np.asarray(loads.time, dtype=float)
     pieces = _cut(time, edges)
     columns = {n: _compressed(pieces, time, edges, v, loads.units[n]) for n, v in loads.columns.items()}
     units = dict(loads.units)
-    for name, (a, b) in (products or {}).items():
+    for name, (a, b) in products.items():
         unknown = [c for c in (a, b) if c not in loads.columns]
         if unknown:
             raise LogError(f"no column '{unknown[0]}'", "loads", f"columns are: {', '.join(loads.columns)}")
@@ -85,12 +90,16 @@ def compress_loads(
     return Table(edges[:-1], columns, units, loads.naive)
 
 
-def compress_stream(tables: Iterable[Table], interval: float) -> Iterator[Table]:
-    """`compress_loads` of a log that comes in pieces, in bounded memory: the pieces' complete intervals, as they come.
+def compress_stream(tables: Iterable[Table], interval: float, hold: Callable[[], float]) -> Iterator[Table]:
+    """A whole log that comes in pieces, in bounded memory: means over every `interval` [s] from its first sample on.
 
-    Intervals count from the first sample of all. Raises LogError as `compress_loads` does.
+    Unlike `compress_loads` nothing is left over: the last interval ends with the log, complete or not, and a closing
+    row there tells how long it is. That row has the values of the last sample (magnitudes of what is compressed to
+    those), which hold after it as after the log itself. hold(): how long the last sample holds [s], asked at the end.
+    Nothing comes of a log shorter than `interval`. Raises LogError as `compress_loads` does.
     """
     rest: Table | None = None
+    complete = False
     for table in tables:
         whole = table if rest is None else _joined(rest, table)
         last = float(whole.time[-1])
@@ -99,11 +108,23 @@ def compress_stream(tables: Iterable[Table], interval: float) -> Iterator[Table]
             continue
         done = compress_loads(whole, interval, end=last)
         yield done
+        complete = True
         rest = _from(whole, float(done.time[-1] + interval))
-    if rest is not None and len(rest.time) > 1:
-        end = float(rest.time[-1] + np.median(np.diff(rest.time)))
-        if end - rest.time[0] >= interval * (1.0 - 1e-9):
-            yield compress_loads(rest, interval, end=end)
+    if rest is None:
+        return
+    start, held = float(rest.time[0]), hold()
+    end = float(rest.time[-1]) + held
+    sliver = 1e-3 * held  # POSIX stamps are rounded to 0.2 us: what that leaves is no interval
+    count = int(np.floor((end - start + sliver) / interval))
+    if not (complete or count):
+        return
+    edges = start + interval * np.arange(count + 1)
+    if end - edges[-1] > sliver:
+        edges = np.append(edges, end)
+    if len(edges) > 1:
+        edges[-1] = end
+        yield _over(rest, edges, {})
+    yield _closing(rest, float(edges[-1]))
 
 
 def dwell_shares(time: np.ndarray, position: np.ndarray, edges: np.ndarray, borders: np.ndarray) -> np.ndarray:
@@ -139,6 +160,13 @@ def _compressed(pieces: _Pieces, time: np.ndarray, edges: np.ndarray, values: np
     if unit in _WAY:
         return np.interp(edges[:-1], time, values)
     return pieces.mean(np.abs(values) if unit in _MAGNITUDE else values)
+
+
+def _closing(table: Table, end: float) -> Table:
+    """One row at `end` [s] with the last sample, as it would be compressed over no time at all."""
+    bare = _RMS | _MAGNITUDE
+    last = {n: np.abs(v[-1:]) if table.units[n] in bare else v[-1:] for n, v in table.columns.items()}
+    return Table(np.array([end]), last, table.units, table.naive)
 
 
 def _joined(first: Table, then: Table) -> Table:

@@ -22,8 +22,9 @@ def unpack(path: Path, mean: float | None = None, machine: str | None = None) ->
     """The run, what happened to its blocks, and the number of gaps.
 
     mean [s]: compress to means over this time as the blocks are read, in memory that does not grow with their number.
+    The last interval may be shorter; a closing row stands where the last record ceases to hold.
     Raises LogError: no file of blocks, nothing sound in it, columns that change or with units unknown, a log shorter
-    than `mean`.
+    than `mean`, records further apart than `mean`.
     """
     resolver = Resolver(window=None)
     blocks = in_order(read_blocks(path), resolver)
@@ -32,31 +33,40 @@ def unpack(path: Path, mean: float | None = None, machine: str | None = None) ->
         raise LogError(f"no sound block ({resolver.counts})", str(path), "check the sender, and the disk")
     _check_units(first, path)
     absolute = first.time > EPOCH
-    gaps = 0
+    gaps, before = 0, first
 
     def watched() -> Iterator[Block]:
-        nonlocal gaps
-        before = first
+        nonlocal gaps, before
+        _check_mean(first, mean, path)
         yield first
         for block in blocks:
+            _check_mean(block, mean, path)
             gaps += gap_between(before, block) is not None
-            yield block
             before = block
+            yield block
 
     parts = tables(watched(), first.time if absolute else 0.0)
-    log = list(parts if mean is None else compress_stream(parts, mean))
+    log = list(parts if mean is None else compress_stream(parts, mean, lambda: before.interval))
     if not log:
         raise LogError(f"the log is shorter than {mean:g} s", str(path), "give a shorter --mean")
     columns = {name: np.concatenate([piece.columns[name] for piece in log]) for name in log[0].columns}
+    time = np.concatenate([piece.time for piece in log])
+    usual = mean is None or abs(float(np.median(np.diff(time))) - mean) < 0.05 * mean  # not of an interval and a half
     said = f"unpacked from {path.name}; {resolver.counts}" + (f"; {gaps} gap{'s' * (gaps > 1)}" if gaps else "")
     run = Run(
-        loads=Table(np.concatenate([piece.time for piece in log]), columns, log[0].units),
+        loads=Table(time, columns, log[0].units),
         start=datetime.fromtimestamp(first.time, UTC) if absolute else None,
-        sampling=mean or first.interval,
+        sampling=(mean or first.interval) if usual else None,
         provenance=said + (f"; means over {mean:g} s: rms, mean of magnitudes" if mean else ""),
         machine=machine,
     )
     return run, resolver.counts, gaps
+
+
+def _check_mean(block: Block, mean: float | None, path: Path) -> None:
+    if mean is not None and mean < block.interval * (1.0 - 1e-9):
+        what = f"means over {mean:g} s of records {block.interval:g} s apart"
+        raise LogError(what, str(path), f"write --mean '{block.interval:g} s' or longer, or leave --mean out")
 
 
 def _check_units(block: Block, path: Path) -> None:

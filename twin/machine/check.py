@@ -38,8 +38,20 @@ def check_machine(machine: Machine) -> list[Problem]:
         problems += _material(name, material)
     problems += lumped_oddities(machine) if machine.lumped else []
     problems += _joints(machine)
+    problems += _encoders(machine)
     problems += _unused(machine)
     return problems
+
+
+def _encoders(machine: Machine) -> Iterator[Problem]:
+    """Scales whose expansion no material has."""
+    low, high, unit = _BANDS["expansion"]
+    for name, axis in machine.axes.items():
+        value = axis.encoder.expansion
+        if axis.encoder.kind == "linear" and not low <= value <= high:
+            what = f"{value:g} {unit} is outside {low:g} .. {high:g} of such materials"
+            remedy = 'steel has "11.7e-6 1/K", glass "8e-6 1/K"'
+            yield Problem(what, f"machine.toml: axes.{name}.encoder.expansion", remedy)
 
 
 def _joints(machine: Machine) -> Iterator[Problem]:

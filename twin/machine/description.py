@@ -195,7 +195,7 @@ class Film(Entry):
 
     law: str
     # "part.surface", or "part.*" for every surface of the part not used elsewhere; of a lumped machine nodes and bars
-    surfaces: tuple[str, ...]
+    surfaces: tuple[str, ...] = Field(min_length=1)
     area: Area | None = Field(None, gt=0)  # lumped machines: of a node that exchanges heat through several films
     environment: str
     gain: float = Field(1.0, gt=0)  # calibration factor of the convection
@@ -255,7 +255,7 @@ class Support(Entry):
 class Limits(Entry):
     """Above these errors, in a case of the stated size, `twin verify` fails.
 
-    The model is linear in its loads, so an error goes with the size of the temperature and TCP changes it belongs to.
+    At given films the model is linear in its loads, so an error goes with the size of the changes it belongs to.
     """
 
     temperature: TemperatureDifference = Field(0.02, gt=0)

@@ -141,6 +141,10 @@ def _contacts(machine: Machine) -> Iterator[Problem]:
     for name, entry in machine.contacts.items():
         if entry is not None:
             yield from (_fixed if entry.kind == "fixed" else _moving)(entry, f"contacts.{name}", machine)
+            try:
+                wiring.joint_conductance(name, machine)
+            except TwinError as e:
+                yield from e.problems
 
 
 def _fixed(entry: description.Contact, where: str, machine: Machine) -> Iterator[Problem]:

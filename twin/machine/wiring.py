@@ -103,6 +103,9 @@ def film_law(name: str, entry: description.Film, machine: Machine) -> LawUse:
             problems.append(Problem(f"unknown environment '{named}'", f"{where}.{key}", remedy))
     try:
         use = law_use(entry.law, "film", entry.parameters, entry.signals, where, machine)
+        if entry.emissivity and not LAWS[use.law].radiates:
+            what = f"surfaces of law '{use.law}' do not see their surroundings"
+            problems.append(Problem(what, f"{where}.emissivity", "remove it: they do not radiate"))
     except TwinError as e:
         raise DescriptionError.collect([*problems, *e.problems]) from e
     if problems:
@@ -140,7 +143,9 @@ def joint_conductance(name: str, machine: Machine) -> float:
     values = {n: use.parameters.get(n, a.default) for n, a in law.parameters.items()}
     value = float(law.function(**values))
     if not (value > 0 and math.isfinite(value)):
-        raise DescriptionError(f"law '{use.law}' gives {value:g} W/(m^2 K)", f"{where}.joint", "check its parameters")
+        bolts = "torque, pitch, flank_diameter, hole_diameter, head_diameter and area with the bolts"
+        remedy = f"give the pressure, or {bolts}" if "pressure" in law.parameters else "check its parameters"
+        raise DescriptionError(f"law '{use.law}' gives {value:g} W/(m^2 K)", f"{where}.joint.parameters", remedy)
     return value
 
 

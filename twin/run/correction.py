@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from twin.errors import TwinError
+from twin.rom.load_model import AxisWiring
 from twin.rom.poses import pose_weights
 from twin.run.correction_axes import offset_matrix, uncorrectable
 from twin.run.correction_polynomial import (
@@ -116,7 +117,7 @@ def fit_correction(
     axes = normalised_axes(errors.axes, errors.poses, degrees or default_degrees(errors))
     if zero_at is not None:
         if len(axes) != 1 or form != "full":
-            remedy = "leave --zero-at out" + ("" if form == "full" else ", or --form product")
+            remedy = "leave --zero-at out" + ("" if form == "full" else ", or write --form full")
             raise TwinError("a polynomial that is zero at a bearing goes along one axis", "--zero-at", remedy)
         if axes[0].degree < 1:
             raise TwinError("degree 0 leaves nothing but the constant", "--degree", "write --degree 4, or less")
@@ -125,6 +126,21 @@ def fit_correction(
         return Correction(fit_full(axes, errors.poses, errors.tcp), jacobian, form)
     product_form = fit_product(axes, errors.poses, errors.tcp)
     return Correction(product_form.expanded(), jacobian, form, product_form.factors)
+
+
+def check_zero(zero_at: float, names: Sequence[str], axes: Sequence[AxisWiring]) -> None:
+    """Raises TwinError where `zero_at` [m] lies further than a stroke from the stroke of the only axis.
+
+    A fixed bearing sits beyond the stroke, but not far; a unit slip does.
+    names: axes of the poses; several are for `fit_correction` to refuse. axes: those of the machine.
+    """
+    for axis in axes:
+        length = axis.high - axis.low
+        if list(names) != [axis.name] or axis.low - length <= zero_at <= axis.high + length:
+            continue
+        stroke = f"{1e3 * axis.low:g} to {1e3 * axis.high:g} mm"
+        what = f"{1e3 * zero_at:g} mm is far outside the stroke of axis '{axis.name}', {stroke}"
+        raise TwinError(what, "--zero-at", "write the position of the fixed bearing along the axis, with its unit")
 
 
 def corrected_error(correction: Correction, errors: PoseErrors, position: np.ndarray) -> np.ndarray:

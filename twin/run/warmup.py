@@ -115,7 +115,7 @@ def settling(
     distance = np.abs(value - value[-1])
     change = float(distance.max())
     rate = end_rate(elapsed, value, window)
-    settled = abs(rate) * horizon <= tolerance
+    settled = abs(rate) * horizon <= tolerance and bool(distance[-2] <= tolerance)
     return Settling(
         change=change,
         final=float(value[-1] - value[0]),
