@@ -284,7 +284,7 @@ def test_command_options(slide_artefact, slide_result, tmp_path):
     assert "compressed" in told.output
     told = call(slide_artefact, slide_result, "-o", path, "--zero-at", "-350 mm")
     c = json.loads(path.read_text())
-    s = (-0.15 - c["axes"][0]["centre_m"]) / c["axes"][0]["half_range_m"]
+    s = (-0.35 - c["axes"][0]["centre_m"]) / c["axes"][0]["half_range_m"]
     np.testing.assert_allclose(np.array(c["coefficients_m"]) @ s ** np.arange(5), 0.0, atol=1e-17)
 
 
