@@ -39,7 +39,10 @@ def test_the_spindle_is_read_in_si_and_has_nothing_odd():
 
 
 def test_schema_accepts_the_spindle():
-    jsonschema.validate(tomllib.loads((SPINDLE / "machine.toml").read_text()), json_schema())
+    described, schema = tomllib.loads((SPINDLE / "machine.toml").read_text()), json_schema()
+    jsonschema.validate(described, schema)
+    described["nodes"]["bearing_front"]["capacty"] = 1.0
+    assert not jsonschema.Draft202012Validator(schema).is_valid(described)
 
 
 @pytest.mark.parametrize(

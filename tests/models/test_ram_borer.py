@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from types import ModuleType
 
 import meshio
 import numpy as np
@@ -15,6 +14,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
+from tests.support.scripts import load_script
 from twin.build.check_meshes import check_meshes
 from twin.build.simulate import simulate_run
 from twin.logs.read import read_run
@@ -80,16 +80,7 @@ def p2p(residual: np.ndarray) -> tuple[float, float]:
     return float(np.ptp(residual)), float(abs(residual.max()) + abs(residual.min()))
 
 
-def script(path: str) -> ModuleType:
-    """A script of the model's folder as a module."""
-    name = f"ram_borer_{Path(path).stem}"
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, FOLDER / path)
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[name] = importlib.util.module_from_spec(spec)  # dataclasses look their module up
-        spec.loader.exec_module(sys.modules[name])
-    return sys.modules[name]
+script = partial(load_script, FOLDER)
 
 
 @pytest.mark.parametrize(("number", "expected"), TABLE_1.items())

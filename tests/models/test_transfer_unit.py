@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
+from tests.support.scripts import load_script
 from twin.build.mesh import load_body_meshes
 from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.build.thermal import assemble_thermal
@@ -27,16 +26,7 @@ FOLDER = Path(__file__).parents[2] / "models" / "transfer_unit"
 RUNS = ("passive", "warmup", "validation", "working_day")
 
 
-def script(path: str) -> ModuleType:
-    """A script of the model's folder as a module."""
-    name = f"transfer_unit_{Path(path).stem}"
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, FOLDER / path)
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[name] = importlib.util.module_from_spec(spec)  # dataclasses look their module up
-        spec.loader.exec_module(sys.modules[name])
-    return sys.modules[name]
+script = partial(load_script, FOLDER)
 
 
 @pytest.fixture(scope="module")

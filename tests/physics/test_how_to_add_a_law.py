@@ -26,8 +26,16 @@ def example() -> dict[str, object]:
     return names
 
 
-def test_its_own_test_passes(example):
-    example["test_copper_loss_of_torque"]()
+def test_its_own_test_passes_and_can_fail(example):
+    own = example["test_copper_loss_of_torque"]
+    own()
+    right = own.__globals__["motor_copper_of_torque"]
+    own.__globals__["motor_copper_of_torque"] = lambda *given, **named: 1.01 * right(*given, **named)
+    try:
+        with pytest.raises(AssertionError):
+            own()
+    finally:
+        own.__globals__["motor_copper_of_torque"] = right
     example["test_where_it_holds"]()
 
 

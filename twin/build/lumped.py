@@ -14,7 +14,6 @@ from twin.build.lumped_body import (
     at,
     capacity,
     conduction,
-    film_area,
     film_areas,
     heights,
     lumped_body,
@@ -27,6 +26,7 @@ from twin.build.thermal import machine_model
 from twin.build.wiring import load_model
 from twin.errors import DescriptionError
 from twin.machine.bodies import bodies_of, owner_of
+from twin.machine.check_lumped import film_area
 from twin.machine.description import Contact, Machine
 from twin.machine.kinematics import direction, linear_axes, rail_moves
 from twin.machine.references import reference_problems

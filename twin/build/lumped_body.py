@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from twin.machine.bodies import Body, owner_of
-from twin.machine.check_lumped import bar_capacity, node_capacity
+from twin.machine.check_lumped import bar_capacity, film_area, node_capacity
 from twin.machine.description import Bar, Film, Machine
 
 
@@ -98,16 +98,6 @@ def film_areas(machine: Machine, film: Film, body: LumpedBody) -> np.ndarray:
         if place in body:
             areas[body.states(place, machine)] += film_area(machine, film, place) * mean(machine, place)
     return areas
-
-
-def film_area(machine: Machine, film: Film, place: str) -> float:
-    """m^2 of one node or bar through which a film exchanges heat: the film's own, else all the node or bar has."""
-    if film.area is not None:
-        return film.area
-    if place in machine.nodes:
-        return float(machine.nodes[place].area or 0.0)
-    bar = machine.bars[place]
-    return float(bar.perimeter or 0.0) * bar.length
 
 
 def mean(machine: Machine, place: str) -> np.ndarray:

@@ -15,11 +15,10 @@ from twin.build.full_model import FullModel, assemble
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
 from twin.build.scenario import Scenario, draw, theta_bounds
-from twin.build.stepper import FOLLOW
 from twin.build.workers import LONG
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
-from twin.rom.following import difference_place
+from twin.rom.following import FOLLOW, difference_place
 from twin.rom.load_model import LoadModel
 from twin.rom.model import MachineModel
 

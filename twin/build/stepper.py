@@ -26,11 +26,10 @@ import scipy.sparse
 from twin.build.factorize import factorize
 from twin.build.fixed_point import fixed_point
 from twin.rom.drive import Drive
-from twin.rom.following import FilmPlan, difference_place, film_state, read_table, temperature_place
+from twin.rom.following import FOLLOW, FilmPlan, difference_place, film_state, read_table, temperature_place
 from twin.rom.load_model import Pair, Rail
 from twin.rom.model import AffineBody, MachineModel, Matrix
 
-FOLLOW = 0.2  # share by which theta may leave the values of a factor before a new one is made
 LEAST = 1e-6  # W: a balance is not judged against less than that
 
 

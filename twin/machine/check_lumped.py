@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from twin.errors import Problem
 from twin.machine.bodies import owner_of
-from twin.machine.description import Machine
+from twin.machine.description import Film, Machine
 
 LIGHTEST = 0.5  # J/K: one gram of steel
 HEAVIEST = 2.5e8  # J/K: 500 t
@@ -105,3 +105,13 @@ def _contacts(machine: Machine) -> Iterator[Problem]:
         if lighter / conductance < TIGHTEST:
             what = f"{conductance:.4g} W/K make its two sides one within {lighter / conductance:.2g} s"
             yield _problem(what, f"contacts.{name}", "check the number and its unit (W/K), or make the two one node")
+
+
+def film_area(machine: Machine, film: Film, place: str) -> float:
+    """m^2 of one node or bar through which a film exchanges heat: the film's own, else all the node or bar has."""
+    if film.area is not None:
+        return film.area
+    if place in machine.nodes:
+        return float(machine.nodes[place].area or 0.0)
+    bar = machine.bars[place]
+    return float(bar.perimeter or 0.0) * bar.length

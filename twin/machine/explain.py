@@ -18,7 +18,8 @@ from twin.errors import LogError, TwinError
 from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.machine import wiring
-from twin.machine.description import Film, Machine
+from twin.machine.check_lumped import film_area
+from twin.machine.description import Machine
 from twin.nearest import did_you_mean
 from twin.physics.laws import LAWS, Argument
 from twin.physics.radiation import radiation_coefficient
@@ -179,9 +180,9 @@ def _film(machine: Machine, name: str, load: Load) -> Explanation:
         "ambient": (ambient, f"environment {entry.environment}"),
         "surface": (surface, f"{_ONE_STEP_LATE} (here its environment + {WARMER:g} K)"),
     }
-    inputs = _inputs(
-        use, f"films.{name}", entry.parameters, load, states, machine, entry.area or _lumped_area(entry, machine)
-    )
+    # of meshes only the build knows it
+    area = sum(film_area(machine, entry, place) for place in entry.surfaces) if machine.lumped else None
+    inputs = _inputs(use, f"films.{name}", entry.parameters, load, states, machine, area)
     radiant = ambient if entry.radiant is None else _environment(machine, entry.radiant, load)
     emissivity = wiring.emissivity(entry)
     told = f"films.{name}.emissivity" if entry.emissivity is not None else "default of the law"
@@ -217,15 +218,6 @@ def _contact(machine: Machine, name: str, load: Load) -> Explanation:
 def _environment(machine: Machine, name: str, load: Load) -> np.ndarray:
     air = wiring.environment(name, machine.environment[name], machine)
     return load.signals[air.signal] if air.signal else np.array([air.temperature])
-
-
-def _lumped_area(entry: Film, machine: Machine) -> float | None:
-    """m^2 of the nodes and bars of a film; None for meshes, whose areas the build knows."""
-    if not machine.lumped:
-        return None
-    nodes = [float(machine.nodes[s].area or 0.0) for s in entry.surfaces if s in machine.nodes]
-    bars = [machine.bars[s] for s in entry.surfaces if s in machine.bars]
-    return sum(nodes) + sum(float(b.perimeter or 0.0) * b.length for b in bars) or None
 
 
 def _inputs(

@@ -21,6 +21,9 @@ from twin.rom.load_model import LoadModel
 
 Array = Any
 
+# Share by which coefficients may leave those in a factor before a new one is made, offline and at the edge alike.
+FOLLOW = 0.2
+
 # Surface minus ambient: uniform in the fourth root, in which free convection (Nu ~ Ra^(1/4)) is a straight line.
 WIDEST = 100.0  # K
 _HALF = 32

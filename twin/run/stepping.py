@@ -29,12 +29,10 @@ import numpy as np
 from jax import lax
 
 from twin.rom.drive import Drive
-from twin.rom.following import FilmPlan, difference_place, film_state, read_table, temperature_place
+from twin.rom.following import FOLLOW, FilmPlan, difference_place, film_state, read_table, temperature_place
 from twin.rom.load_model import LoadModel
 from twin.run.block_factor import BlockFactor, Blocks, factorise, solve
 from twin.run.system import Array, Layout, System
-
-FOLLOW = 0.2  # as twin.build.stepper
 
 
 @jax.tree_util.register_dataclass
