@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from types import ModuleType
 
 import h5py
 import numpy as np
 import pytest
 
+from tests.support.scripts import load_script
 from twin.build.full_model import FullModel
 from twin.build.pipeline import BuildOptions, full_model
 from twin.build.product import build_artefact
@@ -39,16 +38,7 @@ PLACES = ("fixed_bearing", "nut", "table", "bed")
 LIMIT = 0.05  # of the rise at a place, and of the range of the displacement
 
 
-def script(path: str) -> ModuleType:
-    """A script of the model's folder as a module."""
-    name = f"ball_screw_axis_{Path(path).stem}"
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, FOLDER / path)
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[name] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(sys.modules[name])
-    return sys.modules[name]
+script = partial(load_script, FOLDER)
 
 
 @dataclass(frozen=True)

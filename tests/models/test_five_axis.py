@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -11,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.scripts import load_script
 from twin.build.full_model import FullModel
 from twin.build.pipeline import full_model
 from twin.build.pose_study import study_grids
@@ -28,11 +27,8 @@ HOUR = 12  # steps
 
 
 @pytest.mark.parametrize("name", ["experiment_a", "experiment_b"])
-def test_runs_are_sound_and_what_their_script_writes(name, monkeypatch):
-    spec = importlib.util.spec_from_file_location("make_runs", FOLDER / "runs" / "make_runs.py")
-    make_runs = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "make_runs", make_runs)
-    spec.loader.exec_module(make_runs)
+def test_runs_are_sound_and_what_their_script_writes(name):
+    make_runs = load_script(FOLDER, "runs/make_runs.py")
     (experiment,) = [e for e in make_runs.EXPERIMENTS if e.name == name]
     assert make_runs.table(experiment) == (FOLDER / "runs" / name / "loads.csv").read_text(encoding="utf-8")
     assert twin(["check", str(FOLDER / "runs" / name)]) == 0
