@@ -1,0 +1,1 @@
+"""Learning from measurements: scores, baselines, parameters fitted to runs, updates on the machine."""
