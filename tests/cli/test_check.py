@@ -102,6 +102,47 @@ def test_run_without_a_machine_is_checked_for_itself(tmp_path, capsys):
     assert [p["warning"] for p in found["problems"]] == [True, False]
 
 
+def damaged(folder: Path, old: str, new: str) -> Path:
+    shutil.copytree(RUN, folder)
+    loads = folder / "loads.csv"
+    text = loads.read_text()
+    assert old in text
+    loads.write_text(text.replace(old, new, 1))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "what"),
+    [
+        ("\n50,", "\n40,", "(line 12)", "time runs backwards"),
+        ("\n50,", "\n45,", "(line 12)", "the same time twice"),
+        ("time [s]", "time [ms]", "loads.csv", "run.toml says 5 s: a factor 1000"),
+        ("\n50,", "\n50;", "(line 12)", "cells under"),
+    ],
+)
+def test_what_the_check_refuses_every_verb_refuses(tmp_path, capsys, old, new, line, what):
+    folder = damaged(tmp_path / "run", old, new)
+    status, found = check(capsys, folder, "--machine", SLIDE)
+    errors = [p for p in found["problems"] if not p["warning"]]
+    assert status == 2
+    assert line in errors[0]["where"]
+    assert what in errors[0]["what"]
+    assert run(["losses", str(SLIDE), "--run", str(folder)]) == 2
+    refused = capsys.readouterr().err
+    assert all(p["what"] in refused and p["where"] in refused for p in errors)
+
+
+def test_warnings_of_a_run_name_lines_and_columns(tmp_path, capsys):
+    folder = damaged(tmp_path / "run", "x_speed [m/min]", "x_speed [m/s]")
+    status, found = check(capsys, folder, "--machine", SLIDE)
+    assert (status, found["ok"]) == (0, True)
+    (slip,) = [p for p in found["problems"] if "times the speed of" in p["what"]]
+    assert "'x_speed' is 60" in slip["what"]
+    assert "60: minutes for seconds" in slip["what"]
+    (outside,) = [p for p in found["problems"] if "rows outside" in p["what"]]
+    assert "(line 2 and " in outside["where"]
+
+
 @pytest.mark.parametrize("name", ["nothing", "."])
 def test_neither_machine_nor_run(tmp_path, capsys, name):
     assert run(["check", str(tmp_path / name)]) == 2

@@ -11,7 +11,7 @@ import pytest
 from tests.logs.test_read import RUN_TOML, write
 from twin.errors import LogError
 from twin.logs.check import check_run
-from twin.logs.read import read_run
+from twin.logs.read import parse_run, read_run
 from twin.logs.sampling_rule import AxisLimits, Needed, core_sampling
 from twin.logs.signals import signal_values
 
@@ -34,7 +34,7 @@ def table(columns: dict[str, np.ndarray]) -> str:
 
 
 def found(folder: Path, columns: dict[str, np.ndarray], *signals: Signal, run: str = RUN_TOML, **tables: str) -> list:
-    return check_run(read_run(write(folder, table(columns), run=run, **tables)), signals)
+    return check_run(parse_run(write(folder, table(columns), run=run, **tables)), signals)
 
 
 TIME = np.arange(200) * 5.0
@@ -89,11 +89,16 @@ def test_duplicated_and_reversed_times(tmp_path):
     time[10] = time[9]
     (duplicate,) = found(tmp_path, {"time [s]": time, "x [m]": WAVE})
     assert not duplicate.warning
-    assert "the same time twice, once" in duplicate.what
+    assert "the same time twice, once, 1 with other values" in duplicate.what
     assert "(line 12)" in duplicate.where
     time[100:] -= 400.0
     problems = found(tmp_path, {"time [s]": time, "x [m]": WAVE})
-    assert [p.what for p in problems] == ["time runs backwards, once", "the same time twice, once"]
+    restart = "time runs backwards, once: the clock starts again, from 495 to 100 s"
+    assert [p.what for p in problems] == [restart, "the same time twice, once, 1 with other values"]
+    assert [p.where.split("(")[1] for p in problems] == ["line 102)", "line 12)"]
+    with pytest.raises(LogError) as caught:
+        read_run(tmp_path)  # what `twin check` calls an error, no verb reads
+    assert list(caught.value.problems) == problems
 
 
 def test_naive_times_are_warned_of(tmp_path):
@@ -103,13 +108,13 @@ def test_naive_times_are_warned_of(tmp_path):
     assert "without a zone" in naive.what
 
 
-def test_clock_change_in_naive_times_shows_as_reversed_time(tmp_path):
+def test_clock_change_in_naive_times_is_refused_with_its_lines(tmp_path):
     rows = [f"2026-10-25T{h:02d}:{m:02d}:00,{h + m}" for h, m in [(1, 30), (2, 0), (2, 30), (2, 0), (2, 30), (3, 0)]]
     text = "\n".join(["time,x [mm]", *rows])
-    problems = check_run(
+    with pytest.raises(LogError) as caught:
         read_run(write(tmp_path, text, run="start = 2026-10-25T00:00:00+02:00\nzone = 'Europe/Berlin'"))
-    )
-    assert any("backwards" in p.what for p in problems)
+    assert [p.where.split("(line ")[1] for p in caught.value.problems] == ["3)", "4)", "5)", "6)"]
+    assert all("twice on 2026-10-25" in p.what for p in caught.value.problems)
 
 
 def test_constant_zero_stuck_and_missing_values(tmp_path):
@@ -121,8 +126,8 @@ def test_constant_zero_stuck_and_missing_values(tmp_path):
     told = [(p.what.split(" (")[0], p.warning) for p in problems]
     assert told == [
         ("column 'x' lacks 4 of 200 values, first in line 5", True),
+        ("column 'none' has no value at all", True),
         ("column 'dead' is zero throughout", True),
-        ("column 'none' has no value at all", False),
         ("column 'bed' never changes", True),
         ("column 'column' spans -252.25 .. -252.05 degC", True),
     ]
@@ -130,8 +135,19 @@ def test_constant_zero_stuck_and_missing_values(tmp_path):
 
 def test_header_in_milliseconds_that_counts_seconds(tmp_path):
     (clock,) = found(tmp_path, {"time [ms]": TIME, "x [m]": WAVE})
-    assert "0.005 s apart, run.toml says 5 s" in clock.what
+    assert "0.005 s apart, run.toml says 5 s: a factor 1000" in clock.what
     assert "milliseconds" in clock.remedy
+    assert not clock.warning
+    with pytest.raises(LogError, match=r"0\.005 s apart"):
+        read_run(tmp_path)
+
+
+def test_a_signal_without_any_value_is_an_error_where_it_is_wanted(tmp_path):
+    columns = {"time [s]": TIME, "x [m]": WAVE, "i [A]": np.nan * TIME}
+    run = read_run(write(tmp_path, table(columns)))
+    told = check_run(run, (Signal("i", "i", "A"),))
+    assert [(p.what, p.warning) for p in told] == [("column 'i' has no value at all", False)]
+    assert [p.warning for p in check_run(run)] == [True]
 
 
 def test_range_outside_the_certified_one(tmp_path):
@@ -144,6 +160,8 @@ def test_tables_of_another_day(tmp_path):
     temperatures = table({"time [s]": TIME + 86400, "bed [degC]": 20 + WAVE})
     (apart,) = found(tmp_path, {"time [s]": TIME, "x [m]": WAVE}, temperatures=temperatures)
     assert "lie outside the loads'" in apart.what
+    with pytest.raises(LogError):
+        read_run(tmp_path)
 
 
 def test_sensors_and_axes_are_matched(tmp_path):

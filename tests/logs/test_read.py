@@ -80,14 +80,69 @@ def test_iso_times_define_the_start_where_it_is_unknown(tmp_path):
 
 
 def test_naive_iso_times(tmp_path):
-    text = "time,x [mm]\n2026-03-02T08:00:10+01:00,1\n2026-03-02T08:00:20,2\n"
+    text = "time,x [mm]\n2026-03-02T08:00:10,1\n2026-03-02T08:00:20,2\n"
     run = read_run(write(tmp_path, text))
     assert run.loads.naive
     assert run.loads.time.tolist() == [10.0, 20.0]
     message = refused(write(tmp_path, text, run="start = 2026-03-02T08:00:00+01:00"))
-    assert "has no zone" in message
+    assert message.count("has no zone") == 2
+    assert "line 2" in message
     assert "line 3" in message
     assert 'zone = "Europe/Berlin"' in message
+
+
+def test_times_with_and_without_a_zone_in_one_file(tmp_path):
+    """A zone lost from one time would move that row by hours."""
+    text = "time,x [mm]\n2026-03-02T08:00:10+01:00,1\n2026-03-02T08:00:20,2\n"
+    message = refused(write(tmp_path, text))
+    assert "(line 3): this time has no zone" in message
+
+
+@pytest.mark.parametrize(
+    ("time", "says"),
+    [("2026-10-25T02:30:00", "shows 02:30 twice on 2026-10-25"), ("2026-03-29T02:30:00", "skips 02:30 on 2026-03-29")],
+)
+def test_local_times_that_the_clock_shows_twice_or_never(tmp_path, time, says):
+    zone = "start = 'unknown'\nzone = 'Europe/Berlin'"
+    message = refused(write(tmp_path, f"time,x [mm]\n2026-01-01T00:00:00,0\n{time},1\n", run=zone))
+    assert "line 3" in message
+    assert says in message
+    run = read_run(write(tmp_path, f"time,x [mm]\n{time}+01:00,1\n", run=zone))  # the offset says it all
+    assert run.start.timestamp() == datetime.fromisoformat(f"{time}+01:00").timestamp()
+    start = refused(write(tmp_path, "time [s],x [mm]\n0,1\n", run=f"start = {time}\nzone = 'Europe/Berlin'"))
+    assert says in start
+
+
+def test_days_of_a_clock_change_count_every_second(tmp_path):
+    """From midnight to six: five hours in March, seven in October."""
+    for day, hours in (("2026-03-29", 5), ("2026-10-25", 7)):
+        text = f"time,x [mm]\n{day}T00:00:00,0\n{day}T06:00:00,1\n"
+        run = read_run(write(tmp_path, text, run="start = 'unknown'\nzone = 'Europe/Berlin'"))
+        assert run.loads.time.tolist() == [0.0, 3600.0 * hours]
+
+
+def test_decimal_points_among_decimal_commas(tmp_path):
+    message = refused(write(tmp_path, "time [s];x [mm];y [mm]\n0;1,5;2\n5;1.500;2\n10;1,5;2\n"))
+    assert "line 3" in message
+    assert "decimal points in 1 rows" in message
+    iso = "time;x [mm]\n2026-03-02T08:00:10.500+01:00;1,5\n"  # the point of a time is no decimal mark of the values
+    assert read_run(write(tmp_path, iso)).loads.columns["x"].tolist() == [1.5e-3]
+
+
+def test_points_that_look_like_thousands(tmp_path):
+    rows = [f"{5 * k};{k % 3};{v}" for k, v in enumerate(["980", "1.020", "1.250", "1.310", "2.400", "2.500", "990"])]
+    message = refused(write(tmp_path, "\n".join(["time [s];x [mm];n [1/min]", *rows])))
+    assert "column 'n' seems to hold thousands separators" in message
+    assert "lines 3, 4, 5 and 2 more" in message
+    fine = [row.replace("980", "0.980") for row in rows]  # three decimals after all
+    assert read_run(write(tmp_path, "\n".join(["time [s];x [mm];n [1/min]", *fine]))).loads.time[-1] == 30.0
+
+
+def test_nul_bytes_are_told_with_their_line(tmp_path):
+    message = refused(write(tmp_path, b"time [s],x [mm]\r\n0,1\r\n5,2\r\n\0\0\0\0"))
+    assert "nul bytes" in message
+    assert "line 4" in message
+    assert "nul bytes" in refused(write(tmp_path, "time [s],x [mm]\n0,1\n".encode("utf-16-le")))
 
 
 def test_empty_cells_are_missing_values(tmp_path):

@@ -156,7 +156,19 @@ def test_empty_file_lists_what_is_needed_once_each(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["parts = 3", "[parts]\nbed = 3", "[[parts]]", "folder = '/'", "tcp = [1]", "poses.x = {}"]
+    "text",
+    [
+        "parts = 3",
+        "[parts]\nbed = 3",
+        "[[parts]]",
+        "folder = '/'",
+        "tcp = [1]",
+        "poses.x = {}",
+        "parameters = 3",
+        "parameters = [1]",
+        "parameters = [[]]",
+        "[parameters.a]",
+    ],
 )
 def test_odd_shapes_are_described_not_crashed_on(tmp_path, text):
     (tmp_path / "machine.toml").write_text(text)
@@ -176,6 +188,8 @@ def test_schema_accepts_the_slide_and_refuses_a_typo(tmp_path):
     schema = json.loads((tmp_path / "schema.json").read_text())
     assert schema == json_schema()
     data = tomllib.loads(SLIDE.read_text())
+    jsonschema.validate(data, schema)
+    data["parameters"] = [{"path": "films.*.gain", "tolerance": "20 %", "low": 0.5}, {"path": "*", "fixed": True}]
     jsonschema.validate(data, schema)
     data["parts"]["bed"]["materiel"] = "steel"
     with pytest.raises(jsonschema.ValidationError, match="materiel"):
@@ -200,6 +214,14 @@ def test_key_lines_skip_strings_and_arrays():
     assert lines == {("a",): 1, ("t", "u v"): 2, ("t", "u v", "b"): 3, ("t", "u v", "c"): 6, ("t", "u v", "e", "f"): 9}
     assert line_of(lines, ("t", "u v", "e", "f", "g")) == 9
     assert line_of(lines, ("z",)) is None
+
+
+def test_key_lines_number_arrays_of_tables():
+    text = "x = 1\n[[a.b]] # one\nc = 1\n[a.b.d]\ne = [[2]]\n[[a.b]]\nc.f = 3\n[a.g]\n"
+    assert key_lines(text) == {
+        ("x",): 1, ("a", "b"): 2, ("a", "b", "0"): 2, ("a", "b", "0", "c"): 3, ("a", "b", "0", "d"): 4,
+        ("a", "b", "0", "d", "e"): 5, ("a", "b", "1"): 6, ("a", "b", "1", "c", "f"): 7, ("a", "g"): 8,
+    }  # fmt: skip
 
 
 def test_copy_of_folder_reads_alike(tmp_path):

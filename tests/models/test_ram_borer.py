@@ -11,12 +11,12 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
 from tests.support.scripts import load_script
 from twin.build.check_meshes import check_meshes
 from twin.build.simulate import simulate_run
+from twin.calibrate.output_error import fit_oe
+from twin.calibrate.transfer_function import TransferFunction
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 
@@ -35,39 +35,11 @@ class Truth:
     tcp: np.ndarray  # (m, 3) um
 
 
-@dataclass(frozen=True)
-class TransferFunction:
-    """Two poles and one zero: the sum of two first-order lags, in time constants and gains (erratum E-003-6)."""
-
-    tau: np.ndarray  # (2,) s
-    gain: np.ndarray  # (2,) um/K
-
-    def __call__(self, temperature: np.ndarray) -> np.ndarray:
-        return lags(temperature, self.tau) @ self.gain
-
-
-def lags(u: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Responses (n, 2) of unit lags to samples u (n,) a minute apart, linear between them; at rest before."""
-    columns = []
-    for t in tau:
-        a, ratio = np.exp(-MINUTE / t), t / MINUTE
-        columns.append(lfilter([1.0 - ratio * (1.0 - a), ratio * (1.0 - a) - a], [1.0, -a], u))
-    return np.column_stack(columns)
-
-
 def identify(truth: Truth) -> TransferFunction:
-    """Output error: time constants by least squares, gains linear in every step."""
-    z = truth.tcp[:, 2]
-
-    def model(log_tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        at_rows = lags(truth.bearing, np.exp(log_tau))[truth.rows]
-        gain = np.linalg.lstsq(at_rows, z, rcond=None)[0]
-        return gain, at_rows @ gain - z
-
-    starts = [np.log([a, b]) for a in (30.0, 300.0, 900.0) for b in (2000.0, 5000.0, 12000.0)]
-    bounds = (np.log([5.0, 5.0]), np.log([1e5, 1e5]))
-    best = min((least_squares(lambda p: model(p)[1], s, bounds=bounds) for s in starts), key=lambda r: r.cost)
-    return TransferFunction(np.exp(best.x), model(best.x)[0])
+    """Output error, two real poles, the bearing's temperature linear between its samples; um/K."""
+    z = np.full(len(truth.time), np.nan)
+    z[truth.rows] = truth.tcp[:, 2]
+    return fit_oe(truth.bearing, z, MINUTE, 2)
 
 
 def fit(z: np.ndarray, model: np.ndarray) -> float:
@@ -181,12 +153,12 @@ def test_thermal_error_is_of_the_size_of_the_papers(truths):
 def test_transfer_function_trained_at_the_bottom_fails_at_other_heights(truths):
     """Paper 003: fit 89 % and p2p 16.6 um in test 1, 41.5 % and 64 um in tests 2 to 5."""
     trained = identify(truths[1])
-    dc, tau = trained.gain.sum(), np.sort(trained.tau)
+    dc, tau = trained.dc_gain[0], np.sort(trained.time_constants)
     print(f"\nDC gain {dc:.1f} um/K (paper -16.5), time constants {tau[0]:.0f} s and {tau[1]:.0f} s (688, 3632)")
     fits, measured, residuals = {}, [], []
     for number, truth in truths.items():
         z = truth.tcp[:, 2]
-        model = trained(truth.bearing)[truth.rows]
+        model = trained.simulate(truth.bearing)[truth.rows]
         fits[number] = fit(z, model)
         fair, papers = p2p(z - model)
         largest = np.abs(z - model).max()
@@ -205,7 +177,7 @@ def test_transfer_function_trained_at_the_bottom_fails_at_other_heights(truths):
     assert 20.0 < pooled < 60.0
     assert all(fits[n] < fits[1] for n in (2, 3, 4, 5))
     assert fits[3] < fits[4]  # the farther from where it was trained, the worse
-    own = p2p(truths[1].tcp[:, 2] - trained(truths[1].bearing)[truths[1].rows])[0]
+    own = p2p(truths[1].tcp[:, 2] - trained.simulate(truths[1].bearing)[truths[1].rows])[0]
     assert spread[0] > 2 * own
 
 
@@ -222,7 +194,7 @@ def test_it_fails_because_of_the_height_alone(truths, tmp_path):
     trained = identify(truths[1])
 
     def fitted(truth: Truth) -> float:
-        return fit(truth.tcp[:, 2], trained(truth.bearing)[truth.rows])
+        return fit(truth.tcp[:, 2], trained.simulate(truth.bearing)[truth.rows])
 
     print(f"\nloads of test 3: fit {fitted(control):.1f} % at Y = 0, {fitted(high):.1f} % at Y = 1200 mm")
     assert fitted(control) > 85.0

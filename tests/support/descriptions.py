@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 SLIDE = Path(__file__).parents[1] / "machines" / "slide" / "machine.toml"
+MACHINES = sorted(
+    p for root in ("models", "tests/machines") for p in Path(__file__).parents[2].glob(f"{root}/*/machine.toml")
+)
 
 
 def edited(folder: Path, *edits: tuple[str, str]) -> Path:

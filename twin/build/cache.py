@@ -38,8 +38,8 @@ def source_hash() -> str:
 
 
 def machine_hash(machine: Machine) -> str:
-    """Hash of the description's content and of every mesh file it names."""
-    digest = hashlib.sha256(machine.model_dump_json(exclude={"folder"}).encode())
+    """Hash of the description's content and of every mesh file it names; tolerances of parameters change no model."""
+    digest = hashlib.sha256(machine.model_dump_json(exclude={"folder", "parameters"}).encode())
     for name, part in sorted(machine.parts.items()):
         if part.mesh is not None:
             digest.update(name.encode())

@@ -166,6 +166,8 @@ def _body(machine: Machine, body: LumpedBody, ports: ContactPorts, load: LoadMod
         one=one,
         energy=capacities,
         H=_columns(H, body.n) if graded else None,
+        members=body.members,
+        first=body.first,
     )
 
 

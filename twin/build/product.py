@@ -23,6 +23,7 @@ from twin.build.pipeline import (
 )
 from twin.errors import ArtefactError
 from twin.machine.load import load_machine
+from twin.machine.parameters import parameters
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact, SurfaceField, read_artefact, write_artefact
 
@@ -60,7 +61,8 @@ def build_artefact(
         "rich_states": str(rich.n),
         "options_hash": hashlib.sha256(repr(options).encode()).hexdigest(),
     }
-    write_artefact(target, bare, description.read_text(encoding="utf-8"), result.to_json(), provenance, fields)
+    text = description.read_text(encoding="utf-8")
+    write_artefact(target, bare, text, result.to_json(), provenance, fields, parameters=parameters(machine))
     return result
 
 
@@ -74,14 +76,16 @@ def verify_artefact(
     """Certify an artefact on scenarios it has never seen, with the full model in the chain, and store the result in it.
 
     The machine is read from where the artefact was built, or from `machine_path`; it must be the one the artefact was
-    built from. Raises ArtefactError otherwise.
+    built from. Raises ArtefactError otherwise. A calibrated artefact brings its own description, to the meshes of the
+    one it started from.
     """
     artefact: Artefact = read_artefact(path)
     origin = Path(machine_path or artefact.provenance.get("machine", ""))
     if not origin.exists():
         raise ArtefactError(f"its machine description is not at {origin}", str(path), "name it with --machine")
-    machine = load_machine(origin)
-    if machine_hash(machine) != artefact.provenance.get("machine_hash"):
+    calibrated = "calibrated_from" in artefact.provenance and not machine_path
+    machine = load_machine(origin, artefact.description if calibrated else None)
+    if not calibrated and machine_hash(machine) != artefact.provenance.get("machine_hash"):
         raise ArtefactError(
             f"{origin} is not the machine this artefact was built from (description or meshes differ)",
             str(path),
@@ -92,5 +96,8 @@ def verify_artefact(
     result = certificate(
         machine, rich, artefact.model, full.thermal, options, VERIFY_SEED, full_scenarios, progress=progress
     )
-    write_artefact(path, artefact.model, artefact.description, result.to_json(), artefact.provenance, artefact.fields)
+    write_artefact(
+        path, artefact.model, artefact.description, result.to_json(), artefact.provenance, artefact.fields,
+        parameters=artefact.parameters,
+    )  # fmt: skip
     return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -34,8 +35,12 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
         return (R + R.T) / 2 if W is None else R
 
     one = left.T @ (body.E @ body.one)
+    E_members, G_members = _members(body, left, V, congruent)
     return replace(
         body,
+        first=(),
+        E_members=E_members,
+        G_members=G_members,
         E=congruent(body.E),
         A0=congruent(body.A0),
         A=tuple(congruent(a) for a in body.A),
@@ -51,6 +56,22 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
         energy=V.T @ body.energy,
         F=None if body.F is None else body.F @ V,
     )
+
+
+def _members(
+    body: AffineBody, left: np.ndarray, V: np.ndarray, congruent: Callable[[Matrix], np.ndarray]
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Shares of the members in the projected E and G: slices of the full model, matrices of a reduced one."""
+    if not body.members:
+        return None, None
+    if body.E_members is not None and body.G_members is not None:
+        return np.array([congruent(E) for E in body.E_members]), body.G_members @ V
+    E, G = [], []
+    for m in range(len(body.members)):
+        own = body.member_states(m)
+        E.append(left[own].T @ (body.E[own, own] @ V[own]))  # members share no states, E couples none of them
+        G.append(body.G[:, :, own] @ V[own])
+    return np.array(E), np.array(G)
 
 
 def orthonormalise(X: np.ndarray, E: Matrix, V: np.ndarray | None = None, tolerance: float = 1e-12) -> np.ndarray:

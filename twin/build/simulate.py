@@ -20,7 +20,7 @@ from twin.logs.run import Run, Table, Tcp
 from twin.logs.signals import signal_values
 from twin.machine.load import load_machine
 from twin.progress import Progress, silent
-from twin.rom.drive import Drive, evaluate
+from twin.rom.drive import Drive, evaluate, measured_air
 
 
 @dataclass(frozen=True)
@@ -65,20 +65,20 @@ def simulate(
     x = stepper.uniform(start)
     row_step = np.clip(np.searchsorted(drive.time, tcp_time, side="left") - 1, -1, drive.n_steps - 1)
     tcp = np.zeros((len(tcp_time), 3))
-    air = [e for _, e in model.ambient_sensors]
+    shown = measured_air(model.load_model, drive)[:, [e for _, e in model.ambient_sensors]]
 
     def tcp_rows(step: int) -> None:
         for r in np.flatnonzero(row_step == step):
             positions = dict(zip(model.pose_axes, tcp_positions[r], strict=True))
             tcp[r] = full.structure.displacement(positions, tuple(x))
 
-    temperatures = [np.concatenate([sensor_temperatures(model, x), drive.environment[0, air]])]
+    temperatures = [np.concatenate([sensor_temperatures(model, x), shown[0]])]
     tcp_rows(-1)
     balance = np.zeros(drive.n_steps)
     with progress("full model", drive.n_steps) as advance:
         for step, x, heat in stepper.run(drive, x, substeps):  # noqa: B020  x goes on from where it began
             balance[step] = heat.balance_error
-            temperatures.append(np.concatenate([sensor_temperatures(model, x), drive.environment[step, air]]))
+            temperatures.append(np.concatenate([sensor_temperatures(model, x), shown[step]]))
             tcp_rows(step)
             advance(f"{drive.time[step + 1] / 3600:.1f} h")
     rng = np.random.default_rng(noise.seed)

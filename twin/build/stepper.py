@@ -196,7 +196,7 @@ class CoupledStepper:
                 temperature[list(body.sources)] += body.source_rows @ xb
             own = list(drive.losses.index)
             power[own] = read_table(np, drive.losses.value[step], temperature_place(np, temperature[own]))
-        return Loads(theta, rise, lift, power, drive.port_heat[step], surface, films.radiated)
+        return Loads(theta, rise, lift, power, drive.contact_heat[step].sum(axis=0), surface, films.radiated)
 
     def forcing(self, loads: Loads) -> list[np.ndarray]:
         """Per body M theta (T_out - T_ref) + H lift + B q + P q_port [W]."""

@@ -164,6 +164,8 @@ def _body(
         one=one,
         energy=E @ one,
         H=np.column_stack(H) if H and any(e.gradient for e in load.environments) else None,
+        members=tuple(part.name for part in body.parts),
+        first=tuple(int(offset) for offset in body.offsets),
     )
 
 

@@ -77,7 +77,7 @@ def film_range(
     names = sorted({*use.signals.values(), *([air.signal] if air.signal else [])})
     corners = _corners([(signals[n].low, signals[n].high) for n in names])
     values = dict(zip(names, corners.T, strict=True))
-    ambient = values[air.signal] if air.signal else np.full(len(corners), air.temperature)
+    ambient = (values[air.signal] if air.signal else np.full(len(corners), air.temperature)) + air.offset
     surface = ambient[:, None] + DIFFERENCES
     free = states_of(use)
     if free:
@@ -108,5 +108,5 @@ def _corners(ranges: Iterable[tuple[float, float]]) -> np.ndarray:
 def _middle(environment: EnvironmentWiring, signals: Mapping[str, Signal]) -> float:
     """degC: of a radiant environment; its coefficient varies by 2 % for 10 K, which the margins cover."""
     if not environment.signal:
-        return environment.temperature
-    return (signals[environment.signal].low + signals[environment.signal].high) / 2
+        return environment.temperature + environment.offset
+    return (signals[environment.signal].low + signals[environment.signal].high) / 2 + environment.offset

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +27,7 @@ class Expected:
     axes: tuple[str, ...]  # linear
     sensors: tuple[str, ...]
     core: Needed | None = None  # the sampling that the axes' limits ask for, where they are known
+    strokes: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # m, of the linear axes
 
 
 @dataclass
@@ -117,11 +119,11 @@ def _check_machine(path: Path, meshes: bool) -> Findings:
 
 def _check_run(path: Path, machine_path: Path | None) -> Findings:
     from twin.logs.check import check_run
-    from twin.logs.read import read_run
+    from twin.logs.read import parse_run
 
     findings = Findings("run", path)
     try:
-        run = read_run(path)
+        run = parse_run(path)
     except LogError as e:
         findings.problems += e.problems
         return findings
@@ -142,7 +144,9 @@ def _check_run(path: Path, machine_path: Path | None) -> Findings:
         findings.problems += [Problem(what, str(path), remedy, warning=True), *check_run(run)]
         return findings
     findings.facts["machine"] = expected.machine
-    findings.problems += check_run(run, expected.signals, expected.axes, expected.sensors, expected.core)
+    findings.problems += check_run(
+        run, expected.signals, expected.axes, expected.sensors, expected.core, expected.strokes
+    )
     return findings
 
 
@@ -168,7 +172,9 @@ def _of_description(path: Path) -> Expected:
     machine = load_machine(path)
     signals = tuple(signal(name, entry) for name, entry in machine.signals.items())
     axes = linear_axes(machine)
-    return Expected(machine.machine.name, signals, axes, tuple(machine.sensors), _core_sampling(machine, axes))
+    strokes = {a: machine.axes[a].stroke for a in axes}
+    core = _core_sampling(machine, axes)
+    return Expected(machine.machine.name, signals, axes, tuple(machine.sensors), core, strokes)
 
 
 def _core_sampling(machine: Machine, axes: tuple[str, ...]) -> Needed | None:
@@ -192,7 +198,8 @@ def _of_artefact(path: Path) -> Expected:
     model = read_artefact(path).model
     axes = tuple(axis.name for axis in model.load_model.axes)
     sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
-    return Expected(model.name, model.load_model.signals, axes, sensors)
+    strokes = {axis.name: (axis.low, axis.high) for axis in model.load_model.axes}
+    return Expected(model.name, model.load_model.signals, axes, sensors, strokes=strokes)
 
 
 def _as_text(findings: Findings) -> str:

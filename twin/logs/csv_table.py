@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from twin.errors import LogError, Problem
+from twin.logs.decimal_marks import mark_problems
 from twin.logs.times import parse_iso
 from twin.units import Unit, parse_unit
 
@@ -35,8 +36,9 @@ class CsvTable:
 def read_csv(path: Path, zone: tzinfo | None = None) -> CsvTable:
     """Read one table. Empty cells become NaN.
 
-    Raises LogError: unreadable file, headers without or with unknown units, columns named twice, no time column, rows
-    of the wrong length, cells that are no numbers, times without a zone where `zone` is None.
+    Raises LogError: unreadable file, nul bytes, headers without or with unknown units, columns named twice, no time
+    column, rows of the wrong length, cells that are no numbers, decimal points among decimal commas, times without a
+    zone where `zone` is None, or that its clock shows twice or never.
     """
     lines = _lines(path)
     delimiter = ";" if ";" in lines[0] else "\t" if "\t" in lines[0] else ","
@@ -44,6 +46,8 @@ def read_csv(path: Path, zone: tzinfo | None = None) -> CsvTable:
     body = lines[1:]
     if not body:
         raise LogError("no rows under the header", str(path), "log at least one row, or remove the file")
+    if delimiter != "," and (mixed := mark_problems(body, delimiter, 1 if clock is None else 0, names, str(path))):
+        raise LogError.collect(mixed)
     naive = False
     if clock is None:
         cells = [line.partition(delimiter) for line in body]
@@ -72,6 +76,10 @@ def _lines(path: Path) -> list[str]:
         text = raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeError:
         text = raw.decode("latin-1")  # what German controls write; every byte is a character there
+    if "\0" in text:
+        line = re.split("\r\n|\r|\n", text[: text.index("\0")])
+        remedy = "the logger stopped while writing, or the file is UTF-16 without its mark: mend or convert it"
+        raise LogError("nul bytes", f"{path} (line {len(line)})", remedy)
     # Line numbers in messages must be the file's own, so blank lines are cut at the end only.
     lines = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n ").split("\n")
     if not lines[0].strip():

@@ -2,70 +2,123 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
 from twin.errors import Problem
+from twin.logs.channels import owner
+from twin.logs.found import held, slip, warning
 from twin.logs.run import Table
 
-_LAGS = range(-5, 7)  # samples by which the speed may come late
-_HONEST = (0, 1)  # the speed of the interval that starts, or of the one that ended, with the sample
+# Samples by which the speed comes late against the mean speed of the interval that starts with the sample. Whole ones
+# compare with the mean over one interval, halves with that over two: what a speed at the sample itself is like.
+_LAGS = tuple(k / 2 for k in range(-10, 13))
+_HONEST = (0.0, 0.5, 1.0)  # mean of the interval that starts, speed at the sample, mean of the interval that ended
 _LEAST = 30  # moving samples
+_SURE = 0.98  # correlation
+_PATHS = {"m/s": ("m", 1.0), "rad/s": ("rad", 1.0), "1/s": ("rad", 0.5 / math.pi)}  # a speed's position, and scale
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A speed explained by a position."""
+
+    position: str
+    correlation: float
+    lag: float  # samples by which the speed is late; see _LAGS
+    factor: float  # logged speed over derivative of the position
+    sharp: bool  # is the lag one sample off clearly worse?
 
 
 def motion_problems(loads: Table, where: str) -> list[Problem]:
-    """Warnings about speed columns [m/s] against the position column [m] that fits them best.
+    """Warnings about speed columns [m/s, 1/s, rad/s] against the position column that fits them best.
 
     loads.time must increase. Sampling must resolve the motion: where no position explains the speed with a correlation
-    above 0.98 at any lag nothing is said.
+    above 0.98 at any lag nothing is said; `path_problems` of twin.logs.slips then still finds speeds that are too low.
     """
-    positions = [name for name, unit in loads.units.items() if unit == "m"]
-    speeds = [name for name, unit in loads.units.items() if unit == "m/s"]
+    fits = {speed: fit for speed in loads.columns if (fit := explained(loads, speed))}
     problems = []
-    for speed in speeds:
-        fits = [(*_best_lag(loads, position, speed), position) for position in positions]
-        correlation, lag, factor, position = max(fits, default=(0.0, 0, 1.0, ""))
-        if correlation < 0.98:
-            continue
-        if lag not in _HONEST:
-            late = f"{lag - 1} sample(s) late" if lag > 0 else f"{-lag} sample(s) early"
+    for speed, fit in fits.items():
+        if fit.lag not in _HONEST:
+            shift = fit.lag - (0.5 if fit.lag % 1.0 else 1.0 if fit.lag > 0.0 else 0.0)
+            late = f"{abs(shift):g} sample(s) {'late' if shift > 0.0 else 'early'}"
             problems.append(
-                Problem(
-                    f"'{speed}' is {late} against '{position}'",
-                    where,
-                    "shift the column back in the logger",
-                    warning=True,
-                )
+                warning(f"'{speed}' is {late} against '{fit.position}'", where, "shift the column back in the logger")
             )
-        if not 0.8 < factor < 1.25:
+        if not 0.8 < fit.factor < 1.25:
+            looks_like = slip(fit.factor)
             problems.append(
-                Problem(
-                    f"'{speed}' is {factor:.4g} times the speed of '{position}'",
+                warning(
+                    f"'{speed}' is {fit.factor:.4g} times the speed of '{fit.position}'"
+                    + (f", a factor {looks_like}" if looks_like else ""),
                     where,
                     "check both units in the headers: a factor 60 is m/min, 1000 is mm",
-                    warning=True,
                 )
             )
-    return problems
+    return problems + _disagreement(fits, where)
 
 
-def _best_lag(loads: Table, position: str, speed: str) -> tuple[float, int, float]:
-    """Correlation, lag and slope of the speed against the derivative of the position; (0, 0, 1) without motion."""
-    moved = np.diff(loads.columns[position]) / np.diff(loads.time)
+def explained(loads: Table, speed: str) -> Fit | None:
+    """The position that explains a speed best; None where none does, or where the column is no speed."""
+    if loads.units[speed] not in _PATHS:
+        return None
+    unit, scale = _PATHS[loads.units[speed]]
+    positions = [name for name, u in loads.units.items() if u == unit]
+    own = [name for name in positions if owner(name) == owner(speed)]
+    if loads.units[speed] == "1/s" and not own:
+        return None  # a motor's speed: its angle is seldom logged
+    fits = [fit for p in own or positions if (fit := _fit(loads, p, speed, scale))]
+    best = max(fits, key=lambda f: f.correlation, default=None)
+    return best if best is not None and best.correlation > _SURE else None
+
+
+def _disagreement(fits: dict[str, Fit], where: str) -> list[Problem]:
+    """Honest lags that differ from axis to axis: one of the columns has slipped by a row."""
+    sharp = {name: fit for name, fit in fits.items() if fit.sharp and fit.lag in _HONEST}
+    lags = sorted(fit.lag for fit in sharp.values())
+    if len(lags) < 2 or lags[-1] - lags[0] < 1.0:
+        return []
+    usual = lags[len(lags) // 2]
+    odd = [name for name, fit in sharp.items() if abs(fit.lag - usual) >= 1.0]
+    what = f"speeds of some axes come one sample later than those of others ({', '.join(odd)})"
+    return [warning(what, where, "were columns of several sources joined? shift them to one moment")]
+
+
+def _fit(loads: Table, position: str, speed: str, scale: float) -> Fit | None:
+    """The best lag of the speed against the derivative of the position; None without motion."""
+    moved = scale * np.diff(loads.columns[position]) / np.diff(loads.time)
     logged = loads.columns[speed][:-1]
-    if not np.nanmin(logged, initial=0.0) < 0.0:
+    if np.count_nonzero(moved) < _LEAST or np.count_nonzero(logged) < _LEAST:
+        return None
+    signed = bool(np.nanmin(logged, initial=0.0) < 0.0)
+    if not signed:
         moved = np.abs(moved)  # an unsigned speed
-    best = (0.0, 0, 1.0)
-    for lag in sorted(_LAGS, key=lambda k: (k not in _HONEST, abs(k))):
-        n = len(moved) - abs(lag)
-        if n < _LEAST:
-            break
-        a, b = (moved[:n], logged[lag : lag + n]) if lag >= 0 else (moved[-lag:], logged[:n])
-        use = np.isfinite(a) & np.isfinite(b)
-        a, b = a[use], b[use]
-        size = np.sqrt(np.sum(a**2) * np.sum(b**2))
-        if np.count_nonzero(a) < _LEAST or size == 0.0:
-            continue
-        correlation = float(np.sum(a * b) / size)
-        if correlation > best[0] + 0.01:  # a later lag must be clearly better
-            best = (correlation, lag, float(np.sum(a * b) / np.sum(a**2)))
-    return best
+    moved, logged = held(moved), held(logged)
+    if not signed and max(_agreement(moved, logged, lag)[0] for lag in _LAGS[::2]) <= _SURE:
+        return None  # the mean of two magnitudes is nearly constant where sampling does not resolve the motion
+    found = {lag: _agreement(moved, logged, lag) for lag in _LAGS}
+    honest = max(_HONEST, key=lambda lag: found[lag][0])
+    best = max(_LAGS, key=lambda lag: found[lag][0])
+    apart = 1.0 - found[honest][0]  # any other lag must be clearly better than the best honest one
+    if best not in _HONEST and (apart < 1e-3 or 1.0 - found[best][0] > 0.25 * apart):
+        best = honest
+    others = [1.0 - found[lag][0] for lag in (best - 1.0, best + 1.0) if lag in found]
+    sharp = min(others) > max(1e-3, 4.0 * (1.0 - found[best][0]))
+    return Fit(position, found[best][0], best, found[best][1], sharp)
+
+
+def _agreement(moved: np.ndarray, logged: np.ndarray, lag: float) -> tuple[float, float]:
+    """Correlation and slope of the logged speed against the derivative of the position, `lag` samples earlier."""
+    if lag % 1.0:
+        moved = np.concatenate([moved[:1], 0.5 * (moved[1:] + moved[:-1])])
+    k = math.floor(lag)
+    n = len(moved) - abs(k)
+    if n < _LEAST:
+        return 0.0, 1.0
+    a, b = (moved[:n], logged[k : k + n]) if k >= 0 else (moved[-k:], logged[:n])
+    aa, bb, ab = (float(np.einsum("i,i->", *pair)) for pair in ((a, a), (b, b), (a, b)))
+    if aa == 0.0 or bb == 0.0 or not math.isfinite(aa * bb):
+        return 0.0, 1.0
+    return ab / math.sqrt(aa * bb), ab / aa

@@ -7,31 +7,47 @@ from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime, tzinfo
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from twin.errors import LogError
 from twin.logs.csv_table import CsvTable, read_csv
+from twin.logs.refuse import refusals
 from twin.logs.run import Run, Table, Tcp
-from twin.logs.times import zone_of
+from twin.logs.segments import read_segments
+from twin.logs.times import in_zone, zone_of
 from twin.nearest import did_you_mean
 from twin.units import to_si
 
 TABLES = ("loads", "temperatures", "tcp")
 _KEYS = (
     "start", "zone", "sampling", "sampling_s", "provenance", "source", "synthetic", "initial_temperature", "machine",
-    "description",
+    "description", "segments", "tcp_reference",
 )  # fmt: skip
 _DISPLACEMENT = ("dx", "dy", "dz")
 
 
 def read_run(folder: Path) -> Run:
-    """The run in `folder`, in SI. Nothing is repaired: `check_run` tells what is odd about it.
+    """The run in `folder`, in SI: `parse_run`, and refused where results from it would be wrong in silence.
+
+    Every verb reads runs with this. Nothing is repaired: `check_run` tells what else is odd.
+
+    Raises LogError: all of `parse_run`, and all that `refusals` finds.
+    """
+    run = parse_run(folder)
+    problems = refusals(run)
+    if problems:
+        raise LogError.collect(problems)
+    return run
+
+
+def parse_run(folder: Path) -> Run:
+    """The run in `folder` as it stands, in SI, for those who list what is wrong with it; others use `read_run`.
 
     run.toml: start (TOML date-time with offset, or "unknown"), zone, sampling ("5 s"), provenance, synthetic (true,
-    false, or the names of computed tables), initial_temperature, machine (path of its description). Files for other
-    purposes may lie beside it.
+    false, or the names of computed tables), initial_temperature, machine (path of its description), segments
+    (tables of name, start, end), tcp_reference ("absolute" or "first"). Files for other purposes may lie beside it.
 
     Raises LogError: run.toml or loads.csv missing, malformed files, times without a zone, units of the wrong dimension.
     """
@@ -52,8 +68,9 @@ def read_run(folder: Path) -> Run:
     zero = start.timestamp() if start else None
     temperatures = tables["temperatures"]
     tcp = tables["tcp"]
+    loads_table = _table(loads, zero, folder / "loads.csv")
     return Run(
-        loads=_table(loads, zero, folder / "loads.csv"),
+        loads=loads_table,
         temperatures=_table(temperatures, zero, folder / "temperatures.csv", "degC") if temperatures else None,
         tcp=_tcp(tcp, zero, folder / "tcp.csv") if tcp else None,
         start=start,
@@ -64,6 +81,20 @@ def read_run(folder: Path) -> Run:
         initial_temperature=_quantity(facts, "initial_temperature", "degC", where),
         machine=_text(facts, "machine", where),
         folder=folder,
+        segments=read_segments(facts.get("segments", []), str(where), loads_table.time.min(), loads_table.time.max()),
+        tcp_reference=_tcp_reference(facts.get("tcp_reference", "absolute"), where),
+    )
+
+
+def _tcp_reference(value: Any, where: Path) -> Literal["absolute", "first"]:
+    if value == "absolute":
+        return "absolute"
+    if value == "first":
+        return "first"
+    raise LogError(
+        f"tcp_reference = {value!r}"[:80],
+        str(where),
+        'write "absolute", or "first" where the deviations in tcp.csv count from its first row',
     )
 
 
@@ -102,7 +133,10 @@ def _start(value: Any, zone: tzinfo | None, where: Path) -> datetime | None:
     if value.tzinfo is None:
         if zone is None:
             raise LogError("start has no zone", str(where), "write start = 2026-03-01T08:00:00+01:00, or add a zone")
-        value = value.replace(tzinfo=zone)
+        try:
+            value = in_zone(value, zone)
+        except (ValueError, OverflowError) as e:
+            raise LogError(f"start: {e}", str(where), "write its offset: start = 2026-03-01T08:00:00+01:00") from e
     try:
         value.timestamp()
     except (OverflowError, ValueError, OSError) as e:
@@ -192,4 +226,5 @@ def _tcp(table: CsvTable, zero: float | None, path: Path) -> Tcp:
         displacement=np.column_stack([table.columns[d] for d in _DISPLACEMENT]),
         sigma=table.columns.get("sigma"),
         naive=table.naive,
+        angle={name: table.columns[name] for name, si in table.units.items() if si == "rad"},
     )

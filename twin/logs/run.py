@@ -6,8 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of a run that is scored, or fitted, by itself: a phase, or one of several tests in one log."""
+
+    name: str
+    start: float  # s since the start of the run
+    end: float  # s, after `start`
 
 
 @dataclass(frozen=True)
@@ -30,6 +40,7 @@ class Tcp:
     displacement: np.ndarray  # (n, 3) m, machine x, y, z
     sigma: np.ndarray | None = None  # (n,) m, standard deviation of each component
     naive: bool = False
+    angle: Mapping[str, np.ndarray] = field(default_factory=dict)  # (n,) rad of each rotary axis that is logged
 
 
 @dataclass(frozen=True)
@@ -47,3 +58,5 @@ class Run:
     initial_temperature: float | None = None  # degC of the whole machine at the start, where known
     machine: str | None = None  # path of the machine description, relative to the run folder
     folder: Path = field(default=Path("."))
+    segments: tuple[Segment, ...] = ()  # in the order of time, without overlap
+    tcp_reference: Literal["absolute", "first"] = "absolute"  # "first": tcp.csv counts deviations from its first row

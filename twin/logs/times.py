@@ -8,7 +8,9 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 
-from twin.errors import LogError
+from twin.errors import LogError, Problem
+
+_SHOWN = 10  # problems of one file shown at once
 
 
 def zone_of(name: str, where: str) -> ZoneInfo:
@@ -19,31 +21,57 @@ def zone_of(name: str, where: str) -> ZoneInfo:
         raise LogError(f"unknown time zone '{name}'", where, "write an IANA name, for example 'Europe/Berlin'") from e
 
 
-def parse_iso(cells: Sequence[str], zone: tzinfo | None, where: str) -> tuple[np.ndarray, bool]:
-    """POSIX seconds (n,) of ISO 8601 cells, and whether any of them came without a zone.
+def in_zone(moment: datetime, zone: tzinfo) -> datetime:
+    """A local time in its zone. Raises ValueError where the clock shows it twice, or skips it."""
+    moment = moment.replace(tzinfo=zone)
+    first, second = moment.utcoffset(), moment.replace(fold=1).utcoffset()
+    if first != second and first is not None and second is not None:
+        if first > second:
+            raise ValueError(f"the clock of {zone} shows {moment:%H:%M} twice on {moment:%Y-%m-%d}")
+        raise ValueError(f"the clock of {zone} skips {moment:%H:%M} on {moment:%Y-%m-%d}")
+    return moment
 
-    Naive times are read in `zone`; where it is None they are refused, for an hour is 6 K of a warming machine.
-    Raises LogError with the line (cell i stands on line i + 2 of `where`).
+
+def parse_iso(cells: Sequence[str], zone: tzinfo | None, where: str) -> tuple[np.ndarray, bool]:
+    """POSIX seconds (n,) of ISO 8601 cells, and whether they came without a zone.
+
+    Naive times are read in `zone`; where it is None they are refused, for an hour is 6 K of a warming machine. So are
+    local times that the clock shows twice or never, and files with both kinds of times.
+    Raises LogError with the lines (cell i stands on line i + 2 of `where`).
     """
     seconds = np.empty(len(cells))
-    naive = False
+    problems: list[Problem] = []
+    kinds: dict[bool, int] = {}  # naive or not -> the first cell of that kind
+
+    def refuse(i: int, what: str, remedy: str) -> None:
+        problems.append(Problem(what, f"{where} (line {i + 2})", remedy))
+
     for i, cell in enumerate(cells):
+        text = cell.strip().strip('"')
         try:
-            moment = datetime.fromisoformat(cell.strip().strip('"'))
-            if moment.tzinfo is None:
-                naive = True
-                if zone is None:
-                    raise LogError(
-                        f"time '{cell.strip()}' has no zone",
-                        f"{where} (line {i + 2})",
-                        'write 2026-03-01T08:00:00+01:00, or name the zone in run.toml: zone = "Europe/Berlin"',
-                    )
-                moment = moment.replace(tzinfo=zone)
-            seconds[i] = moment.timestamp()
-        except (ValueError, OverflowError, OSError) as e:
-            raise LogError(
-                f"'{cell.strip()[:40]}' is neither a number nor an ISO 8601 time",
-                f"{where} (line {i + 2})",
-                "write seconds under 'time [s]', or 2026-03-01T08:00:00+01:00 under 'time'",
-            ) from e
-    return seconds, naive
+            moment = datetime.fromisoformat(text)
+        except ValueError:
+            remedy = "write seconds under 'time [s]', or 2026-03-01T08:00:00+01:00 under 'time'"
+            refuse(i, f"'{text[:40]}' is neither a number nor an ISO 8601 time", remedy)
+        else:
+            naive = moment.tzinfo is None
+            kinds.setdefault(naive, i)
+            try:
+                if naive and zone is not None:
+                    moment = in_zone(moment, zone)
+                seconds[i] = moment.timestamp()
+            except (ValueError, OverflowError, OSError) as e:
+                refuse(
+                    i, f"time '{text[:40]}': {e}", "log the offset with each time, or UTC: 2026-03-01T08:00:00+01:00"
+                )
+            if naive and zone is None:
+                remedy = 'write 2026-03-01T08:00:00+01:00, or name the zone in run.toml: zone = "Europe/Berlin"'
+                refuse(i, f"time '{text[:40]}' has no zone", remedy)
+        if len(problems) >= _SHOWN:
+            break
+    if len(kinds) == 2 and not problems:
+        what = f"has {'no' if kinds[True] > kinds[False] else 'a'} zone, the times above it are of the other kind"
+        refuse(max(kinds.values()), f"this time {what}", "write the offset with every time")
+    if problems:
+        raise LogError.collect(problems)
+    return seconds, True in kinds

@@ -61,6 +61,14 @@ def _facts(run: Run) -> str:
     lines += [f"sampling = {run.sampling!r}"] if run.sampling else []
     lines += [f"initial_temperature = {run.initial_temperature!r}"] if run.initial_temperature is not None else []
     lines.append(f"synthetic = {json.dumps(list(run.synthetic))}")
+    if run.tcp_reference != "absolute":
+        lines.append(f"tcp_reference = {json.dumps(run.tcp_reference)}")
+    if run.segments:
+        rows = [
+            f"  {{ name = {json.dumps(s.name, ensure_ascii=False)}, start = {s.start!r}, end = {s.end!r} }},"
+            for s in run.segments
+        ]
+        lines += ["segments = [", *rows, "]"]
     return "\n".join(lines) + "\n"
 
 
@@ -72,8 +80,10 @@ def write_table(path: Path, table: Table) -> None:
 
 def write_tcp(path: Path, tcp: Tcp) -> None:
     """The tcp.csv of a run folder, positions in mm and displacements in um; not atomically."""
-    headers = ["time [s]", *(f"{a} [mm]" for a in tcp.axes), "dx [um]", "dy [um]", "dz [um]"]
-    columns = [tcp.time[:, None], tcp.position * 1e3, tcp.displacement * 1e6]
+    headers = ["time [s]", *(f"{a} [mm]" for a in tcp.axes), *(f"{a} [deg]" for a in tcp.angle)]
+    headers += ["dx [um]", "dy [um]", "dz [um]"]
+    angles = [np.rad2deg(values)[:, None] for values in tcp.angle.values()]
+    columns = [tcp.time[:, None], tcp.position * 1e3, *angles, tcp.displacement * 1e6]
     if tcp.sigma is not None:
         headers.append("sigma [um]")
         columns.append(tcp.sigma[:, None] * 1e6)

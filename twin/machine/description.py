@@ -158,6 +158,7 @@ class JointLaw(Entry):
     """The conductance of a fixed joint by a law of kind "joint", from roughness, hardness and bolts (004 eqs 7-10)."""
 
     law: str
+    gain: float = Field(1.0, gt=0)  # calibration factor of the law
     parameters: dict[str, float | str] = {}
 
 
@@ -212,6 +213,8 @@ class Environment(Entry):
     temperature: Temperature | None = None  # constant, where no signal is given
     gradient: TemperatureGradient = 0.0  # warmer by this per metre above `height`
     height: Length = 0.0  # vertical machine coordinate at which the temperature is measured
+    # added to it: of a sensor that reads wrong by a constant, or of air that differs from where it is measured
+    offset: TemperatureDifference = 0.0
 
 
 class SignalEntry(Entry):
@@ -265,6 +268,19 @@ class Limits(Entry):
     relative: float = Field(0.01, gt=0)  # of every output's own range over all scenarios
 
 
+class ParameterEntry(Entry):
+    """What measurements may correct, and how well it is known; a later table wins over an earlier one.
+
+    Bounds and tolerances have the unit of the parameter, but the tolerance of a positive scale parameter is relative.
+    """
+
+    path: str  # dotted path of parameters; *, ? and [abc] as in file names: "sources.*.gain"
+    tolerance: float | str | None = None  # one standard deviation: "30 %" or 0.3; "0.5 K" of an offset
+    low: float | str | None = None
+    high: float | str | None = None
+    fixed: bool = False  # never fitted
+
+
 class MachineEntry(Entry):
     name: str
     description: str = ""
@@ -291,6 +307,7 @@ class Machine(Entry):
     supports: dict[str, Support] = {}
     poses: dict[str, int | tuple[Length, ...]] = {}  # per linear axis: number of equidistant positions, or a list
     limits: Limits = Limits()
+    parameters: tuple[ParameterEntry, ...] = ()
     folder: Path = Path(".")  # where machine.toml lies; set by the loader
 
     @property

@@ -202,7 +202,7 @@ def _contact(machine: Machine, name: str, load: Load) -> Explanation:
         wiring.joint_conductance(name, machine)  # raises what is wrong with it
         use = wiring.law_use(entry.joint.law, "joint", entry.joint.parameters, {}, f"{path}.joint", machine)
         inputs = _inputs(use, f"{path}.joint", entry.joint.parameters, load, {}, machine)
-        return _explained(path, "contact", use, inputs, 1.0, None, " - ".join(entry.surfaces or ()), 1)
+        return _explained(path, "contact", use, inputs, entry.joint.gain, None, " - ".join(entry.surfaces or ()), 1)
     if entry.total is not None:
         given = Input("total", np.array([entry.total]), "W/K", "of the joint, or of each pad", f"{path}.total")
     else:
@@ -217,7 +217,7 @@ def _contact(machine: Machine, name: str, load: Load) -> Explanation:
 
 def _environment(machine: Machine, name: str, load: Load) -> np.ndarray:
     air = wiring.environment(name, machine.environment[name], machine)
-    return load.signals[air.signal] if air.signal else np.array([air.temperature])
+    return (load.signals[air.signal] if air.signal else np.array([air.temperature])) + air.offset
 
 
 def _inputs(
@@ -272,8 +272,8 @@ def _explained(
     values = {i.name: i.value for i in inputs if i.name in {**law.signals, **law.states, **law.parameters}}
     result = gain * np.broadcast_to(np.asarray(law.function(**values)), (n,))
     holds: Any = law.validity.holds(**values) if law.validity else True
-    if kind != "contact":
-        inputs += (Input("gain", np.array([gain]), "1", "calibration factor of the law", f"{path}.gain"),)
+    at = "joint.gain" if kind == "contact" else "gain"
+    inputs += (Input("gain", np.array([gain]), "1", "calibration factor of the law", f"{path}.{at}"),)
     return Explanation(
         path=path,
         kind=kind,

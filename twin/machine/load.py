@@ -13,22 +13,24 @@ from pydantic import BaseModel, ValidationError
 
 from twin.atomic import atomic_path
 from twin.errors import DescriptionError, Problem
-from twin.machine.description import Machine, MachineEntry
+from twin.machine.description import Machine, MachineEntry, ParameterEntry
 from twin.machine.references import reference_problems
 from twin.machine.schema_errors import Keys, known_keys, missing_section, schema_problem
 from twin.machine.toml_lines import key_lines, line_of
 from twin.nearest import nearest
 
 
-def load_machine(path: Path) -> Machine:
+def load_machine(path: Path, text: str | None = None) -> Machine:
     """The machine described by the file `path`, or by machine.toml in the folder `path`; meshes are not read.
+
+    text: read instead of the file, as if it stood there (a calibrated artefact brings its own description).
 
     Raises DescriptionError with one problem per mistake, each with file, key, line and remedy: TOML syntax, unknown or
     missing keys, units, names that mean nothing, laws with wrong parameters or signals, values out of range.
     """
     path = Path(path)
     path = path / "machine.toml" if path.is_dir() else path
-    text = _read(path)
+    text = _read(path) if text is None else text
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as e:
@@ -140,9 +142,11 @@ def _has(data: Any, keys: Keys) -> bool:
 
 
 def _mark_broken(data: dict[str, Any], keys: Keys) -> None:
-    """Set the named entry, or the section without named entries, that `keys` lies in to None."""
+    """Set the named or numbered entry, or the section without entries, that `keys` lies in to None."""
     section = data.get(keys[0])
-    if len(keys) > 1 and isinstance(section, dict) and not known_keys(keys[:1]):
+    if len(keys) > 1 and isinstance(section, list):
+        section[int(keys[1])] = None
+    elif len(keys) > 1 and isinstance(section, dict) and not known_keys(keys[:1]):
         section[keys[1]] = None
     else:
         data[keys[0]] = None
@@ -158,6 +162,10 @@ def _partial(data: dict[str, Any], sound: dict[str, Any], folder: Path) -> Machi
         if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
             default = None if field.is_required() or section in data else field.get_default()
             values[section] = field.annotation.model_validate(kept) if kept is not None else default
+            continue
+        if section == "parameters":
+            tables = kept if isinstance(kept, list) else []
+            values[section] = tuple(_entry(ParameterEntry, table) for table in tables)
             continue
         given = data.get(section)
         if section in data and not isinstance(kept, dict):

@@ -20,6 +20,7 @@ from twin.machine.description import BOX_SURFACES, Machine
 from twin.machine.encoders import encoder_problems, scale_problems
 from twin.machine.kinematics import linear_axes, rail_moves
 from twin.machine.lumped_references import bodies_without_film, joint_law_problems, lumped_problems, misplaced
+from twin.machine.parameters import parameter_problems
 from twin.nearest import did_you_mean, nearest
 from twin.units import parse_unit
 
@@ -298,6 +299,8 @@ def _motion(machine: Machine) -> Iterator[Problem]:
                 rail_moves(machine, str(contact.axis), rail, pad)
             except TwinError as e:
                 yield from e.problems
+    if machine.tcp is not None:
+        yield from parameter_problems(machine)
     if machine.lumped:
         yield from joint_law_problems(machine)
         yield from bodies_without_film(machine, [body.parts for body in bodies_of(machine)])

@@ -107,13 +107,14 @@ _EXAMPLES = {
     "pairs": '[["bed.rail_1", "column.pad_1"]]', "temperature": '"20 degC"', "reference_temperature": '"20 degC"',
     "segments": "12", "elements": "20", "capacity": '"1200 J/K"', "total": '"12 W/K"', "area": '"0.1 m^2"',
     "volume": '"0.4 l"', "mass": '"3 kg"', "length": '"800 mm"', "perimeter": '"100 mm"', "cross_section": '"8 cm^2"',
-    "fixed_end": '"start"',
+    "fixed_end": '"start"', "path": '"sources.*.gain"', "tolerance": '"30 %"', "fixed": "true",
     "tool": '{ surface = "spindle.nose", point = [0, 0, 0.3] }', "work": '{ surface = "table.top" }',
 }  # fmt: skip
 _SECTIONS = {
     "machine": '[machine] with name = "..."', "materials": "[materials.NAME]",
     "parts": "[parts.NAME], or [nodes.NAME] for a machine without meshes",
     "environment": '[environment.shop] with temperature = "20 degC"', "films": "[films.NAME]",
+    "parameters": '[[parameters]] with path = "sources.*.gain" and tolerance = "30 %"',
     "tcp": "[tcp.tool] and [tcp.work]", "supports": "[supports.NAME]",
 }  # fmt: skip
 

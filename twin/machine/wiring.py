@@ -51,10 +51,11 @@ def environment(name: str, entry: description.Environment, machine: Machine) -> 
             "give either a signal or a temperature", where, 'signal = "shop_air" or temperature = "20 degC"'
         )
     if entry.signal is None:
-        return EnvironmentWiring(name, "", float(entry.temperature or 0.0), entry.gradient, entry.height)
+        constant = float(entry.temperature or 0.0)
+        return EnvironmentWiring(name, "", constant, entry.gradient, entry.height, entry.offset)
     expect_signal(entry.signal, "degC", f"{where}.signal", machine)
     reference = machine.machine.reference_temperature
-    return EnvironmentWiring(name, entry.signal, reference, entry.gradient, entry.height)
+    return EnvironmentWiring(name, entry.signal, reference, entry.gradient, entry.height, entry.offset)
 
 
 def axis(name: str, machine: Machine) -> AxisWiring:
@@ -146,7 +147,7 @@ def joint_conductance(name: str, machine: Machine) -> float:
         bolts = "torque, pitch, flank_diameter, hole_diameter, head_diameter and area with the bolts"
         remedy = f"give the pressure, or {bolts}" if "pressure" in law.parameters else "check its parameters"
         raise DescriptionError(f"law '{use.law}' gives {value:g} W/(m^2 K)", f"{where}.joint.parameters", remedy)
-    return value
+    return entry.joint.gain * value
 
 
 def law_use(

@@ -17,9 +17,12 @@ from twin.errors import ArtefactError
 from twin.rom.hdf5_file import put, put_attributes, scale, strings, writing
 from twin.rom.load_model import LoadModel
 from twin.rom.model import AffineBody, MachineModel
+from twin.rom.parameter import Parameter
 
 FORMAT = "twin artefact"
 SCHEMA_VERSION = 2
+
+_PAPERS = ("certificate", "fields", "description", "parameters")  # what results do not depend on
 
 # Dataset of a body -> (unit, dimensions). `equation` counts rows, `state` columns: they differ for oblique projections.
 _MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -36,8 +39,10 @@ _MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
     "G": ("m/K", ("pose", "component", "state")),
     "one": ("K", ("state",)),
     "energy": ("J/K", ("state",)),
+    "E_members": ("J/K", ("member", "equation", "state")),
+    "G_members": ("m/K", ("member", "pose", "component", "state")),
 }
-_OPTIONAL = ("H", "B_out", "P_out")
+_OPTIONAL = ("H", "B_out", "P_out", "E_members", "G_members")
 _INDICES = {"theta": "theta", "sources": "source", "ports": "port", "sensors": "sensor"}  # into root coordinates
 
 
@@ -60,6 +65,7 @@ class Artefact:
     certificate: dict[str, Any]  # JSON values; number tables as numpy arrays
     provenance: dict[str, str]  # hashes of inputs, versions, command
     fields: tuple[SurfaceField, ...]
+    parameters: tuple[Parameter, ...]  # what measurements may correct
     created: str  # ISO 8601, UTC
     digest: str  # sha256 of the model: what results depend on, not its papers, pictures and date
 
@@ -72,6 +78,7 @@ def write_artefact(
     provenance: Mapping[str, str] | None = None,
     fields: Sequence[SurfaceField] = (),
     created: datetime | None = None,
+    parameters: Sequence[Parameter] = (),
 ) -> None:
     """Write a dense model. Equal input gives equal bytes apart from the attribute `created` (now by default).
 
@@ -86,6 +93,14 @@ def write_artefact(
         put(f, "reference_temperature", float(model.reference_temperature), "degC")
         put(f, "load_model", json.dumps(model.load_model.to_json()), "", (), "sources, films, contacts, signals (JSON)")
         put(f, "description", description, "", (), "machine.toml")
+        put(
+            f,
+            "parameters",
+            json.dumps([p.to_json() for p in parameters]),
+            "",
+            (),
+            "what calibration may correct (JSON)",
+        )
         _write_coordinates(f, model)
         bodies = f.create_group("bodies")
         for body in model.bodies:
@@ -121,6 +136,8 @@ def _write_coordinates(f: h5py.File, model: MachineModel) -> None:
 def _write_body(group: h5py.Group, body: AffineBody) -> None:
     scale(group, "state", np.arange(body.n), "", "modal coordinates [K]")
     scale(group, "equation", np.arange(body.n), "", "rows")
+    if body.members:
+        scale(group, "member", body.members, "", "parts, or nodes and bars: shares of E and G")
     for name, root in _INDICES.items():
         scale(group, name, np.array(getattr(body, name), dtype=np.int64), "", f"index of each {root} in /{root}")
     values = {name: getattr(body, name) for name in _MATRICES} | {
@@ -206,7 +223,7 @@ def _digest(f: h5py.File) -> str:
     f.visit(names.append)
     for name in sorted(names):
         item = f[name]
-        if not isinstance(item, h5py.Dataset) or name.split("/")[0] in ("certificate", "fields", "description"):
+        if not isinstance(item, h5py.Dataset) or name.split("/")[0] in _PAPERS:
             continue
         digest.update(f"{name} {item.shape}".encode())
         text = h5py.check_string_dtype(item.dtype) is not None
@@ -251,9 +268,16 @@ def _read(f: h5py.File, path: Path) -> Artefact:
             SurfaceField(name, *(_dataset(f, f"fields/{name}/{part}")[...] for part in ("nodes", "triangles", "basis")))
             for name in _dataset(f, "fields")
         ),
+        parameters=_parameters(f),
         created=f.attrs["created"].decode(),
         digest=_digest(f),
     )
+
+
+def _parameters(f: h5py.File) -> tuple[Parameter, ...]:
+    if "parameters" not in f:  # written before there were any
+        return ()
+    return tuple(Parameter.from_json(p) for p in json.loads(f["parameters"].asstr()[()]))
 
 
 def _dataset(f: h5py.File, name: str) -> Any:
@@ -268,8 +292,10 @@ def _read_body(f: h5py.File, name: str, n_poses: int) -> AffineBody:
 
     indices = {part: tuple(int(i) for i in get(part)) for part in _INDICES}
     values = {part: get(part) for part in _MATRICES if part not in _OPTIONAL or f"bodies/{name}/{part}" in f}
+    members = strings(f[f"bodies/{name}/member"]) if f"bodies/{name}/member" in f else ()
     n = len(values["one"])
-    sizes = {"equation": n, "state": n, "pose": n_poses, "component": 3} | {k: len(v) for k, v in indices.items()}
+    sizes = {"equation": n, "state": n, "pose": n_poses, "component": 3, "member": len(members)}
+    sizes |= {k: len(v) for k, v in indices.items()}
     for part, value in values.items():
         if value.shape != tuple(sizes[dim] for dim in _MATRICES[part][1]) or not np.all(np.isfinite(value)):
             raise KeyError(f"'bodies/{name}/{part}' has shape {value.shape} or values that do not fit")
@@ -292,4 +318,7 @@ def _read_body(f: h5py.File, name: str, n_poses: int) -> AffineBody:
         P_out=values.get("P_out"),
         B_out=values.get("B_out"),
         H=values.get("H"),
+        members=members,
+        E_members=values.get("E_members"),
+        G_members=values.get("G_members"),
     )

@@ -29,11 +29,11 @@ class Drive:
 
     time: np.ndarray  # (n + 1,) s, step edges
     power: np.ndarray  # (n, n_sources) W, gains included, surfaces and contacts alike; 0 where `losses` tells
-    port_heat: np.ndarray  # (n, n_ports) W that contact sources bring into each port, following the moving pads
+    contact_heat: np.ndarray  # (n, n_contact_sources, n_ports) W that each brings into each port, following the pads
     theta: np.ndarray  # (n, n_theta) W/(m^2 K): convection of films, gains included, 0 where `films` tells; then joints
     films: Following  # films whose law follows the surface temperature
     losses: Following  # sources whose law follows the temperature of their surface
-    environment: np.ndarray  # (n, n_environments) degC
+    environment: np.ndarray  # (n, n_environments) degC, offsets included: what the machine feels, not what is measured
     conductance: np.ndarray  # (n, n_pairs) W/K
     weight: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w, zero-padded to the longest rail
     square: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w_i^2
@@ -46,6 +46,11 @@ class Drive:
     @property
     def n_steps(self) -> int:
         return len(self.time) - 1
+
+    @property
+    def port_heat(self) -> np.ndarray:
+        """(n, n_ports) W that all contact sources bring into each port."""
+        return self.contact_heat.sum(axis=1)
 
 
 def evaluate(
@@ -75,19 +80,20 @@ def evaluate(
     films, films_hold = _read_from_log([(f.use, f.gain) for f in load_model.films], values, len(t))
     joints = np.array([j.conductance for j in load_model.joints])
     environments = _columns(
-        [values[e.signal] if e.signal else np.full(len(t), e.temperature) for e in load_model.environments], len(t)
-    )
+        [(values[e.signal] if e.signal else np.full(len(t), e.temperature)) + e.offset
+         for e in load_model.environments], len(t)
+    )  # fmt: skip
 
     path = {a.name: np.interp(np.append(intervals.start, intervals.end[-1]), t, values[a.position])
             for a in load_model.axes}  # fmt: skip
     flags = _flags(load_model, t, values, missing, path, intervals, dt)
     flags |= _outside("sources", [(s.name, s.use) for s in load_model.sources], powers_hold, intervals)
     flags |= _outside("films", [(f.name, f.use) for f in load_model.films], films_hold, intervals)
-    weight, square, neighbour, port_heat = _contacts(load_model, path, powers, intervals)
+    weight, square, neighbour, contact_heat = _contacts(load_model, path, powers, intervals)
     return Drive(
         time=time[0] + edges,
         power=intervals.mean(powers),
-        port_heat=port_heat,
+        contact_heat=contact_heat,
         theta=np.hstack([intervals.mean(films), np.tile(joints, (n_steps, 1))]),
         films=following_films(load_model, values, environments, intervals),
         losses=following_losses(load_model, values, intervals),
@@ -100,6 +106,11 @@ def evaluate(
         flags=np.stack(list(flags.values()), axis=1),
         flag_names=tuple(flags),
     )
+
+
+def measured_air(load_model: LoadModel, drive: Drive) -> np.ndarray:
+    """What sensors in the air show (n, n_environments) [degC]: the environments without their offsets."""
+    return drive.environment - np.array([e.offset for e in load_model.environments])
 
 
 def outside_flag(kind: str, name: str, text: str) -> str:
@@ -173,11 +184,12 @@ def _pad_coordinate(pair: Pair, position: np.ndarray) -> np.ndarray:
 def _contacts(
     load_model: LoadModel, path: dict[str, np.ndarray], powers: np.ndarray, intervals: Intervals
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Dwell means (n_steps, n_pairs, n_segments) of w, w^2, w_i w_{i+1}, and port heat (n_steps, n_ports) [W]."""
+    """Dwell means (n_steps, n_pairs, n_segments) of w, w^2, w_i w_{i+1}; heat [W] as `Drive.contact_heat`."""
     n_steps = intervals.n_steps
     longest = max((len(rail.stations) for rail in load_model.rails), default=0)
     weight, square, neighbour = np.zeros((3, n_steps, len(load_model.pairs), longest))
-    port_heat = np.zeros((n_steps, len(load_model.ports)))
+    moving = load_model.contact_sources
+    contact_heat = np.zeros((n_steps, len(moving), len(load_model.ports)))
     in_contact = {s.contact: sum(p.contact == s.contact for p in load_model.pairs) for s in load_model.sources}
     for k, pair in enumerate(load_model.pairs):
         rail = load_model.rails[pair.rail]
@@ -194,16 +206,17 @@ def _contacts(
         share = points.share * np.where(rest[step], 1.0, intervals.share[use][points.interval])
         means = assign(stations, points.s, step, share, n_steps)
         weight[:, k, :n], square[:, k, :n], neighbour[:, k, : n - 1] = means.mean, means.square, means.neighbour
-        for j, source in enumerate(load_model.sources):
+        for i, j in enumerate(moving):
+            source = load_model.sources[j]
             if source.contact != pair.contact:
                 continue
             power = powers[:, j] / in_contact[source.contact]
             mean = intervals.mean(power)
             here = np.where(rest[step], mean[step], power[sample])
             under_pad = assign(stations, points.s, step, share * here, n_steps)
-            port_heat[:, rail.first_port : rail.first_port + n] += source.rail_share * under_pad.mean
-            port_heat[:, pair.pad_port] += (1.0 - source.rail_share) * mean
-    return weight, square, neighbour, port_heat
+            contact_heat[:, i, rail.first_port : rail.first_port + n] += source.rail_share * under_pad.mean
+            contact_heat[:, i, pair.pad_port] += (1.0 - source.rail_share) * mean
+    return weight, square, neighbour, contact_heat
 
 
 def _margin(low: float, high: float) -> float:

@@ -41,6 +41,7 @@ class EnvironmentWiring:
     temperature: float  # degC, where no signal is given
     gradient: float = 0.0  # K/m upwards from `height`
     height: float = 0.0  # m, vertical machine coordinate
+    offset: float = 0.0  # K: what surrounds the machine is warmer by this than `signal` or `temperature` says
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,11 @@ class LoadModel:
         """The environment a machine at rest is as warm as: the first whose films radiate, hence no coolant."""
         films = [f for f in self.films if f.emissivity > 0.0] or list(self.films)
         return min((f.environment for f in films), default=0)
+
+    @property
+    def contact_sources(self) -> tuple[int, ...]:
+        """Index of the sources whose heat goes into moving contacts."""
+        return tuple(j for j, s in enumerate(self.sources) if s.contact)
 
     @property
     def theta_names(self) -> tuple[str, ...]:

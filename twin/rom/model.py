@@ -51,6 +51,15 @@ class AffineBody:
     B_out: np.ndarray | None = None  # (n, len(sources)) likewise of sources
     H: np.ndarray | None = None  # (n, len(theta)) m^3: A_k @ height of film terms; None: zero
     F: Matrix | None = None  # (m, n) 1: temperatures of the surface vertices, for pictures
+    # What parameters of single members (parts; nodes and bars of lumped machines) act on, summing to E and G:
+    members: tuple[str, ...] = ()
+    first: tuple[int, ...] = ()  # of the full model: the first state of each member; the reduced ones have instead
+    E_members: np.ndarray | None = None  # (n_members, n, n) J/K
+    G_members: np.ndarray | None = None  # (n_members, n_poses, 3, n) m/K
+
+    def member_states(self, member: int) -> slice:
+        """Of the full model: which states are those of a member."""
+        return slice(self.first[member], (*self.first, self.n)[member + 1])
 
     @property
     def port_rows(self) -> np.ndarray:

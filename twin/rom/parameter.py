@@ -16,7 +16,7 @@ Scale = Literal["log", "linear"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """`targets` are names in the load model (of sources, films, joints, contacts, environments) or members of bodies."""
+    """`targets`: names in the load model (of sources, films, joints, contacts, environments), or members of bodies."""
 
     path: str  # "sources.y_motor.gain": its name in descriptions, fits and reports
     kind: Kind

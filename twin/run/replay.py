@@ -14,7 +14,7 @@ from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
-from twin.rom.drive import Drive, evaluate
+from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.following_flags import following_flags
 from twin.rom.poses import Kind, pose_weights
 from twin.run.checkpoint import CheckpointFolder, Steps, chain
@@ -81,7 +81,7 @@ def replay_drive(
         what = f"the temperatures are not finite after {drive.time[step]:g} s"
         raise TwinError(what, "loads", "a value in the loads is beyond all reason: run `twin check` on the run folder")
     temperature, tcp = _observe(prepared, states)
-    air = drive.environment[:, [i for _, i in model.ambient_sensors]]
+    air = measured_air(model.load_model, drive)[:, [i for _, i in model.ambient_sensors]]
     positions = np.concatenate([position[None], drive.position])
     axes = [a.name for a in model.load_model.axes]
     weights, outside = pose_weights(

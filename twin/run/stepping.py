@@ -171,7 +171,7 @@ class State:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class _Loads:
+class StepLoads:
     """What drives a step, with the laws that follow the state read at its start."""
 
     theta: jax.Array  # (n_theta,)
@@ -183,7 +183,8 @@ class _Loads:
     radiated: jax.Array  # (n_films,) W
 
 
-def _loads(layout: Layout, system: System, z: jax.Array, inputs: Inputs) -> _Loads:
+def loads_of(layout: Layout, system: System, z: jax.Array, inputs: Inputs) -> StepLoads:
+    """What drives a step from state z (N,): the laws of the log, and those that follow the state read there."""
     n, T_ref = layout.n_films, system.reference_temperature
     theta, power = jnp.asarray(inputs.theta), jnp.asarray(inputs.power)
     plan = FilmPlan(
@@ -201,7 +202,7 @@ def _loads(layout: Layout, system: System, z: jax.Array, inputs: Inputs) -> _Loa
     if layout.following_losses:
         own = np.array(layout.following_losses)
         power = power.at[own].set(read_table(jnp, inputs.power_table, temperature_place(jnp, winding)))
-    return _Loads(
+    return StepLoads(
         theta, films.outer - T_ref, films.lift, power, jnp.asarray(surface), jnp.asarray(winding), area * films.radiated
     )
 
@@ -212,7 +213,7 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
     Pure: jit, scan and vmap apply. The factor is used again where `inputs.changed` is False and theta stays near.
     """
     start, n, borders = state.z, layout.n_films, layout.offsets[1:-1]
-    loads = _loads(layout, system, start, inputs)
+    loads = loads_of(layout, system, start, inputs)
     anew = inputs.changed | jnp.any(jnp.abs(loads.theta - state.held) > inputs.follow * state.held)
     factor, held = lax.cond(
         anew,

@@ -1,0 +1,153 @@
+"""What was measured in a run, as a fit compares it: temperatures averaged over bins, TCP rows one by one.
+
+A sensor is logged far more often than a machine tool changes: means over bins lose nothing and make the noise of a bin
+sigma / sqrt(samples). Sensors in the air are inputs of the model, not outputs, and are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.errors import LogError
+from twin.logs.run import Run
+from twin.rom.drive import Drive
+from twin.rom.model import MachineModel
+from twin.rom.poses import Kind, pose_weights
+
+BIN = 300.0  # s
+LEAST = 0.5  # share of a bin's samples that a sensor must have
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One run; s sensors, b bins, k TCP rows."""
+
+    name: str
+    sensors: tuple[str, ...]  # in the order of columns below
+    column: np.ndarray  # (s,) index among the model's sensors
+    bin_time: np.ndarray  # (b,) s
+    mean_of: np.ndarray  # (b, n_steps + 1): bin means = mean_of @ outputs at step edges
+    temperature: np.ndarray  # (b, s) degC, NaN where too few samples
+    count: np.ndarray  # (b, s) samples
+    tcp_time: np.ndarray  # (k,) s
+    tcp_step: np.ndarray  # (k,) int, step edge before
+    tcp_share: np.ndarray  # (k,) of the edge after
+    pose: np.ndarray  # (k, n_poses) weights of the poses
+    tcp: np.ndarray  # (k, 3) m
+    tcp_sigma: np.ndarray | None  # (k,) m, where the run tells
+    from_first: bool  # deviations count from the first row
+    skipped: tuple[str, ...]  # what the run holds and the fit does not use, in words
+
+    @property
+    def n_temperature(self) -> int:
+        return int(np.isfinite(self.temperature).sum())
+
+
+def measured(
+    model: MachineModel,
+    run: Run,
+    drive: Drive,
+    name: str,
+    bin_length: float = BIN,
+    exclude: Sequence[str] = (),
+    interpolation: Kind = "lagrange",
+) -> Measured:
+    """The measurements of a run beside a drive of it. exclude: sensors left out.
+
+    Raises LogError where a run holds nothing that the model predicts.
+    """
+    skipped: list[str] = []
+    edges = drive.time
+    table = run.temperatures
+    air = {name for name, _ in model.ambient_sensors}
+    sensors = [s for s in model.sensors if table is not None and s in table.columns and s not in exclude]
+    if table is not None:
+        unknown = [c for c in table.columns if c not in model.sensors and c not in air]
+        if unknown:
+            skipped.append(f"{len(unknown)} columns that are no sensor of the machine: {', '.join(unknown)}")
+        time = table.time
+        inside = (time >= edges[0]) & (time <= edges[-1])
+        if not inside.all():
+            skipped.append(f"{int((~inside).sum())} rows of temperatures outside the loads' time")
+        values = np.column_stack([table.columns[s] for s in sensors]) if sensors else np.zeros((len(time), 0))
+        centre, mean_of, temperature, count = _bins(edges, time[inside], values[inside], bin_length)
+    else:
+        centre, mean_of = np.zeros(0), np.zeros((0, len(edges)))
+        temperature = count = np.zeros((0, 0))
+    step, share, pose, tcp, sigma, when = _tcp_rows(model, run, edges, interpolation, skipped)
+    if not np.isfinite(temperature).any() and not len(tcp):
+        raise LogError(
+            "nothing measured that the model predicts", str(run.folder),
+            "a fit needs temperatures.csv with sensors of the machine, tcp.csv, or both",
+        )  # fmt: skip
+    return Measured(
+        name=name,
+        sensors=tuple(sensors),
+        column=np.array([model.sensors.index(s) for s in sensors], dtype=int),
+        bin_time=centre,
+        mean_of=mean_of,
+        temperature=temperature,
+        count=count,
+        tcp_time=when,
+        tcp_step=step,
+        tcp_share=share,
+        pose=pose,
+        tcp=tcp,
+        tcp_sigma=sigma,
+        from_first=run.tcp_reference == "first" and len(tcp) > 0,
+        skipped=tuple(skipped),
+    )
+
+
+def _bins(
+    edges: np.ndarray, time: np.ndarray, values: np.ndarray, length: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    if not len(time):
+        none = np.zeros((0, values.shape[1]))
+        return np.zeros(0), np.zeros((0, len(edges))), none, none
+    number = np.floor((time - edges[0]) / length).astype(int)
+    used, row = np.unique(number, return_inverse=True)
+    position = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
+    share = (time - edges[position]) / (edges[position + 1] - edges[position])
+    size = np.bincount(row).astype(float)
+    mean_of = np.zeros((len(used), len(edges)))
+    np.add.at(mean_of, (row, position), (1.0 - share) / size[row])
+    np.add.at(mean_of, (row, position + 1), share / size[row])
+    good = np.isfinite(values)
+    total, count = np.zeros((2, len(used), values.shape[1]))
+    np.add.at(total, row, np.where(good, values, 0.0))
+    np.add.at(count, row, good.astype(float))
+    enough = count >= LEAST * size[:, None]
+    mean = np.where(enough, total / np.maximum(count, 1.0), np.nan)
+    return np.bincount(row, time) / size, mean_of, mean, count
+
+
+def _tcp_rows(
+    model: MachineModel, run: Run, edges: np.ndarray, interpolation: Kind, skipped: list[str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, np.ndarray]:
+    tcp = run.tcp
+    if tcp is None:
+        none = np.zeros(0)
+        return none.astype(int), none, np.zeros((0, len(model.poses))), np.zeros((0, 3)), None, none
+    missing = [a for a in model.pose_axes if a not in tcp.axes]
+    if missing:
+        raise LogError(
+            f"no position of {', '.join(missing)}", str(run.folder / "tcp.csv"),
+            "give the position of every linear axis in a column of its name",
+        )  # fmt: skip
+    good = (tcp.time >= edges[0]) & (tcp.time <= edges[-1]) & np.isfinite(tcp.displacement).all(axis=1)
+    if not good.all():
+        skipped.append(f"{int((~good).sum())} rows of tcp.csv outside the loads' time or without a value")
+    position = tcp.position[good][:, [tcp.axes.index(a) for a in model.pose_axes]]
+    weights, outside = pose_weights(model.pose_grid, position, interpolation)
+    if outside.any():
+        skipped.append(f"{int(outside.sum())} rows of tcp.csv outside the pose grid")
+    inside = ~outside
+    time = tcp.time[good][inside]
+    step = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
+    share = (time - edges[step]) / (edges[step + 1] - edges[step])
+    sigma = None if tcp.sigma is None else tcp.sigma[good][inside]
+    return step, share, weights[inside], tcp.displacement[good][inside], sigma, time

@@ -1,0 +1,112 @@
+"""Channels that stop changing while their neighbours go on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.errors import Problem
+from twin.logs.channels import DRIVES, MOVES, PLACES, pairs
+from twin.logs.found import held, span, warning
+from twin.logs.run import Table
+
+_ROWS = 20  # a shorter standstill is not looked at
+_EXPECTED = 25.0  # changes that its neighbours made one expect, for a standstill to be told
+
+
+def stuck_temperatures(table: Table, where: str) -> list[Problem]:
+    """Warnings about temperatures that stand still while the others change as often as before.
+
+    Expected changes are the channel's own elsewhere, scaled by how often the others (their median) changed meanwhile:
+    a coarse sensor in slow air may rest for an hour, one with noise may not.
+    """
+    columns = {name: held(v) for name, v in table.columns.items() if np.isfinite(v).any()}
+    moves = {name: np.diff(v) != 0.0 for name, v in columns.items()}
+    counts = {name: np.concatenate([[0], np.cumsum(m)]) for name, m in moves.items()}
+    problems = []
+    busy = np.sum(list(moves.values()), axis=0, dtype=int) if moves else np.zeros(0, int)
+    for name, own in counts.items():
+        first, last = longest_rest(moves[name], busy - moves[name])
+        if last - first < _ROWS or own[-1] < 10:
+            continue
+        others = [c for n, c in counts.items() if n != name]
+        inside = np.array([c[last] - c[first] for c in others], dtype=float)
+        outside = np.array([c[-1] for c in others], dtype=float) - inside
+        usable = outside >= 10
+        if not usable.any():
+            continue
+        expected = float(own[-1] * np.median(inside[usable] / outside[usable]))
+        if expected >= _EXPECTED:
+            what = f"'{name}' stands still at {columns[name][first]:g} degC while others go on"
+            remedy = f"about {expected:.0f} changes were to be expected: a frozen channel? leave its cells empty if so"
+            problems.append(warning(what, span(where, first, last), remedy))
+    return problems
+
+
+def stuck_loads(loads: Table, where: str) -> list[Problem]:
+    """Warnings about channels of one drive that contradict each other: speed without motion, motion without speed,
+    currents, torques and powers to the last digit the same while the drive turns."""
+    problems: list[Problem] = []
+    for speed, position in pairs(loads, MOVES, PLACES):
+        v, x = held(loads.columns[speed]), held(loads.columns[position])
+        turns, moves = v[:-1] != 0.0, np.diff(x) != 0.0
+        both = np.count_nonzero(turns & moves)
+        if both < _ROWS:
+            continue  # a drive that never moved, or a spindle's angle
+        first, last = longest_rest(~(turns & ~moves))
+        if last - first >= _ROWS and both > 0.5 * (np.count_nonzero(turns) - (last - first)):
+            what = f"'{position}' rests while '{speed}' does not"
+            problems.append(warning(what, span(where, first, last), "one of the two channels is frozen"))
+        first, last = longest_rest(~(moves & ~turns))
+        if last - first >= _ROWS and both > 0.5 * (np.count_nonzero(moves) - (last - first)):
+            what = f"'{position}' moves while '{speed}' is zero"
+            problems.append(warning(what, span(where, first, last), "one of the two channels is frozen"))
+    for speed, other in [*pairs(loads, ("m/s",), ("1/s",)), *pairs(loads, ("1/s",), ("m/s",))]:
+        problems += _one_of_two(loads, speed, other, where)
+    told: set[str] = set()
+    for speed, drive in pairs(loads, MOVES, DRIVES):
+        if drive not in told and (found := _frozen_drive(loads, speed, drive, where)):
+            told.add(drive)
+            problems.append(found)
+    return problems
+
+
+def longest_rest(moves: np.ndarray, meanwhile: np.ndarray | None = None) -> tuple[int, int]:
+    """First and last row of the stretch without a move in which most happens; moves (n - 1,) bool between rows.
+
+    meanwhile (n - 1,): what happens between rows, 1 by default, so that the longest stretch is taken.
+    """
+    edges = np.flatnonzero(np.concatenate([[True], moves, [True]]))
+    happened = np.arange(len(moves) + 1) if meanwhile is None else np.concatenate([[0], np.cumsum(meanwhile)])
+    last = edges[1:] - 1  # the row before the next move
+    k = int(np.argmax(happened[last] - happened[edges[:-1]]))
+    return int(edges[k]), int(edges[k + 1] - 1)
+
+
+def _one_of_two(loads: Table, frozen: str, other: str, where: str) -> list[Problem]:
+    """Two speeds of one drive: `frozen` stands still while `other` changes as it did together with it elsewhere."""
+    a, b = np.diff(held(loads.columns[frozen])) != 0.0, np.diff(held(loads.columns[other])) != 0.0
+    first, last = longest_rest(a, b)
+    inside = int(np.count_nonzero(b[first:last]))
+    outside = int(np.count_nonzero(b)) - inside
+    together = int(np.count_nonzero(a & b))
+    if inside < _ROWS or outside < 10 or together < 0.8 * outside or np.ptp(held(loads.columns[frozen])) == 0.0:
+        return []
+    what = f"'{frozen}' stands still while '{other}' changes"
+    return [warning(what, span(where, first, last), "a frozen channel? leave its cells empty if so")]
+
+
+def _frozen_drive(loads: Table, speed: str, drive: str, where: str) -> Problem | None:
+    turns = held(loads.columns[speed])[:-1] != 0.0
+    values = held(loads.columns[drive])
+    moves = np.diff(values) != 0.0
+    first, last = longest_rest(~(turns & ~moves))
+    rows = last - first
+    if rows < _ROWS or values[first] == 0.0:
+        return None
+    elsewhere = np.count_nonzero(turns) - rows
+    share = np.count_nonzero(turns & moves) / elsewhere if elsewhere >= _ROWS else 0.0
+    # a channel that changes from row to row with this probability does not rest so long by chance
+    if share < 0.5 or rows * -np.log1p(-min(share, 0.99)) < _EXPECTED:
+        return None
+    what = f"'{drive}' is {values[first]:g} {loads.units[drive]} to the last digit while '{speed}' goes on"
+    return warning(what, span(where, first, last), "a frozen channel? leave its cells empty if so")
