@@ -19,7 +19,7 @@ import numpy as np
 
 from twin.calibrate.problem import FitRun, Problem, outputs_of
 
-CHUNK = 32  # samples stepped together: their matrices stay in the cache of a core
+CHUNK = 64  # samples stepped together: their matrices stay in the cache of a core
 
 
 @dataclass(frozen=True)
