@@ -121,14 +121,14 @@ def calibrated(artefact: Artefact, parameters: Sequence[Parameter], values: dict
 def write_calibrated(
     artefact: Artefact, target: Path, report: dict[str, Any], parameters: Sequence[Parameter], command: str
 ) -> str:
-    """Write the artefact with the fitted values; returns its description, edited where that was possible.
+    """Write the artefact with the fitted values; returns its description; the report notes whether that was edited.
 
     The certificate stays what it was, marked as that of the values before: `twin verify` makes one for the new ones.
     Raises TwinError if the file cannot be written.
     """
     values = {row["path"]: row["value"] for row in report["parameters"]}
     model, now = calibrated(artefact, parameters, values)
-    text = edited_description(artefact.description, report)
+    text, report["description_edited"] = edited_description(artefact.description, report)
     certificate = {**artefact.certificate, "holds_for": f"the values before calibration, model {artefact.digest[:16]}"}
     provenance = {
         **artefact.provenance,
@@ -142,20 +142,20 @@ def write_calibrated(
     return text
 
 
-def edited_description(text: str, report: dict[str, Any]) -> str:
-    """The description at the fitted values, each with a remark; unchanged where the workshop's packages are missing."""
+def edited_description(text: str, report: dict[str, Any]) -> tuple[str, bool]:
+    """The description at the fitted values, each with a remark; as it was, and False, where pydantic is missing."""
     if not text.strip():
-        return text
+        return text, False
     try:
         from twin.machine.edit import edited
     except ModuleNotFoundError:  # the edge has no pydantic: the numbers are in the artefact all the same
-        return text
+        return text, False
     changed = {row["path"]: row for row in report["parameters"]}
     remarks = {
         path: f"calibrated: {row['value']:.4g} +- {row['sigma']:.2g} {row['unit']} (was {row['nominal']:.4g})"
         for path, row in changed.items()
     }
-    return edited(text, {path: row["value"] for path, row in changed.items()}, remarks)
+    return edited(text, {path: row["value"] for path, row in changed.items()}, remarks), True
 
 
 def write_report(path: Path, report: dict[str, Any]) -> None:

@@ -40,11 +40,10 @@ def command(
     best values so far. Writes the artefact with the fitted values and OUTPUT.json with values, intervals, pulls, what
     the data cannot separate and which experiment would. Check it on a run it was not fitted to: `twin score`.
     """
-    import twin.run.jax_setup  # noqa: F401  isort: skip  first: it prepares JAX before NumPy is loaded
-
     import json
     from pathlib import Path
 
+    import twin.run.jax_setup
     from twin.atomic import atomic_path, check_file
     from twin.calibrate.calibration import calibrate, chosen, windows
     from twin.calibrate.fit import Iteration, Stop
@@ -61,6 +60,10 @@ def command(
     check_file(target)
     if target.exists() and Path(artefact).exists() and target.samefile(artefact):
         raise TwinError("would replace the artefact it starts from", "-o", "the base model stays: name another file")
+    if machine is not None:
+        import twin.machine.edit  # noqa: F401  needs the workstation's packages: say so now, not after the fit
+
+        check_file(Path(machine))
     loaded = read_artefact(Path(artefact))
     options = Options(
         temperature_sigma=positive("--noise", noise, "K"),

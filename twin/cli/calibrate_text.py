@@ -54,5 +54,7 @@ def lines(facts: dict[str, Any], output: str) -> list[str]:
                     f"would separate {name}: {best[0]['do']} (to {best[0]['sigma_after']:.2f} of the prior, now "
                     f"{best[0]['sigma_before']:.2f})"
                 )
+    if not facts["description_edited"]:
+        result += ["", "the description in the artefact is as it was: editing it takes the packages of 'twin[build]'"]
     path = output.removesuffix(".h5") + ".json"
     return [*result, "", f"wrote {output} and {path}; next: twin score {output} RUN, on a run it was not fitted to"]
