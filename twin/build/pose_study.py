@@ -19,7 +19,7 @@ from twin.errors import LogError
 from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
-from twin.rom.drive import evaluate
+from twin.rom.drive import evaluate, measured_air
 from twin.rom.poses import Kind, pose_weights
 
 KINDS: tuple[Kind, ...] = ("linear", "lagrange")
@@ -47,7 +47,7 @@ def fields_of_run(
     stepper = CoupledStepper(full.thermal)
     start = run.initial_temperature
     if start is None:
-        start = float(drive.environment[0, load.surroundings])
+        start = float(measured_air(load, drive)[0, load.surroundings])
     kept: dict[int, list[np.ndarray]] = {}
     with progress("full model", max(wanted)) as advance:
         for step, x, _ in stepper.run(drive, stepper.uniform(start)):

@@ -134,7 +134,7 @@ def simulate_run(
     inside = tcp_time <= drive.time[-1]
     start = run.initial_temperature
     if start is None:
-        start = float(drive.environment[0, load.surroundings])
+        start = float(measured_air(load, drive)[0, load.surroundings])
     result = simulate(full, drive, tcp_time[inside], positions[inside], start, substeps, noise, progress)
     kept = run.loads.time <= drive.time[-1]
     loads = Table(run.loads.time[kept], {k: v[kept] for k, v in run.loads.columns.items()}, run.loads.units)

@@ -148,9 +148,9 @@ def windows(run: Run, length: float, every: float) -> list[Run]:
 
     Loads before a window are kept: the model has to warm up from the run's start, only the measurements are windowed.
     """
-    end = float(run.loads.time[-1])
+    begin, end = float(run.loads.time[0]), float(run.loads.time[-1])
     result = []
-    for stop in np.arange(every, end + every / 2, every):
+    for stop in np.arange(begin + every, end + every / 2, every):
         low, high = stop - length, min(stop, end)
         table, tcp, loads = run.temperatures, run.tcp, run.loads
         past = loads.time <= high

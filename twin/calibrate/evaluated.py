@@ -13,26 +13,36 @@ Pairs = list[tuple[np.ndarray, np.ndarray]]  # per run: of temperatures (b, s, .
 
 
 class Evaluated:
-    """A problem that remembers its last outputs and Jacobian: solver, noise and covariance ask at the same place."""
+    """A problem that remembers its last outputs and Jacobian: solver, noise and covariance ask at the same place.
+
+    TCP rows are weighted: in units of the run's median sigma, so that a good row counts by its own.
+    """
 
     def __init__(self, problem: Problem):
         self.problem = problem
+        self._weights = [run.measured.row_weight(floors(problem, run)[1][0])[:, None] for run in problem.runs]
         self._last: dict[str, tuple[bytes, Pairs]] = {}
 
     def outputs(self, x: np.ndarray) -> Pairs:
-        """As `Problem.outputs`."""
-        return self._ask("outputs", self.problem.outputs, x)
+        """As `Problem.outputs`, TCP rows weighted."""
+        pairs = self._ask("outputs", self.problem.outputs, x)
+        return [(T, weight * w) for (T, w), weight in zip(pairs, self._weights, strict=True)]
 
     def jacobian(self, x: np.ndarray) -> Pairs:
-        """As `Problem.jacobian`."""
-        return self._ask("jacobian", self.problem.jacobian, x)
+        """As `Problem.jacobian`, TCP rows weighted."""
+        pairs = self._ask("jacobian", self.problem.jacobian, x)
+        return [(T, weight[:, :, None] * w) for (T, w), weight in zip(pairs, self._weights, strict=True)]
 
     def residuals(self, x: np.ndarray) -> Pairs:
-        """Per run measured minus simulated: (b, s) K and (k, 3) m; NaN where nothing was measured."""
+        """Per run measured minus simulated: (b, s) K and weighted (k, 3) m; NaN where nothing was measured."""
         return [
-            (run.measured.temperature - T, run.measured.tcp - w)
-            for run, (T, w) in zip(self.problem.runs, self.outputs(x), strict=True)
+            (run.measured.temperature - T, weight * run.measured.tcp - w)
+            for run, weight, (T, w) in zip(self.problem.runs, self._weights, self.outputs(x), strict=True)
         ]
+
+    def plain_residuals(self, x: np.ndarray) -> Pairs:
+        """The same without weights."""
+        return [(T, w / weight) for (T, w), weight in zip(self.residuals(x), self._weights, strict=True)]
 
     def _ask(self, name: str, of: Callable[[np.ndarray], Pairs], x: np.ndarray) -> Pairs:
         key = x.tobytes()
@@ -46,7 +56,8 @@ def floors(problem: Problem, run: FitRun) -> tuple[np.ndarray, np.ndarray]:
     m, options = run.measured, problem.options
     samples = np.median(np.where(m.count > 0, m.count, np.nan), axis=0) if len(m.count) else np.ones(len(m.sensors))
     sensor = options.temperature_sigma / np.sqrt(np.nan_to_num(samples, nan=1.0).clip(1.0))
-    told = options.tcp_sigma if m.tcp_sigma is None or not len(m.tcp_sigma) else float(np.median(m.tcp_sigma))
+    rows = np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma[np.isfinite(m.tcp_sigma) & (m.tcp_sigma > 0.0)]
+    told = float(np.median(rows)) if len(rows) else options.tcp_sigma
     return sensor, np.full(3, max(told, 1e-9))
 
 

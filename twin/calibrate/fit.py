@@ -97,7 +97,7 @@ def fit(
     def count(cost: float, x: np.ndarray) -> None:
         history.append(Iteration(len(history), cost, x.copy(), time.perf_counter() - began))
         report(history[-1])
-        if len(history) > stop.iterations:
+        if len(history) >= stop.iterations:
             raise _Over("iterations")
         if time.perf_counter() - began > stop.seconds:
             raise _Over("time")
@@ -105,6 +105,7 @@ def fit(
     best = x
     evaluated = Evaluated(problem)
     noise = known if known is not None else noise_at(evaluated, [(white(s), white(w)) for s, w in limits], x)
+    k = 0
     try:
         for k in range(whitenings + 1):
             best = _minimise(evaluated, noise, best, (low, high), count, loose=k < whitenings)
@@ -118,11 +119,17 @@ def fit(
         stopped, best = str(over), history[-1].x
     except KeyboardInterrupt:
         stopped, best = "interrupted", (history[-1].x if history else x)
+    if stopped != "minimum" and known is None and k < whitenings:  # intervals need the noise that is there
+        seen = [
+            (estimated(sensors.without_form(T), floor[0]), estimated(tcp.without_form(w), floor[1]))
+            for (T, w), (sensors, tcp), floor in zip(evaluated.residuals(best), noise, limits, strict=True)
+        ]
+        noise = noise_at(evaluated, seen, best)
     seen_by_data = information(evaluated, noise, best)
     covariance = np.linalg.inv(seen_by_data + np.eye(len(best)))
     return Fit(
         problem, best, (covariance + covariance.T) / 2, seen_by_data, noise, tuple(history), stopped,
-        tuple(evaluated.residuals(best)),
+        tuple(evaluated.plain_residuals(best)),
     )  # fmt: skip
 
 

@@ -38,8 +38,16 @@ class Measured:
     pose: np.ndarray  # (k, n_poses) weights of the poses
     tcp: np.ndarray  # (k, 3) m
     tcp_sigma: np.ndarray | None  # (k,) m, where the run tells
+
     from_first: bool  # deviations count from the first row
     skipped: tuple[str, ...]  # what the run holds and the fit does not use, in words
+
+    def row_weight(self, sigma: float) -> np.ndarray:
+        """(k,) how much better than `sigma` [m] each TCP row is measured; 1 where the run does not tell."""
+        if self.tcp_sigma is None:
+            return np.ones(len(self.tcp))
+        told = np.isfinite(self.tcp_sigma) & (self.tcp_sigma > 0.0)
+        return np.where(told, sigma / np.where(told, self.tcp_sigma, 1.0), 1.0)
 
     @property
     def n_temperature(self) -> int:
@@ -74,10 +82,15 @@ def measured(
             skipped.append(f"{int((~inside).sum())} rows of temperatures outside the loads' time")
         values = np.column_stack([table.columns[s] for s in sensors]) if sensors else np.zeros((len(time), 0))
         centre, mean_of, temperature, count = _bins(edges, time[inside], values[inside], bin_length)
+        lost = int((~np.isfinite(temperature) & (count > 0)).sum())
+        if lost:
+            skipped.append(f"{lost} of {temperature.size} bin means with too few samples, or samples to one side")
     else:
         centre, mean_of = np.zeros(0), np.zeros((0, len(edges)))
         temperature = count = np.zeros((0, 0))
     step, share, pose, tcp, sigma, when = _tcp_rows(model, run, edges, interpolation, skipped)
+    if run.tcp_reference == "first" and len(tcp):
+        tcp = tcp - tcp[0]  # from the first row that is used, as the model's
     if not np.isfinite(temperature).any() and not len(tcp):
         raise LogError(
             "nothing measured that the model predicts", str(run.folder),
@@ -109,10 +122,11 @@ def _bins(
         none = np.zeros((0, values.shape[1]))
         return np.zeros(0), np.zeros((0, len(edges))), none, none
     number = np.floor((time - edges[0]) / length).astype(int)
-    used, row = np.unique(number, return_inverse=True)
+    used = np.arange(number.min(), number.max() + 1)  # bins of a gap stay, empty: it interrupts the noise model
+    row = number - used[0]
     position = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
     share = (time - edges[position]) / (edges[position + 1] - edges[position])
-    size = np.bincount(row).astype(float)
+    size = np.bincount(row, minlength=len(used)).astype(float)
     mean_of = np.zeros((len(used), len(edges)))
     np.add.at(mean_of, (row, position), (1.0 - share) / size[row])
     np.add.at(mean_of, (row, position + 1), share / size[row])
@@ -120,9 +134,15 @@ def _bins(
     total, count = np.zeros((2, len(used), values.shape[1]))
     np.add.at(total, row, np.where(good, values, 0.0))
     np.add.at(count, row, good.astype(float))
-    enough = count >= LEAST * size[:, None]
+    own = np.zeros_like(total)
+    np.add.at(own, row, np.where(good, time[:, None], 0.0))
+    centre = np.bincount(row, time, minlength=len(used)) / np.maximum(size, 1.0)
+    usual = np.median(size[size > 0])
+    enough = (count >= LEAST * np.maximum(size, usual)[:, None]) & (
+        np.abs(own / np.maximum(count, 1.0) - centre[:, None]) <= 0.05 * length
+    )
     mean = np.where(enough, total / np.maximum(count, 1.0), np.nan)
-    return np.bincount(row, time) / size, mean_of, mean, count
+    return edges[0] + (used + 0.5) * length, mean_of, mean, count
 
 
 def _tcp_rows(

@@ -23,7 +23,7 @@ from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
-from twin.rom.drive import Drive, evaluate
+from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
 from twin.run.system import Layout, System, prepare
@@ -176,7 +176,7 @@ def problem(
     for run, name in zip(runs, run_names(runs), strict=True):
         drive = evaluate(load, run.loads.time, signal_values(run, load.signals), options.dt)
         start = run.initial_temperature
-        start = float(drive.environment[0, load.surroundings]) if start is None else start
+        start = float(measured_air(load, drive)[0, load.surroundings]) if start is None else start
         ready.append((name, drive, start, measured(model, run, drive, name, options.bin_length, options.exclude)))
     starts = _starts(model, runs, options)
     histories = [History(drive, start) for _, drive, start, _ in ready]

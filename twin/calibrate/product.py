@@ -155,7 +155,7 @@ def edited_description(text: str, report: dict[str, Any]) -> tuple[str, bool]:
         path: f"calibrated: {row['value']:.4g} +- {row['sigma']:.2g} {row['unit']} (was {row['nominal']:.4g})"
         for path, row in changed.items()
     }
-    return edited(text, {path: row["value"] for path, row in changed.items()}, remarks), True
+    return edited(text, {path: row["value"] for path, row in changed.items()}, remarks, digits=9), True
 
 
 def write_report(path: Path, report: dict[str, Any]) -> None:

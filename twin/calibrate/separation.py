@@ -39,11 +39,18 @@ def separation(names: tuple[str, ...], information: np.ndarray) -> Separation:
     n = len(names)
     posterior = np.linalg.inv(information + np.eye(n))
     alone = np.diag(information)
-    eigenvalue, vectors = np.linalg.eigh((information + information.T) / 2)
+    known, rest = np.flatnonzero(alone > KNOWN), np.flatnonzero(alone <= KNOWN)
+    # what the data know of the visible ones once the others, held by their priors, are free: unseen parameters have
+    # null directions of their own, which would mix with those of confounded pairs
+    cross = information[np.ix_(known, rest)]
+    own = information[np.ix_(rest, rest)] + np.eye(len(rest))
+    visible = information[np.ix_(known, known)] - cross @ np.linalg.solve(own, cross.T)
+    eigenvalue, vectors = np.linalg.eigh((visible + visible.T) / 2)
     combinations = []
-    for value, v in zip(eigenvalue, vectors.T, strict=True):
-        part = np.flatnonzero(np.abs(v) > SHARE)
-        seen = part[alone[part] > KNOWN]
+    for value, part in zip(eigenvalue, vectors.T, strict=True):
+        v = np.zeros(n)
+        v[known] = part
+        seen = np.flatnonzero(np.abs(v) > SHARE)
         if value < 1.0 and len(seen) >= 2:
             order = seen[np.argsort(-np.abs(v[seen]))]
             sign = np.sign(v[order[0]])

@@ -254,7 +254,7 @@ def _rows(run: Run, base: Result) -> list[Measurement]:
     return [
         Measurement(
             float(run.tcp.time[i]), position[i], run.tcp.displacement[i],
-            None if sigma is None or not np.isfinite(sigma[i]) else float(sigma[i]),
+            None if sigma is None or not (np.isfinite(sigma[i]) and sigma[i] > 0.0) else float(sigma[i]),
         )
         for i in order
     ]  # fmt: skip

@@ -19,7 +19,7 @@ from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
-from twin.rom.drive import evaluate
+from twin.rom.drive import evaluate, measured_air
 from twin.run.replay import replay
 from twin.run.results import Result
 
@@ -76,7 +76,7 @@ def update_run(
     drive = evaluate(model.load_model, run.loads.time, signals, options.dt)
     start = run.initial_temperature
     if start is None:
-        start = float(drive.environment[0, model.load_model.surroundings])
+        start = float(measured_air(model.load_model, drive)[0, model.load_model.surroundings])
     loads = separate_loads(model.load_model, drive, options.substeps)
     updater = StateUpdater(machine_of(artefact, state_prior), loads, options.dt, float(drive.time[0]), start)
     state = Program(updater, model, options.dt, options.slew)

@@ -42,6 +42,7 @@ def command(
     """
     import json
     from pathlib import Path
+    from typing import Any
 
     import twin.run.jax_setup
     from twin.atomic import atomic_path, check_file
@@ -91,7 +92,11 @@ def command(
 
     progress = silent if as_json else bar
     steps = [read] if window is None else [[run] for run in read]
+    facts: dict[str, Any] = {}
     for k, these in enumerate(steps):
+        if window is not None and not any(len(t.time) for t in (these[0].temperatures, these[0].tcp) if t is not None):
+            click.echo(f"{these[0].loads.time[-1] / 3600:.1f} h: nothing measured in this window", err=as_json)
+            continue
         result = calibrate(loaded, these, parameters, options, stop, report, progress)
         facts = told(result, these, experiments=k == len(steps) - 1)
         if window is not None and not as_json:
@@ -100,6 +105,8 @@ def command(
             click.echo(f"{these[0].loads.time[-1] / 3600:.1f} h: {result.fit.stopped}, {what}")
         if result.fit.stopped == "interrupted":
             break
+    if not facts:
+        raise TwinError("nothing was measured in any window", runs[0], "give a run with temperatures.csv or tcp.csv")
     shown = " ".join(["twin calibrate", artefact, *runs, "-o", output])
     text = write_calibrated(loaded, target, facts, parameters, shown)
     write_report(target.with_suffix(".json"), facts)

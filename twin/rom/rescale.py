@@ -16,10 +16,12 @@ def rescaled(drive: Drive, made_for: LoadModel, wanted: LoadModel) -> Drive:
     Film laws were tabulated at the environment temperatures of `made_for`; an offset of 1 K changes the properties of
     air by 0.3 %.
     """
-    source = np.array([b.gain / a.gain for a, b in zip(made_for.sources, wanted.sources, strict=True)])
-    film = np.array([b.gain / a.gain for a, b in zip(made_for.films, wanted.films, strict=True)])
-    joint = np.array([b.conductance / a.conductance for a, b in zip(made_for.joints, wanted.joints, strict=True)])
-    pair = np.array([b.conductance / a.conductance for a, b in zip(made_for.pairs, wanted.pairs, strict=True)])
+    source = np.array([_ratio(b.gain, a.gain) for a, b in zip(made_for.sources, wanted.sources, strict=True)])
+    film = np.array([_ratio(b.gain, a.gain) for a, b in zip(made_for.films, wanted.films, strict=True)])
+    joint = np.array(
+        [_ratio(b.conductance, a.conductance) for a, b in zip(made_for.joints, wanted.joints, strict=True)]
+    )
+    pair = np.array([_ratio(b.conductance, a.conductance) for a, b in zip(made_for.pairs, wanted.pairs, strict=True)])
     offset = np.array([b.offset - a.offset for a, b in zip(made_for.environments, wanted.environments, strict=True)])
     moving = list(made_for.contact_sources)
     return replace(
@@ -32,3 +34,7 @@ def rescaled(drive: Drive, made_for: LoadModel, wanted: LoadModel) -> Drive:
         environment=drive.environment + offset,
         conductance=drive.conductance * pair,
     )
+
+
+def _ratio(now: float, before: float) -> float:
+    return now / before if before else 1.0  # zero stays zero

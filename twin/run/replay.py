@@ -53,7 +53,7 @@ def replay(
         initial = (
             run.initial_temperature
             if run.initial_temperature is not None
-            else float(drive.environment[0, model.load_model.surroundings])
+            else float(measured_air(model.load_model, drive)[0, model.load_model.surroundings])
         )
     first = [signals[axis.position] for axis in model.load_model.axes]
     position = np.array([values[np.argmax(np.isfinite(values))] for values in first])
