@@ -79,10 +79,13 @@ def test_tcp_is_compared_at_the_measured_time_and_pose(artefact, base, result):
 
 
 def test_tcp_at_the_logged_position_is_the_result_s_own(artefact, base, result):
-    """An axis without a column stands where the loads say: with none at all, that is `tcp_actual`."""
-    tcp = Tcp(result.time[5:9], (), np.zeros((4, 0)), np.ones((4, 3)))
+    """Where the loads say the machine stood, that is `tcp_actual`; without a position nothing is guessed."""
+    position = result.position[5:9][:, [result.axes.index(a) for a in ("x", "y")]]
+    tcp = Tcp(result.time[5:9], ("x", "y"), position, np.ones((4, 3)))
     found = channels(artefact, replace(base, tcp=tcp), result)
     np.testing.assert_allclose(np.column_stack([c.simulated for c in found]), result.tcp_actual[5:9], rtol=1e-12)
+    with pytest.raises(LogError, match="no position of y"):
+        channels(artefact, replace(base, tcp=replace(tcp, axes=("x",), position=position[:, :1])), result)
 
 
 def test_deviations_from_the_first_row(artefact, base, result):

@@ -277,7 +277,7 @@ def test_states_of_other_machines_are_refused(artefact, lived, tmp_path):
 
 
 def test_what_cannot_be_updated_is_refused(artefact, truth):
-    with pytest.raises(LogError, match="no TCP measurement"):
+    with pytest.raises(LogError, match=r"no tcp\.csv"):
         update_run(artefact, dataclasses.replace(truth, tcp=None), OPTIONS)
     with pytest.raises(LogError, match="count from the first row"):
         update_run(

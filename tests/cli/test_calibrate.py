@@ -24,6 +24,7 @@ def folder(tmp_path_factory):
     )
     gains = {p.path: 1.3 * p.nominal for p in a.parameters if p.kind == "source"}
     write_run(place / "truth", lumped_case.truth(gains, 5))
+    write_run(place / "again", lumped_case.truth(gains, 6))
     return place
 
 
@@ -88,12 +89,16 @@ def test_windows_tell_where_they_are(folder, capsys):
         (("--only", "sources.spindel*"), "matches no parameter"),
         (("--noise", "0 K"), "positive"),
         (("--exclude", "nose"), "no sensor 'nose'"),
-        (("--window", "1 h", "EXTRA"), "sliding windows go through one run"),
+        (("--window", "1 h", "again"), "sliding windows go through one run"),
+        (("--window", "1 h", "--every", "10 h"), "the run covers"),
+        (("truth",), "a run is given twice"),
+        (("--form", "nan"), "out of range"),
+        (("--machine", "A.h5"), "ends with .toml"),
         (("--budget", "5 K"), "--budget"),
     ],
 )
 def test_bad_input_is_one_clear_error(folder, capsys, arguments, told):
-    more = [str(folder / "truth") if a == "EXTRA" else a for a in arguments]
+    more = [str(folder / a) if a in ("again", "truth") else a for a in arguments]
     target = folder / "never.h5"
     status = twin(["calibrate", str(folder / "A.h5"), str(folder / "truth"), "-o", str(target), *more])
     err = capsys.readouterr().err
@@ -103,10 +108,33 @@ def test_bad_input_is_one_clear_error(folder, capsys, arguments, told):
     assert not target.exists()
 
 
-def test_the_base_artefact_is_never_replaced(folder, capsys):
-    status = twin(["calibrate", str(folder / "A.h5"), str(folder / "truth"), "-o", str(folder / "A.h5")])
-    assert status == 2
-    assert "would replace the artefact" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("target", "told"),
+    [
+        ("A.h5", "would replace the artefact"),
+        ("truth/loads.csv", "ends with .h5"),
+        ("truth/B.h5", "is a run folder"),
+    ],
+)
+def test_nothing_that_was_there_is_replaced(folder, capsys, target, told):
+    before = {p: p.read_bytes() for p in (folder / "A.h5", folder / "truth" / "loads.csv")}
+    assert twin(["calibrate", str(folder / "A.h5"), str(folder / "truth"), "-o", str(folder / target)]) == 2
+    assert told in capsys.readouterr().err
+    assert {p: p.read_bytes() for p in before} == before
+
+
+def test_windows_without_an_r_test_and_rows_without_a_place(folder, tmp_path, capsys):
+    run = lumped_case.truth({}, 7)
+    position = run.tcp.position.copy()
+    position[0] = float("nan")
+    write_run(tmp_path / "run", replace(run, tcp=replace(run.tcp, position=position)))
+    status = twin(
+        ["calibrate", str(folder / "A.h5"), str(tmp_path / "run"), "-o", str(tmp_path / "W.h5"), *OPTIONS,
+         "--window", "10 min", "--every", "30 min"]
+    )  # fmt: skip
+    assert status == 0
+    assert twin(["calibrate", str(folder / "A.h5"), str(tmp_path / "run"), "-o", str(tmp_path / "X.h5"), *OPTIONS]) == 0
+    assert "1 rows of tcp.csv" in capsys.readouterr().out
 
 
 def test_an_old_artefact_without_parameters_says_what_to_do(folder, tmp_path, capsys):

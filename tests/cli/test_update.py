@@ -94,4 +94,4 @@ def test_bad_options_are_told(slide_artefact, measured, options, what):
 def test_a_run_without_tcp_is_refused(slide_artefact):
     done = invoke(slide_artefact, RUN, "--method", "gain")
     assert isinstance(done.exception, TwinError)
-    assert "no TCP measurement" in str(done.exception)
+    assert "no tcp.csv" in str(done.exception)

@@ -111,14 +111,15 @@ def left_out(run: Run, result: Result) -> LeftOut:
 
 
 def tcp_positions(tcp: Tcp, result: Result) -> np.ndarray:
-    """(n, n_pose_axes) m at the rows of tcp.csv; an axis without a column there stands where the loads say."""
-    columns = []
-    for axis in result.pose_axes:
-        if axis in tcp.axes:
-            columns.append(tcp.position[:, tcp.axes.index(axis)])
-        else:
-            columns.append(np.interp(tcp.time, result.time, result.position[:, result.axes.index(axis)]))
-    return np.column_stack(columns) if columns else np.zeros((len(tcp.time), 0))
+    """(n, n_pose_axes) m at the rows of tcp.csv.
+
+    Raises LogError for an axis without a column: loads tell too coarsely where a moving axis stood.
+    """
+    missing = [a for a in result.pose_axes if a not in tcp.axes]
+    if missing:
+        remedy = "give the position of every linear axis in a column of its name"
+        raise LogError(f"no position of {', '.join(missing)}", "tcp.csv", remedy)
+    return tcp.position[:, [tcp.axes.index(a) for a in result.pose_axes]]
 
 
 def simulated_tcp(

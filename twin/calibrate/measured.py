@@ -158,10 +158,12 @@ def _tcp_rows(
             f"no position of {', '.join(missing)}", str(run.folder / "tcp.csv"),
             "give the position of every linear axis in a column of its name",
         )  # fmt: skip
-    good = (tcp.time >= edges[0]) & (tcp.time <= edges[-1]) & np.isfinite(tcp.displacement).all(axis=1)
+    position = tcp.position[:, [tcp.axes.index(a) for a in model.pose_axes]]
+    whole = np.isfinite(tcp.displacement).all(axis=1) & np.isfinite(position).all(axis=1)
+    good = (tcp.time >= edges[0]) & (tcp.time <= edges[-1]) & whole
     if not good.all():
-        skipped.append(f"{int((~good).sum())} rows of tcp.csv outside the loads' time or without a value")
-    position = tcp.position[good][:, [tcp.axes.index(a) for a in model.pose_axes]]
+        skipped.append(f"{int((~good).sum())} rows of tcp.csv outside the loads' time, or with an empty cell")
+    position = position[good]
     weights, outside = pose_weights(model.pose_grid, position, interpolation)
     if outside.any():
         skipped.append(f"{int(outside.sum())} rows of tcp.csv outside the pose grid")

@@ -168,6 +168,8 @@ def replay_update(
     Raises LogError where the run has no row of tcp.csv inside its loads' time, or counts deviations from the first row.
     """
     plan = Plan() if plan is None else plan
+    if run.tcp is None:
+        raise LogError("no tcp.csv", str(run.folder), "an update needs rows of time, positions, dx, dy, dz")
     rows = _rows(run, base)
     file = str(run.folder / "tcp.csv")
     if not rows:

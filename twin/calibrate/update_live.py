@@ -29,6 +29,9 @@ FORMAT = "twin update state"
 
 def write_live(folder: Path, program: Program[Any], live: Live[Any]) -> None:
     """Write the state of any method to a folder. Raises TwinError if the file cannot be written."""
+    own = "state.h5" if isinstance(program.updater, StateUpdater) else "state.json"
+    for other in {"state.h5", "state.json"} - {own}:  # of another method: stale from now on
+        (Path(folder) / other).unlink(missing_ok=True)
     if isinstance(program.updater, StateUpdater):
         write_state(Path(folder) / "state.h5", program.updater.machine, live)
     else:

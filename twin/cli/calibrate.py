@@ -41,6 +41,7 @@ def command(
     the data cannot separate and which experiment would. Check it on a run it was not fitted to: `twin score`.
     """
     import json
+    import math
     from pathlib import Path
     from typing import Any
 
@@ -52,19 +53,28 @@ def command(
     from twin.calibrate.product import told, write_calibrated, write_report
     from twin.cli.calibrate_text import lines
     from twin.cli.quantity import positive
-    from twin.errors import TwinError
+    from twin.errors import LogError, TwinError
     from twin.logs.read import read_run
     from twin.progress import bar, silent
     from twin.rom.artefact import read_artefact
+    from twin.run.results import refuse_run_folder
 
     target = Path(output)
-    check_file(target)
-    if target.exists() and Path(artefact).exists() and target.samefile(artefact):
-        raise TwinError("would replace the artefact it starts from", "-o", "the base model stays: name another file")
+    if target.suffix != ".h5":
+        raise TwinError("an artefact's name ends with .h5", f"-o {output}", "for example -o out/calibrated.h5")
+    if machine is not None and Path(machine).suffix != ".toml":
+        raise TwinError("a description's name ends with .toml", f"--machine {machine}", "name another file")
     if machine is not None:
         import twin.machine.edit  # noqa: F401  needs the workstation's packages: say so now, not after the fit
-
-        check_file(Path(machine))
+    for written in (target, target.with_suffix(".json"), *([Path(machine)] if machine else [])):
+        check_file(written)
+        refuse_run_folder(written.parent)
+        if written.exists() and Path(artefact).exists() and written.samefile(artefact):
+            raise TwinError("would replace the artefact it starts from", str(written), "name another file with -o")
+    if len({Path(run).resolve() for run in runs}) < len(runs):
+        raise TwinError("a run is given twice", "RUNS", "give each once: a run is no more evidence when read again")
+    if not math.isfinite(form):
+        raise TwinError(f"{form} is out of range", "--form", "give a share, for example --form 0.03")
     loaded = read_artefact(Path(artefact))
     options = Options(
         temperature_sigma=positive("--noise", noise, "K"),
@@ -80,7 +90,11 @@ def command(
     if window is not None:
         if len(read) != 1:
             raise TwinError("sliding windows go through one run", "--window", "give one RUN")
-        read = windows(read[0], positive("--window", window, "s"), positive("--every", every, "s"))
+        length, between = positive("--window", window, "s"), positive("--every", every, "s")
+        span = float(read[0].loads.time[-1] - read[0].loads.time[0])
+        if between > span:
+            raise TwinError(f"the run covers {span / 3600:.2f} h only", f"--every {every}", "give a shorter time")
+        read = windows(read[0], length, between)
     parameters = chosen(loaded, only, hold, any(run.tcp is not None for run in read))
     stop = Stop(iterations, positive("--budget", budget, "s"))
 
@@ -94,10 +108,13 @@ def command(
     steps = [read] if window is None else [[run] for run in read]
     facts: dict[str, Any] = {}
     for k, these in enumerate(steps):
-        if window is not None and not any(len(t.time) for t in (these[0].temperatures, these[0].tcp) if t is not None):
-            click.echo(f"{these[0].loads.time[-1] / 3600:.1f} h: nothing measured in this window", err=as_json)
+        try:
+            result = calibrate(loaded, these, parameters, options, stop, report, progress)
+        except LogError as e:  # a window may hold nothing to compare; a run may not
+            if window is None:
+                raise
+            click.echo(f"{these[0].loads.time[-1] / 3600:.1f} h: {e.problems[0].what}", err=as_json)
             continue
-        result = calibrate(loaded, these, parameters, options, stop, report, progress)
         facts = told(result, these, experiments=k == len(steps) - 1)
         if window is not None and not as_json:
             moved = sorted(facts["parameters"], key=lambda row: -abs(row["pull"]))[:3]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 STOPPED = {
@@ -26,7 +27,7 @@ def lines(facts: dict[str, Any], output: str) -> list[str]:
         left = (
             [f"{run['temperatures']} temperatures to {run['rms_temperature_K']:.3f} K"] if run["temperatures"] else []
         )
-        if run["tcp_rows"]:
+        if run["tcp_rows"] and run["rms_displacement_m"] is not None:
             left.append(f"{run['tcp_rows']} TCP rows to {1e6 * run['rms_displacement_m']:.2f} um")
         result.append(f"{run['name']}: {', '.join(left)} (rms)")
         result += [f"  not used: {what}" for what in run["not_used"]]
@@ -56,5 +57,5 @@ def lines(facts: dict[str, Any], output: str) -> list[str]:
                 )
     if not facts["description_edited"]:
         result += ["", "the description in the artefact is as it was: editing it takes the packages of 'twin[build]'"]
-    path = output.removesuffix(".h5") + ".json"
-    return [*result, "", f"wrote {output} and {path}; next: twin score {output} RUN, on a run it was not fitted to"]
+    report = Path(output).with_suffix(".json")
+    return [*result, "", f"wrote {output} and {report}; next: twin score {output} RUN, on a run it was not fitted to"]

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 
-@click.command(epilog="Example: twin update out/five_axis.h5 out/truth/experiment_a --interval '1 h' -o out/update")
+@click.command(epilog="Example: twin update out/five_axis.h5 out/truth --interval '1 h' -o out/update")
 @click.argument("artefact", type=click.Path())
 @click.argument("run", type=click.Path())
 @click.option("--method", type=click.Choice(["state", "gain", "paper"]), default="state", show_default=True,

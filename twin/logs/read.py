@@ -219,6 +219,13 @@ def _tcp(table: CsvTable, zero: float | None, path: Path) -> Tcp:
                 f"'{name}' is in {table.units[name]}", str(path), "lengths are in um, mm or m: 'x [mm]', 'dx [um]'"
             )
     n = len(table.time)
+    if "sigma" in table.columns and np.any(table.columns["sigma"] <= 0.0):
+        line = int(np.argmax(table.columns["sigma"] <= 0.0)) + 2
+        raise LogError(
+            "sigma is not positive",
+            f"{path} (line {line})",
+            "give a standard deviation, or an empty cell",
+        )
     return Tcp(
         time=_relative(table, zero, path),
         axes=axes,

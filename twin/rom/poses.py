@@ -55,5 +55,5 @@ def pose_weights(
         margin = 1e-9 * max(abs(nodes[0]), abs(nodes[-1]))
         outside |= (s < nodes[0] - margin) | (s > nodes[-1] + margin)
         along = axis_weights(nodes, s, kind)
-        weights = (weights[:, :, None] * along[:, None, :]).reshape(len(position), -1)
+        weights = (weights[:, :, None] * along[:, None, :]).reshape(len(position), weights.shape[1] * along.shape[1])
     return weights, outside
