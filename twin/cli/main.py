@@ -54,7 +54,10 @@ class LazyGroup(click.Group):
         # MKL likewise: builds work on several things at once, each in one thread, so that equal input gives equal bits.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         os.environ.setdefault("MKL_NUM_THREADS", "1")
-        return importlib.import_module(f"twin.cli.{name}").command
+        command: click.Command = importlib.import_module(f"twin.cli.{name}").command
+        if command.epilog and not command.epilog.startswith("\b"):
+            command.epilog = f"\b\n{command.epilog}"  # an example that is wrapped cannot be pasted
+        return command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
