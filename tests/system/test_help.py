@@ -23,7 +23,7 @@ def test_the_example_parses(name, monkeypatch):
     command = load(name)
     assert command.epilog is not None
     start, example = command.epilog.split(": ", 1)
-    assert start == "Example"
+    assert start == "\b\nExample"  # not wrapped: it is there to be pasted
     program, called, *arguments = shlex.split(example)
     assert (program, called) == ("twin", name)
     command.make_context(name, list(arguments))  # raises UsageError for unknown options and missing arguments

@@ -36,9 +36,10 @@ def command(
 ) -> int:  # fmt: skip
     """Fit the parameters of ARTEFACT to the temperatures and TCP deviations measured in RUNS.
 
-    Bounded least squares with priors; stops at the minimum, after --iterations or after --budget, and Ctrl-C
-    during the iterations keeps the best values so far. Writes the artefact with the fitted values and OUTPUT.json with values, intervals, pulls, what
-    the data cannot separate and which experiment would. Check it on a run it was not fitted to: `twin score`.
+    Bounded least squares with priors; stops at the minimum, after --iterations or after --budget, and Ctrl-C during the
+    iterations keeps the best values so far. Writes the artefact with the fitted values and OUTPUT.json with values,
+    intervals, pulls, what the data cannot separate and which experiment would. Check it on a run it was not fitted to:
+    `twin score`.
     """
     import json
     import math
