@@ -30,7 +30,9 @@ HOUR = 12  # steps
 def test_runs_are_sound_and_what_their_script_writes(name):
     make_runs = load_script(FOLDER, "runs/make_runs.py")
     (experiment,) = [e for e in make_runs.EXPERIMENTS if e.name == name]
-    assert make_runs.table(experiment) == (FOLDER / "runs" / name / "loads.csv").read_text(encoding="utf-8")
+    assert make_runs.table(make_runs.log_of(experiment)) == (FOLDER / "runs" / name / "loads.csv").read_text(
+        encoding="utf-8"
+    )
     assert twin(["check", str(FOLDER / "runs" / name)]) == 0
 
 

@@ -110,27 +110,33 @@ def fit(
         for k in range(whitenings + 1):
             best = _minimise(evaluated, noise, best, (low, high), count, loose=k < whitenings)
             if k < whitenings:
-                seen = [
-                    (estimated(sensors.without_form(T), floor[0]), estimated(tcp.without_form(w), floor[1]))
-                    for (T, w), (sensors, tcp), floor in zip(evaluated.residuals(best), noise, limits, strict=True)
-                ]
-                noise = noise_at(evaluated, seen, best)
+                noise = _seen(evaluated, noise, limits, best)
     except _Over as over:
         stopped, best = str(over), history[-1].x
     except KeyboardInterrupt:
         stopped, best = "interrupted", (history[-1].x if history else x)
     if stopped != "minimum" and known is None and k < whitenings:  # intervals need the noise that is there
-        seen = [
-            (estimated(sensors.without_form(T), floor[0]), estimated(tcp.without_form(w), floor[1]))
-            for (T, w), (sensors, tcp), floor in zip(evaluated.residuals(best), noise, limits, strict=True)
-        ]
-        noise = noise_at(evaluated, seen, best)
+        noise = _seen(evaluated, noise, limits, best)
     seen_by_data = information(evaluated, noise, best)
     covariance = np.linalg.inv(seen_by_data + np.eye(len(best)))
     return Fit(
         problem, best, (covariance + covariance.T) / 2, seen_by_data, noise, tuple(history), stopped,
         tuple(evaluated.plain_residuals(best)),
     )  # fmt: skip
+
+
+def _seen(
+    evaluated: Evaluated,
+    noise: tuple[tuple[Noise, Noise], ...],
+    limits: list[tuple[np.ndarray, np.ndarray]],
+    x: np.ndarray,
+) -> tuple[tuple[Noise, Noise], ...]:
+    """The noise that the residuals at x show, at least that of the instruments, with errors of form at x."""
+    channels = [
+        (estimated(sensors.without_form(T), floor[0]), estimated(tcp.without_form(w), floor[1]))
+        for (T, w), (sensors, tcp), floor in zip(evaluated.residuals(x), noise, limits, strict=True)
+    ]
+    return noise_at(evaluated, channels, x)
 
 
 def _minimise(

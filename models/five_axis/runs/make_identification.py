@@ -22,15 +22,16 @@ from make_runs import (
     ENCLOSURE_WARMS,
     FINE,
     HOUR,
-    LEAD,
     R_TEST,
     SAMPLING,
     SPEED,
     STILL_AIR,
+    columns_of,
     follow,
     means,
     r_test,
     sweep,
+    table,
 )
 
 MOVES = {0: (0.0, 2.0), 1: (2.0, 4.0), 2: (4.0, 6.0)}  # h in which each axis moves alone
@@ -74,26 +75,12 @@ def main() -> None:
     enclosure = follow(time, room, ENCLOSURE_DELAY) + ENCLOSURE_RISE * follow(
         time, working & (time > 0), ENCLOSURE_WARMS
     )
-    logged = path[:: round(SAMPLING / FINE)]
-    columns = [("time [s]", time, 0)]
-    columns += [(f"{a}_position [mm]", 1e3 * logged[:, k], 1) for k, a in enumerate("xyz")]
-    columns += [(f"{a}_position [deg]", logged[:, k], 1) for k, a in ((3, "b"), (4, "c"))]
-    columns += [(f"{a}_speed [m/min]", 60.0 * means(speed[:, k]), 2) for k, a in enumerate("xyz")]
-    columns += [(f"{a}_motor_speed [1/min]", 60.0 / LEAD * means(speed[:, k]), 0) for k, a in enumerate("xyz")]
-    columns += [(f"{a}_current [A]", np.sqrt(means(current[:, k] ** 2)) + noise[:, k], 2) for k, a in enumerate("xyz")]
-    columns += [
-        ("spindle_speed [1/min]", means(SPINDLE_SPEED * cutting), 0),
-        ("spindle_current [A]", np.sqrt(means((SPINDLE_CURRENT * cutting) ** 2 + (2.0 * testing) ** 2)), 2),
-        ("ambient [degC]", room, 2),
-        ("enclosure [degC]", enclosure, 2),
-        ("draught [m/s]", wind, 2),
-    ]
+    spindle_current = np.sqrt(means((SPINDLE_CURRENT * cutting) ** 2 + (2.0 * testing) ** 2))
+    spindle = means(SPINDLE_SPEED * cutting), spindle_current
+    columns = columns_of(time, path, speed, current, noise, spindle, room, enclosure, wind)
     folder = Path(__file__).parent / "identification"
     folder.mkdir(exist_ok=True)
-    rows = np.column_stack([c[1] for c in columns]).tolist()
-    lines = [",".join(c[0] for c in columns)]
-    lines += [",".join(f"{round(v, c[2]) + 0.0:.10g}" for v, c in zip(row, columns, strict=True)) for row in rows]
-    (folder / "loads.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (folder / "loads.csv").write_text(table(columns), encoding="utf-8")
     print(folder / "loads.csv")
 
 

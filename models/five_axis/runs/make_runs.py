@@ -37,6 +37,9 @@ STILL_AIR, DRAUGHT, DRAUGHT_DELAY = 0.05, 0.8, 60.0  # m/s, m/s, s
 ENCLOSURE_DELAY, ENCLOSURE_RISE, ENCLOSURE_WARMS = 20.0 * 60.0, 1.2, 40.0 * 60.0  # s, K under load, s
 
 
+Column = tuple[str, np.ndarray, int]  # header, values (n,), decimals
+
+
 @dataclass(frozen=True)
 class Experiment:
     """What the paper tells about one of its experiments."""
@@ -130,8 +133,8 @@ def air(experiment: Experiment, time: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return room, follow(time, room, ENCLOSURE_DELAY) + warmed, speed
 
 
-def log_of(experiment: Experiment) -> tuple[list[str], np.ndarray, list[int]]:
-    """Headers, rows and decimals of the log."""
+def log_of(experiment: Experiment) -> list[Column]:
+    """The columns of the log."""
     fine = np.arange(0.0, DURATION + FINE / 2, FINE)
     path = positions(experiment, fine)
     ends = experiment.r_test_ends
@@ -147,6 +150,26 @@ def log_of(experiment: Experiment) -> tuple[list[str], np.ndarray, list[int]]:
     rng = np.random.default_rng(0)
     noise = 0.03 * rng.standard_normal((len(time), 3))
     room, enclosure, wind = air(experiment, time)
+    spindle = means(100.0 * orienting), means(2.0 * testing)
+    return columns_of(time, path, speed, current, noise, spindle, room, enclosure, wind)
+
+
+def columns_of(
+    time: np.ndarray,
+    path: np.ndarray,
+    speed: np.ndarray,
+    current: np.ndarray,
+    noise: np.ndarray,
+    spindle: tuple[np.ndarray, np.ndarray],
+    room: np.ndarray,
+    enclosure: np.ndarray,
+    wind: np.ndarray,
+) -> list[Column]:
+    """The columns of a log: header, values at time (n,) s, decimals.
+
+    path (m, 5), speed (m, 3) [m/s] and current (m, 3) [A] at the resolution FINE; noise (n, 3) [A]; spindle: its speed
+    [1/min] and current [A], (n,) each; room, enclosure [degC] and wind [m/s], (n,) each.
+    """
     logged = path[:: round(SAMPLING / FINE)]
     columns = [("time [s]", time, 0)]
     columns += [(f"{a}_position [mm]", 1e3 * logged[:, k], 1) for k, a in enumerate("xyz")]
@@ -154,30 +177,28 @@ def log_of(experiment: Experiment) -> tuple[list[str], np.ndarray, list[int]]:
     columns += [(f"{a}_speed [m/min]", 60.0 * means(speed[:, k]), 2) for k, a in enumerate("xyz")]
     columns += [(f"{a}_motor_speed [1/min]", 60.0 / LEAD * means(speed[:, k]), 0) for k, a in enumerate("xyz")]
     columns += [(f"{a}_current [A]", np.sqrt(means(current[:, k] ** 2)) + noise[:, k], 2) for k, a in enumerate("xyz")]
-    columns += [
-        ("spindle_speed [1/min]", means(100.0 * orienting), 0),
-        ("spindle_current [A]", means(2.0 * testing), 2),
+    return [
+        *columns,
+        ("spindle_speed [1/min]", spindle[0], 0),
+        ("spindle_current [A]", spindle[1], 2),
         ("ambient [degC]", room, 2),
         ("enclosure [degC]", enclosure, 2),
         ("draught [m/s]", wind, 2),
     ]
-    return [c[0] for c in columns], np.column_stack([c[1] for c in columns]), [c[2] for c in columns]
 
 
-def table(experiment: Experiment) -> str:
+def table(columns: list[Column]) -> str:
     """The text of loads.csv."""
-    headers, rows, decimals = log_of(experiment)
-    lines = [",".join(headers)]
-    lines += [
-        ",".join(f"{round(v, d) + 0.0:.10g}" for v, d in zip(row, decimals, strict=True)) for row in rows.tolist()
-    ]
+    rows = np.column_stack([values for _, values, _ in columns]).tolist()
+    lines = [",".join(header for header, _, _ in columns)]
+    lines += [",".join(f"{round(v, c[2]) + 0.0:.10g}" for v, c in zip(row, columns, strict=True)) for row in rows]
     return "\n".join(lines) + "\n"
 
 
 def main() -> None:
     for experiment in EXPERIMENTS:
         target = Path(__file__).parent / experiment.name / "loads.csv"
-        target.write_text(table(experiment), encoding="utf-8")
+        target.write_text(table(log_of(experiment)), encoding="utf-8")
         print(target)
 
 
