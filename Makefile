@@ -50,6 +50,10 @@ test-all: $(READY) ## every test, the slow ones too
 bench: $(READY) ## what is claimed about speed, memory and accuracy, measured here
 	$(BIN)/python -m benchmarks
 
+.PHONY: campaign
+campaign: $(READY) ## hide effects in data by the hundred and look for them; MINUTES=60 stops earlier, and goes on next time
+	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign $(MINUTES)
+
 .PHONY: demo
 demo: $(READY) ## build, verify and run the shipped five-axis machine; leaves out/ with pictures
 	@$(BIN)/twin demo -o "$(OUT)"

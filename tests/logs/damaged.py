@@ -24,6 +24,8 @@ class Signal:
     low: float
     high: float
     kind: str = "value"
+    default: float | None = None
+    factor: float = 1.0
 
 
 SIGNALS = (

@@ -26,6 +26,8 @@ class Signal:
     kind: str = "value"
     low: float = -1e9
     high: float = 1e9
+    default: float | None = None
+    factor: float = 1.0
 
 
 def table(columns: dict[str, np.ndarray]) -> str:

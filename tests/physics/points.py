@@ -58,6 +58,8 @@ LOSSES = {
     "spindle": {"speed": 100.0, "power": 5000.0, "load": 500.0, "bearings": 2.0, "share": 0.1, **BEARING},
     "constant_heat": {"power": 150.0},
     "switched_heat": {"switch": 0.5, "power": 150.0},
+    "speed_heat": {"speed": -0.3, "power": 150.0, "reference": 0.5, "exponent": 1.5},
+    "turning_heat": {"speed": -30.0, "power": 150.0, "reference": 100.0, "exponent": 1.7},
     "power_share": {"power": 5000.0, "share": 0.1},
 }  # fmt: skip
 FILMS = {
@@ -82,6 +84,7 @@ FILMS = {
     "mixed_horizontal_down": {"speed": -0.6, "length": 0.3, "area_over_perimeter": 0.1, **TEMPERATURES},
     "mixed_cylinder": {"speed": -0.6, "diameter": 0.05, **TEMPERATURES},
     "mixed_rotating_cylinder": {"speed": -5.0, "diameter": 0.05, **TEMPERATURES},
+    "switched_film": {"switch": 0.5, "natural": 6.0},
     "enclosed_gap": {"conductance": 2.0},
     "coolant_channel": {"flow": 5e-5, "diameter": 0.01, "channel_length": 2.0, "area": 0.06, "still": 1.0, **WATER},
 }

@@ -36,3 +36,7 @@ def test_gradients_exist_at_rest():
     assert np.all(np.isfinite(list(gradient.values())))
     assert gradient["speed"] == 0.0
     assert gradient["natural"] == 1.0
+
+
+def test_a_switched_film_is_off_on_or_on_for_a_share():
+    np.testing.assert_allclose(films.switched_film(np.array([0.0, 0.25, 1.0]), 80.0), [0.0, 20.0, 80.0])

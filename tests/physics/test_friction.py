@@ -158,3 +158,12 @@ def test_given_heat():
     assert heat.constant_heat(150.0) == 150.0
     np.testing.assert_allclose(heat.switched_heat(np.array([0.0, 0.25, 1.0]), 150.0), [0.0, 37.5, 150.0])
     np.testing.assert_allclose(heat.power_share(np.array([-2000.0, 2000.0]), 0.1), 200.0)
+
+
+@pytest.mark.parametrize("law", [heat.speed_heat, heat.turning_heat])
+def test_heat_by_a_power_of_the_speed(law):
+    """120 W at 2; at half of it 60, 30 and 120 / 2^(5/3) = 37.798 W by the exponent; either way, and none at rest."""
+    assert law(2.0, 120.0, 2.0, 1.7) == pytest.approx(120.0)
+    for exponent, expected in ((1.0, 60.0), (2.0, 30.0), (5.0 / 3.0, 37.7976)):
+        np.testing.assert_allclose(law(np.array([1.0, -1.0, 0.0]), 120.0, 2.0, exponent), [expected, expected, 0.0],
+                                   rtol=1e-5)  # fmt: skip

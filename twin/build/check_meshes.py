@@ -72,7 +72,7 @@ def _check_lumped(machine: Machine) -> MeshReport:
         problems=tuple(_travel(machine, lumped_ports(machine))),
         parts=0,
         bodies=len(bodies_of(machine)),
-        nodes=sum(count(machine, member) for member in machine.members),
+        nodes=sum(count(machine, member) for member in machine.members) + len(machine.tanks),
         mass=0.0,
         capacity=total_capacity(machine),
     )
@@ -140,6 +140,10 @@ def _other_uses(machine: Machine) -> Iterator[tuple[str, str]]:
     for name, source in machine.sources.items():
         if source.surface:
             yield f"sources.{name}.surface", source.surface
+    for name, tank in machine.tanks.items():
+        yield f"tanks.{name}.surface", tank.surface
+    for name, added in machine.scales.items():
+        yield f"scales.{name}.surface", added.surface
     for name, support in machine.supports.items():
         yield f"supports.{name}.surface", support.surface
     yield "tcp.tool.surface", machine.tcp.tool.surface

@@ -37,9 +37,10 @@ class DisplacementField:
         system = self._structure.system
         loads = np.split(-system.gap_rows(positions).T @ forces, system.offsets[1:-1])
         shifts = self._structure.encoder_shifts(positions, fields)
+        nodal = [T[: body.n] for T, body in zip(fields, self._bodies, strict=True)]  # tanks come after the nodes
         return tuple(
             (supported.solve((e.KT @ T + U @ p)[:, None])[:, 0] + rigid_modes(body.nodes) @ a).reshape(-1, 3) + shift
             for supported, e, U, T, p, body, a, shift in zip(
-                self._supported, self._elasticity, self._U, fields, loads, self._bodies, motions, shifts, strict=True
+                self._supported, self._elasticity, self._U, nodal, loads, self._bodies, motions, shifts, strict=True
             )
         )

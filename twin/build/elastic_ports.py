@@ -139,6 +139,11 @@ class PortTable:
         body, offset, part, facets = self._surface(surface)
         return body, offset, segments(part, facets, direction, n)
 
+    def surface_mean(self, surface: str) -> tuple[int, np.ndarray, np.ndarray]:
+        """Body of a "part.surface", its nodes (m,) there and the weights (m,) of their mean over it; adds no port."""
+        body, offset, whole = self._patch(surface)
+        return body, whole.nodes + offset, whole.mean
+
     def extent(self, surface: str, direction: np.ndarray, n: int) -> np.ndarray:
         """Borders (n + 1,) [m] of the slices along the unit vector, in mesh coordinates."""
         _, _, part, facets = self._surface(surface)

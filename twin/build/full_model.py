@@ -44,7 +44,8 @@ def assemble(machine: Machine, progress: Progress = silent) -> FullModel:
         advance("thermal matrices")
     structure = assemble_structure(machine, bodies, progress)
     rows = structure.pose_rows(thermal.poses)
-    surfaces, selections = zip(*(_surface(body) for body in bodies), strict=True)
+    meshes = zip(bodies, thermal.bodies, strict=True)
+    surfaces, selections = zip(*(_surface(mesh, body.n) for mesh, body in meshes), strict=True)
     parts = zip(thermal.bodies, rows, selections, strict=True)
     thermal = replace(thermal, bodies=tuple(replace(b, G=G, F=F) for b, G, F in parts))
     return FullModel(thermal, structure, bodies, surfaces)
@@ -59,8 +60,8 @@ def _assemble_lumped(machine: Machine) -> FullModel:
     return FullModel(replace(thermal, bodies=tuple(replace(b, G=G) for b, G in parts)), structure, (), ())
 
 
-def _surface(body: BodyMesh) -> tuple[SurfaceMesh, sp.csr_array]:
-    """Surface triangles of a body and the (m, n) selection of its vertices among the nodes."""
+def _surface(body: BodyMesh, n: int) -> tuple[SurfaceMesh, sp.csr_array]:
+    """Surface triangles of a body and the (m, n) selection of its vertices among the states."""
     triangles = np.vstack(
         [
             part.mesh.facets[:, part.mesh.boundary_facets()].T + offset
@@ -68,5 +69,5 @@ def _surface(body: BodyMesh) -> tuple[SurfaceMesh, sp.csr_array]:
         ]
     )
     vertices, index = np.unique(triangles, return_inverse=True)
-    selection = sp.csr_array((np.ones(len(vertices)), (np.arange(len(vertices)), vertices)), (len(vertices), body.n))
+    selection = sp.csr_array((np.ones(len(vertices)), (np.arange(len(vertices)), vertices)), (len(vertices), n))
     return SurfaceMesh(body.nodes[vertices], index.reshape(triangles.shape)), selection

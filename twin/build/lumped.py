@@ -21,7 +21,7 @@ from twin.build.lumped_body import (
     row,
     unit,
 )
-from twin.build.ports import ContactPorts
+from twin.build.ports import ContactPorts, switch_of
 from twin.build.thermal import machine_model
 from twin.build.wiring import load_model
 from twin.errors import DescriptionError
@@ -80,6 +80,7 @@ def lumped_ports(machine: Machine) -> ContactPorts:
                 names.append(node_name)
                 parts.append(node_name)
             area, conductance = pair_conductance(contact)
+            switch, switched = switch_of(contact)
             pairs.append(
                 Pair(
                     contact=contact_name,
@@ -92,6 +93,8 @@ def lumped_ports(machine: Machine) -> ContactPorts:
                     conductance=conductance,
                     assignment=contact.assignment,
                     key="conductance" if contact.total is None else "total",
+                    switch=switch,
+                    switched=switched,
                 )
             )
     return ContactPorts(tuple(names), tuple(parts), (), tuple(rails), tuple(pairs))

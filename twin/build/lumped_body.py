@@ -14,14 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from twin.machine.bodies import Body, owner_of
+from twin.machine.bodies import Body, owner_of, tank_of, tanks_on
 from twin.machine.check_lumped import bar_capacity, film_area, node_capacity
 from twin.machine.description import Bar, Film, Machine
 
 
 @dataclass(frozen=True)
 class LumpedBody:
-    """The states of a body: members one after the other."""
+    """The states of a body: members one after the other, its tanks ("tanks.NAME") last."""
 
     name: str
     members: tuple[str, ...]
@@ -39,13 +39,14 @@ class LumpedBody:
 
 def lumped_body(machine: Machine, body: Body) -> LumpedBody:
     """Number the states of a body."""
-    ends = np.cumsum([0, *(count(machine, member) for member in body.parts)])
-    return LumpedBody(body.name, body.parts, tuple(int(e) for e in ends[:-1]), int(ends[-1]))
+    members = (*body.parts, *tanks_on(machine, body.parts))
+    ends = np.cumsum([0, *(count(machine, member) for member in members)])
+    return LumpedBody(body.name, members, tuple(int(e) for e in ends[:-1]), int(ends[-1]))
 
 
 def count(machine: Machine, member: str) -> int:
-    """How many states a node or bar has."""
-    return 1 if member in machine.nodes else machine.bars[member].elements + 1
+    """How many states a node, bar or tank has."""
+    return machine.bars[member].elements + 1 if member in machine.bars else 1
 
 
 def borders(bar: Bar) -> np.ndarray:
@@ -67,14 +68,16 @@ def shares(bar: Bar) -> np.ndarray:
 
 
 def capacity(machine: Machine, member: str) -> np.ndarray:
-    """J/K per state of a node or bar."""
+    """J/K per state of a node, bar or tank."""
     if member in machine.bars:
         return bar_capacity(machine, member) * shares(machine.bars[member])
+    if tank := tank_of(machine, member):
+        return np.array([tank.capacity])
     return np.array([node_capacity(machine, member)])
 
 
 def conduction(machine: Machine, body: LumpedBody) -> sp.csr_array:
-    """W/K (n, n): the conduction along the bars of a body."""
+    """W/K (n, n): the conduction along the bars of a body, and to its tanks."""
     rows, columns, values = [], [], []
     for member in body.members:
         if member in machine.bars:
@@ -85,6 +88,14 @@ def conduction(machine: Machine, body: LumpedBody) -> sp.csr_array:
                 rows.append(i)
                 columns.append(j)
                 values.append(np.full(bar.elements, sign * g))
+    for member, tank in tanks_on(machine, body.members).items():  # each state of the place by its share of the mean
+        share = tank.conductance * row(machine, body, tank.surface)
+        place = np.flatnonzero(share)
+        there = np.full(len(place), body.states(member, machine).start)
+        for i, j, sign in ((place, place, 1), (there, there, 1), (place, there, -1), (there, place, -1)):
+            rows.append(i)
+            columns.append(j)
+            values.append(sign * share[place])
     if not rows:
         return sp.csr_array((body.n, body.n))
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
@@ -133,13 +144,13 @@ def row(machine: Machine, body: LumpedBody, place: str, weights: np.ndarray | No
 
 
 def heights(machine: Machine, body: LumpedBody) -> np.ndarray:
-    """m (n,): vertical machine coordinate of each state at axis positions zero; 0 of nodes without a position."""
+    """m (n,): vertical machine coordinate of each state at axis positions zero; 0 of tanks and nodes without one."""
     up = "xyz".index(machine.machine.vertical)
     result = np.zeros(body.n)
     for member in body.members:
         if member in machine.bars:
             bar = machine.bars[member]
             result[body.states(member, machine)] = bar.origin[up] + borders(bar) * unit(bar)[up]
-        else:
+        elif member in machine.nodes:
             result[body.states(member, machine)] = (machine.nodes[member].position or (0.0, 0.0, 0.0))[up]
     return result

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.build.lumped_body import LumpedBody, borders, row, unit
+from twin.build.scales import AddedScale, added_scale
 from twin.build.springs import Positions
 from twin.errors import DescriptionError
-from twin.machine.description import Machine
+from twin.machine.description import Machine, Scale
 from twin.machine.kinematics import direction, linear_axes, rail_moves
 
 
@@ -53,11 +54,12 @@ class LumpedStructure:
     axes: tuple[str, ...]  # linear, in the order of positions
     constant: tuple[np.ndarray, ...]  # per body (3, n_b) m/K
     screws: tuple[Screw, ...]
+    scales: tuple[AddedScale, ...] = ()
 
     @property
     def moves(self) -> bool:
         """Whether any temperature moves the tool."""
-        return bool(self.screws) or any(rows.any() for rows in self.constant)
+        return bool(self.screws or self.scales) or any(rows.any() for rows in self.constant)
 
     def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
         """(3, n_b) [m/K] per body. Raises ValueError for unknown axes or a wrong number of positions."""
@@ -66,6 +68,8 @@ class LumpedStructure:
         for screw in self.screws:
             states = slice(screw.first, screw.first + len(screw.borders))
             result[screw.body][:, states] += screw.row(given[screw.axis])
+        for scale in self.scales:
+            result[scale.body][:, scale.states] += scale.rows(given[scale.axis])
         return tuple(result)
 
     def pose_rows(self, poses: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -108,7 +112,15 @@ def lumped_structure(machine: Machine, bodies: Sequence[LumpedBody]) -> LumpedSt
                 rows += np.outer(per_kelvin, row(machine, body, place))
         constant.append(rows)
     screws = tuple(_screw(machine, bodies, name, side) for name, side in machine.tcp.screws.items())
-    return LumpedStructure(linear_axes(machine), tuple(constant), screws)
+    scales = tuple(_scale(machine, bodies, scale) for scale in machine.scales.values())
+    return LumpedStructure(linear_axes(machine), tuple(constant), screws, scales)
+
+
+def _scale(machine: Machine, bodies: Sequence[LumpedBody], scale: Scale) -> AddedScale:
+    body = next(i for i, b in enumerate(bodies) if scale.surface in b)
+    mean = row(machine, bodies[body], scale.surface)
+    states = np.flatnonzero(mean)
+    return added_scale(machine, scale, body, states, mean[states])
 
 
 def _screw(machine: Machine, bodies: Sequence[LumpedBody], name: str, side: str) -> Screw:

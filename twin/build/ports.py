@@ -91,6 +91,7 @@ def contact_ports(machine: Machine, bodies: tuple[BodyMesh, ...]) -> ContactPort
             except TwinError as e:
                 problems += [p for p in e.problems if p not in problems]
                 continue
+            switch, switched = switch_of(contact)
             pairs.append(
                 Pair(
                     contact=contact_name,
@@ -102,11 +103,18 @@ def contact_ports(machine: Machine, bodies: tuple[BodyMesh, ...]) -> ContactPort
                     area=patches[port].area,
                     conductance=joint_conductance(contact_name, machine),
                     assignment=contact.assignment,
+                    switch=switch,
+                    switched=switched,
                 )
             )
     if problems:
         raise DescriptionError.collect(problems)
     return ContactPorts(tuple(names), tuple(parts), tuple(patches), tuple(rails), tuple(pairs))
+
+
+def switch_of(contact: Contact) -> tuple[str, float]:
+    """The signal that switches a contact's conductance and the factor where it is 1: "" and 1 where nothing does."""
+    return contact.switch or "", 1.0 if contact.switched is None else contact.switched
 
 
 def find_part(bodies: tuple[BodyMesh, ...], surface: str, where: str) -> tuple[PartMesh, str]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from twin.build.elastic_ports import MeanPort, PortTable, RailPort, RigidPort
 from twin.build.encoder import LinearEncoder, linear_encoders
+from twin.build.scales import AddedScale, added_scale
 from twin.errors import DescriptionError
 from twin.machine.bodies import Body
 from twin.machine.description import Contact, Machine, StiffnessOfPair
@@ -60,6 +61,7 @@ class SpringSystem:
     tool_point: np.ndarray  # (3,) m at axis positions zero
     work: RigidPort
     encoders: tuple[LinearEncoder, ...] = ()  # linear scales; axes without one are read at their screw
+    scales: tuple[AddedScale, ...] = ()  # growth that encoders lack
 
     def vector(self, positions: Positions) -> np.ndarray:
         """Positions (n_axes,) [m] in the order of `axes`. Raises ValueError for unknown axes or a wrong number."""
@@ -105,10 +107,11 @@ class SpringSystem:
 
     def scale_rows(self, positions: Positions) -> list[tuple[int, np.ndarray, np.ndarray]]:
         """What the growth of each scale adds: (body, its nodes (m,), displacement (3, m) [m/K] per T - T_ref there)."""
+        at = self.vector(positions)
         return [
             (e.strip.body, e.strip.nodes, np.outer(-self._lever(e) * e.sign, self.scale_row(e, positions)))
             for e in self.encoders
-        ]
+        ] + [(s.body, s.states, s.rows(at[s.axis])) for s in self.scales]
 
     def scale_row(self, encoder: LinearEncoder, positions: Positions) -> np.ndarray:
         """(m,) [m/K]: growth of a scale up to its reader per T - T_ref at its `strip.nodes`."""
@@ -177,6 +180,7 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
     shifts = np.array([[displacement(machine, b.name, {a: 1.0}) for a in axes] for b in bodies])
     shifts = shifts.reshape(len(bodies), len(axes), 3)
     encoders = linear_encoders(machine, ports, shifts)
+    scales = [added_scale(machine, scale, *ports.surface_mean(scale.surface)) for scale in machine.scales.values()]
     return SpringSystem(
         axes=axes,
         shifts=shifts,
@@ -189,6 +193,7 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
         tool_point=np.array(machine.tcp.tool.point),
         work=work,
         encoders=encoders,
+        scales=tuple(scales),
     )
 
 

@@ -4,17 +4,18 @@ Springs act on gaps g = J w of port displacements w; with w = H T + F p + R a of
 
     (k^-1 + J F J^T) f - J R a = J H T        compatibility, k the spring stiffnesses
                       R^T J^T f = 0           equilibrium of every body
-    TCP displacement  = t w + growth of linear scales (`encoder`)
+    TCP displacement  = t w + growth of linear scales (`encoder`, `scales`)
 
 Only J (which segments face which pad, levers) and t (levers of the tool centre point) depend on the position, so a pose
-costs one dense system of the size of the springs. T is temperature above the reference, per node of each body.
+costs one dense system of the size of the springs. T is temperature above the reference, per node of each body; tanks
+follow the nodes, as in the thermal model, and move nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -29,7 +30,7 @@ from twin.build.mesh import BodyMesh
 from twin.build.springs import Positions, SpringSystem, spring_system
 from twin.build.workers import workers
 from twin.errors import ModelError
-from twin.machine.bodies import bodies_of
+from twin.machine.bodies import bodies_of, tanks_on
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
 
@@ -103,10 +104,17 @@ class Structure:
                 lever = float((moves[self.system.tool.body] - moves[self.system.work.body]) @ along) * e.sign
                 reader = lever * float(self.system.reader_row(e, positions) @ w)
                 scale = -lever * self._growth(e, positions, fields)
+        for added in self.system.scales:
+            if added.axis == k:
+                rows = added.rows(self.system.vector(positions)[k])
+                scale += float(along @ rows @ fields[added.body][added.states])
         return EncoderTerms(float(along @ self.system.nut_rows(positions) @ w), reader, scale)
 
     def encoder_shifts(self, positions: Positions, fields: Sequence[np.ndarray]) -> np.ndarray:
-        """(n_bodies, 3) [m]: what linear scales move each body by, on top of where nuts and springs hold it."""
+        """(n_bodies, 3) [m]: what linear scales move each body by, on top of where nuts and springs hold it.
+
+        Without `[scales]`, which act on the TCP alone.
+        """
         shifts = np.zeros((len(self.bodies), 3))
         if self.system.encoders:
             w = self._port_displacements(positions, fields)
@@ -204,7 +212,9 @@ def assemble_structure(machine: Machine, bodies: tuple[BodyMesh, ...], progress:
     ):
 
         def condensed(body: BodyMesh, names: list[str], U: csr_array) -> BodyFlexibility:
-            return condense(body.name, tuple(names), U, body_elasticity(machine, body), body.nodes, advance)
+            found = condense(body.name, tuple(names), U, body_elasticity(machine, body), body.nodes, advance)
+            tanks = len(tanks_on(machine, tuple(part.name for part in body.parts)))  # these move nothing
+            return replace(found, H=np.pad(found.H, ((0, 0), (0, tanks)))) if tanks else found
 
         flexible = list(pool.map(condensed, bodies, ports.names, ports.matrices()))
     middles = np.array([body.nodes.mean(axis=0) for body in bodies])

@@ -15,6 +15,7 @@ from twin.build.mesh import BodyMesh, PartMesh
 from twin.build.ports import ContactPorts, contact_ports, port_averages
 from twin.build.probe import probe
 from twin.build.surface import mass, patch
+from twin.build.tanks import with_tanks
 from twin.build.wiring import load_model
 from twin.errors import DescriptionError, Problem, TwinError
 from twin.machine.bodies import split_surface
@@ -147,7 +148,7 @@ def _body(
             sources.append(i)
     P, port_numbers = port_averages(body, ports)
     sensors = _structural(machine)
-    return AffineBody(
+    bare = AffineBody(
         name=body.name,
         E=E,
         A0=A0,
@@ -167,6 +168,7 @@ def _body(
         members=tuple(part.name for part in body.parts),
         first=tuple(int(offset) for offset in body.offsets),
     )
+    return with_tanks(machine, body, bare)
 
 
 def _structural(machine: Machine) -> tuple[str, ...]:

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.build.ports import ContactPorts
+from twin.build.ports import ContactPorts, switch_of
 from twin.errors import DescriptionError
 from twin.machine import wiring
-from twin.machine.description import Machine
+from twin.machine.description import Contact, Machine
 from twin.machine.kinematics import linear_axes
 from twin.physics.laws import LAWS
 from twin.physics.radiation import radiation_coefficient
@@ -20,7 +20,10 @@ from twin.rom.law_values import law_table, law_values, states_of
 from twin.rom.load_model import EnvironmentWiring, Film, Joint, LoadModel, Signal
 
 FILM_MARGIN = (0.5, 2.0)  # certified film coefficients: from half the least to twice the greatest value of the law
-JOINT_MARGIN = 3.0  # certified joint conductances: a third to three times the described one
+# An additional film may be off: its certified range begins at this share of its greatest value, where it is as good as
+# absent, because ranges are sampled on a logarithmic scale
+LEAST_ADDITIONAL = 0.01
+JOINT_MARGIN = 3.0  # certified joint conductances: a third to three times the described one, switched or not
 
 
 # Certified surface temperatures, above and below the environment [K]. At equal temperatures no heat flows, so the least
@@ -44,7 +47,7 @@ def load_model(machine: Machine, ports: ContactPorts, areas: Mapping[str, float]
             use = replace(use, parameters={**use.parameters, "area": areas[name]})
         air = order.index(entry.environment)
         radiant = air if entry.radiant is None else order.index(entry.radiant)
-        film = Film(name, use, air, 0.0, 0.0, entry.gain, wiring.emissivity(entry), radiant)
+        film = Film(name, use, air, 0.0, 0.0, entry.gain, wiring.emissivity(entry), radiant, entry.additional)
         low, high = film_range(film, environments, signals, f"films.{name}")
         films.append(replace(film, low=low, high=high))
     return LoadModel(
@@ -54,15 +57,20 @@ def load_model(machine: Machine, ports: ContactPorts, areas: Mapping[str, float]
         sources=tuple(wiring.source(name, entry, machine) for name, entry in machine.sources.items()),
         films=tuple(films),
         joints=tuple(
-            Joint(name, g, g / JOINT_MARGIN, g * JOINT_MARGIN, "conductance" if c.total is None else "total")
+            _joint(name, wiring.joint_conductance(name, machine), c)
             for name, c in machine.contacts.items()
             if c.kind == "fixed"
-            for g in [wiring.joint_conductance(name, machine)]
         ),
         ports=ports.names,
         rails=ports.rails,
         pairs=ports.pairs,
     )
+
+
+def _joint(name: str, conductance: float, entry: Contact) -> Joint:
+    key, (switch, switched) = "conductance" if entry.total is None else "total", switch_of(entry)
+    low, high = conductance * min(1.0, switched) / JOINT_MARGIN, conductance * max(1.0, switched) * JOINT_MARGIN
+    return Joint(name, conductance, low, high, key, switch, switched)
 
 
 def film_range(
@@ -74,10 +82,11 @@ def film_range(
     where the coefficient is not positive and finite: ranges are sampled on a logarithmic scale.
     """
     use, air = film.use, environments[film.environment]
-    names = sorted({*use.signals.values(), *([air.signal] if air.signal else [])})
+    names = sorted({*use.signals.values(), *(name for name in (air.signal, air.switch) if name)})
     corners = _corners([(signals[n].low, signals[n].high) for n in names])
     values = dict(zip(names, corners.T, strict=True))
     ambient = (values[air.signal] if air.signal else np.full(len(corners), air.temperature)) + air.offset
+    ambient = ambient + (air.switched_offset * values[air.switch] if air.switch else 0.0)
     surface = ambient[:, None] + DIFFERENCES
     free = states_of(use)
     if free:
@@ -88,12 +97,14 @@ def film_range(
     radiant = _middle(environments[film.radiant], signals)
     h = film.gain * convection + radiation_coefficient(surface, radiant, film.emissivity)
     low, high = float(h.min()), float(h.max())
+    if film.additional:
+        low = max(low, LEAST_ADDITIONAL * high)
     if not (low > 0 and math.isfinite(high)):
         raise DescriptionError(
             f"law '{use.law}' gives {low:g} .. {high:g} W/(m^2 K) over its signals' ranges",
             where,
             "film coefficients are finite and above zero, at rest too: check parameters and ranges; "
-            "list surfaces without convection under `adiabatic` of their part",
+            "list surfaces without convection under `adiabatic` of their part; a film that may be off is `additional`",
         )
     return FILM_MARGIN[0] * low, FILM_MARGIN[1] * high
 
@@ -107,6 +118,9 @@ def _corners(ranges: Iterable[tuple[float, float]]) -> np.ndarray:
 
 def _middle(environment: EnvironmentWiring, signals: Mapping[str, Signal]) -> float:
     """degC: of a radiant environment; its coefficient varies by 2 % for 10 K, which the margins cover."""
+    switch = environment.switch
+    share = (signals[switch].low + signals[switch].high) / 2 if switch else 0.0
+    offset = environment.offset + share * environment.switched_offset
     if not environment.signal:
-        return environment.temperature + environment.offset
-    return (signals[environment.signal].low + signals[environment.signal].high) / 2 + environment.offset
+        return environment.temperature + offset
+    return (signals[environment.signal].low + signals[environment.signal].high) / 2 + offset

@@ -142,9 +142,8 @@ def _step(
     K = contacts_of(places, system.P[0], loads)
     terms = jnp.concatenate([jnp.asarray(system.A[0]), K])
     coefficients = jnp.concatenate([drive.theta - jnp.asarray(system.nominal), scaled.contact])
-    coefficients = coefficients.at[n : n + len(scaled.joint)].set(
-        (scaled.joint - 1.0) * jnp.asarray(system.nominal)[n:]
-    )
+    joints = slice(n, n + len(scaled.joint))  # switched ones differ from their nominal values, which A0 includes
+    coefficients = coefficients.at[joints].set(drive.theta[n:] * scaled.joint - jnp.asarray(system.nominal)[n:])
     rate = jnp.asarray(inputs.rate)
 
     def E(x: jax.Array) -> jax.Array:

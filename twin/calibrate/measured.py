@@ -41,6 +41,7 @@ class Measured:
 
     from_first: bool  # deviations count from the first row
     skipped: tuple[str, ...]  # what the run holds and the fit does not use, in words
+    position: np.ndarray | None = None  # (k, n_pose_axes) m of the TCP rows
 
     def row_weight(self, sigma: float) -> np.ndarray:
         """(k,) how much better than `sigma` [m] each TCP row is measured; 1 where the run does not tell."""
@@ -88,7 +89,7 @@ def measured(
     else:
         centre, mean_of = np.zeros(0), np.zeros((0, len(edges)))
         temperature = count = np.zeros((0, 0))
-    step, share, pose, tcp, sigma, when = _tcp_rows(model, run, edges, interpolation, skipped)
+    step, share, pose, tcp, sigma, when, position = _tcp_rows(model, run, edges, interpolation, skipped)
     if run.tcp_reference == "first" and len(tcp):
         tcp = tcp - tcp[0]  # from the first row that is used, as the model's
     if not np.isfinite(temperature).any() and not len(tcp):
@@ -112,6 +113,7 @@ def measured(
         tcp_sigma=sigma,
         from_first=run.tcp_reference == "first" and len(tcp) > 0,
         skipped=tuple(skipped),
+        position=position,
     )
 
 
@@ -147,11 +149,11 @@ def _bins(
 
 def _tcp_rows(
     model: MachineModel, run: Run, edges: np.ndarray, interpolation: Kind, skipped: list[str]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, np.ndarray, np.ndarray]:
     tcp = run.tcp
     if tcp is None:
         none = np.zeros(0)
-        return none.astype(int), none, np.zeros((0, len(model.poses))), np.zeros((0, 3)), None, none
+        return none.astype(int), none, np.zeros((0, len(model.poses))), np.zeros((0, 3)), None, none, np.zeros((0, 0))
     missing = [a for a in model.pose_axes if a not in tcp.axes]
     if missing:
         raise LogError(
@@ -172,4 +174,4 @@ def _tcp_rows(
     step = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
     share = (time - edges[step]) / (edges[step + 1] - edges[step])
     sigma = None if tcp.sigma is None else tcp.sigma[good][inside]
-    return step, share, weights[inside], tcp.displacement[good][inside], sigma, time
+    return step, share, weights[inside], tcp.displacement[good][inside], sigma, time, position[inside]

@@ -39,7 +39,7 @@ def current_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
             what = f"'{s.column}' is declared as rms and negative {times(len(below))}"
             remedy = 'an rms value has no sign: is it the torque-producing current Iq? Its amplitude is kind = "peak"'
             problems.append(warning(what, at(where, below), remedy))
-        problems += _limit(s, np.abs(good), where)
+        problems += _limit(s, np.abs(s.factor * good), where)
     return problems + _twice(run, where)
 
 

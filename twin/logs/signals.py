@@ -28,22 +28,32 @@ class SignalLike(Protocol):
     def low(self) -> float: ...  # certified range, SI, as rms where the kind is "peak"
     @property
     def high(self) -> float: ...
+    @property
+    def default(self) -> float | None: ...  # SI, rms; where the whole column is missing. None: it must be there
+    @property
+    def factor(self) -> float: ...  # of logged values
 
 
 def signal_values(run: Run, signals: Sequence[SignalLike]) -> dict[str, np.ndarray]:
     """Values (n,) of each signal at `run.loads.time`, by the signal's name; SI, temperatures degC, missing ones NaN.
 
+    Signals with a default whose column is not there are left out: `twin.rom.drive` fills them in and flags it.
     Amplitudes of sine currents (kind "peak") are divided by sqrt(2), so that laws see rms values only.
     Raises LogError for columns that are missing or of another dimension, all at once.
     """
-    problems = signal_problems(run, signals)
+    problems = [p for p in signal_problems(run, signals) if not p.warning]
     if problems:
         raise LogError.collect(problems)
-    return {s.name: run.loads.columns[s.column] / (math.sqrt(2.0) if s.kind == "peak" else 1.0) for s in signals}
+    return {s.name: as_meant(s, run.loads.columns[s.column]) for s in signals if s.column in run.loads.columns}
+
+
+def as_meant(signal: SignalLike, logged: np.ndarray) -> np.ndarray:
+    """Logged values (n,) times the declared factor, amplitudes as rms."""
+    return signal.factor * logged / (math.sqrt(2.0) if signal.kind == "peak" else 1.0)
 
 
 def signal_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
-    """Signals without a column, and columns of the wrong dimension."""
+    """Signals without a column, a warning where they have a default, and columns of the wrong dimension."""
     where = str(run.folder / "loads.csv")
     problems = []
     for s in signals:
@@ -53,7 +63,10 @@ def signal_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
             if run.temperatures and s.column in run.temperatures.columns:
                 remedy = "it is in temperatures.csv: signals are read from loads.csv, so copy the column there"
             called = "" if s.column == s.name else f" (signal '{s.name}')"
-            problems.append(Problem(f"no column '{s.column}'{called}", where, remedy))
+            what = f"no column '{s.column}'{called}"
+            if s.default is not None:
+                what += f", so its default {s.default:g} {s.unit} is taken"
+            problems.append(Problem(what, where, remedy, warning=s.default is not None))
         elif found != s.unit:
             problems.append(
                 Problem(

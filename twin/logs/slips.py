@@ -11,7 +11,7 @@ from twin.logs.channels import DRIVES, MOVES, PLACES, owner, pairs
 from twin.logs.found import held, slip, warning
 from twin.logs.motion import explained
 from twin.logs.run import Run, Table
-from twin.logs.signals import SignalLike
+from twin.logs.signals import SignalLike, as_meant
 
 _LEAST = 30  # rows
 _LEAD = (1.5e-3, 0.1)  # m per revolution of ball screws and pinions
@@ -92,7 +92,7 @@ def _little_used(loads: Table, signals: Sequence[SignalLike], where: str) -> lis
         size = max(abs(s.low), abs(s.high))
         if loads.units.get(s.column) != s.unit or s.unit in ("degC", "1") or not 0.0 < size < 1e9:
             continue
-        values = held(loads.columns[s.column])
+        values = s.factor * held(loads.columns[s.column])
         largest = float(np.max(np.abs(values))) if s.unit not in PLACES else 0.5 * float(np.ptp(values))
         if np.count_nonzero(values) >= _LEAST and largest > 0.0:
             used[s.column] = largest / size
@@ -173,7 +173,7 @@ def range_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
     for s in signals:
         if run.loads.units.get(s.column) != s.unit:
             continue
-        values = run.loads.columns[s.column] / (np.sqrt(2.0) if s.kind == "peak" else 1.0)
+        values = as_meant(s, run.loads.columns[s.column])
         margin = 1e-9 * max(abs(s.low), abs(s.high))
         with np.errstate(invalid="ignore"):
             rows = np.flatnonzero((values < s.low - margin) | (values > s.high + margin))

@@ -6,7 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twin.errors import DescriptionError
-from twin.machine.description import Machine
+from twin.machine.description import Machine, Tank
+
+TANKS = "tanks."  # before the name of a tank: no part, node or bar has a dot in its name
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,16 @@ def split_surface(surface: str) -> tuple[str, str]:
 def owner_of(place: str) -> str:
     """The part of "part.surface", the bar of "bar.end", or the node or bar itself."""
     return place.partition(".")[0]
+
+
+def tanks_on(machine: Machine, members: tuple[str, ...]) -> dict[str, Tank]:
+    """The tanks on these parts, nodes or bars by the names they have as members of a body, "tanks.NAME"."""
+    return {f"{TANKS}{name}": tank for name, tank in machine.tanks.items() if owner_of(tank.surface) in members}
+
+
+def tank_of(machine: Machine, member: str) -> Tank | None:
+    """The tank that a member of a body is, None of others."""
+    return machine.tanks[member.removeprefix(TANKS)] if member.startswith(TANKS) else None
 
 
 def bodies_of(machine: Machine) -> tuple[Body, ...]:

@@ -91,8 +91,10 @@ def _unused(machine: Machine) -> Iterator[Problem]:
     used_materials = {p.material for p in machine.parts.values()} | {b.material for b in machine.bars.values()}
     used_materials |= {n.material for n in machine.nodes.values() if n.material is not None}
     used_signals = {a.position for a in machine.axes.values()} | {e.signal for e in machine.environment.values()}
+    used_signals |= {e.switch for e in machine.environment.values()}
     used_signals |= {s for source in machine.sources.values() for s in source.signals.values()}
     used_signals |= {s for film in machine.films.values() for s in film.signals.values()}
+    used_signals |= {c.switch for c in machine.contacts.values()}
     used_environments = {f.environment for f in machine.films.values()} | {
         s.environment for s in machine.sensors.values()
     }

@@ -20,10 +20,10 @@ GROWTH = 2e-4  # m/K: ten metres of aluminium
 
 
 def total_capacity(machine: Machine) -> float:
-    """J/K of all nodes and bars."""
-    return sum(node_capacity(machine, name) for name in machine.nodes) + sum(
-        bar_capacity(machine, name) for name in machine.bars
-    )
+    """J/K of all nodes, bars and tanks."""
+    nodes = sum(node_capacity(machine, name) for name in machine.nodes)
+    bars = sum(bar_capacity(machine, name) for name in machine.bars)
+    return nodes + bars + sum(tank.capacity for tank in machine.tanks.values())
 
 
 def node_capacity(machine: Machine, name: str) -> float:

@@ -178,7 +178,26 @@ class Contact(Entry):
     area: Area | None = Field(None, gt=0)  # lumped machines: of the joint, or of each pad
     total: Conductance | None = Field(None, gt=0)  # lumped machines: of the joint or each pad, instead of both
     joint: JointLaw | None = None  # fixed: instead of `conductance`
+    switch: str | None = None  # signal 0 .. 1: a clamp, a preload, an oil film
+    switched: float | None = Field(None, gt=0)  # factor of the conductance where the switch is 1, in shares between
     stiffness: StiffnessOfPair = StiffnessOfPair()  # moving; fixed joints are glued
+
+
+class Tank(Entry):
+    """A heat capacity behind a conductance that meshes lack: an oil tank, a workpiece. It does not grow."""
+
+    surface: str  # "part.surface"; of a lumped machine a node, a bar, or an end of a bar
+    capacity: Capacity = Field(gt=0)
+    conductance: Conductance = Field(gt=0)
+
+
+class Scale(Entry):
+    """Growth of an encoder's scale that the description lacks otherwise (`twin.build.scales` for its sign)."""
+
+    axis: str  # linear
+    surface: str  # "part.surface" whose mean temperature the scale takes; of a lumped machine a node, bar, or end of it
+    expansion: Expansion = Field(ge=-1e-3, le=1e-3)
+    fixed_at: Length = 0.0  # position of the axis at which the scale's growth moves nothing
 
 
 class Source(Entry):
@@ -202,6 +221,7 @@ class Film(Entry):
     gain: float = Field(1.0, gt=0)  # calibration factor of the convection
     emissivity: float | None = Field(None, ge=0, le=1)  # 0.9 (paint) by default, 0 for channels of a coolant
     radiant: str | None = None  # environment at the radiant temperature, the film's own by default
+    additional: bool = False  # on top of what its surfaces exchange already, by convection alone
     parameters: dict[str, float | str] = {}
     signals: dict[str, str] = {}
 
@@ -215,6 +235,8 @@ class Environment(Entry):
     height: Length = 0.0  # vertical machine coordinate at which the temperature is measured
     # added to it: of a sensor that reads wrong by a constant, or of air that differs from where it is measured
     offset: TemperatureDifference = 0.0
+    switch: str | None = None  # signal 0 .. 1: a door, a fan, a machine beside it
+    switched_offset: TemperatureDifference = 0.0  # added to it where the switch is 1, in shares between
 
 
 class SignalEntry(Entry):
@@ -222,6 +244,8 @@ class SignalEntry(Entry):
     unit: str
     kind: Literal["value", "rms", "peak"] = "value"
     range: tuple[float | str, float | str]  # certified range, in `unit` or with units
+    default: float | str | None = None  # value where loads.csv has no such column at all, in `unit` or with a unit
+    factor: float = 1.0  # logged values are multiplied by it on reading: what they say is off by a known factor
 
 
 class Sensor(Entry):
@@ -298,6 +322,8 @@ class Machine(Entry):
     bars: dict[str, Bar] = {}
     axes: dict[str, Axis] = {}
     contacts: dict[str, Contact] = {}
+    tanks: dict[str, Tank] = {}
+    scales: dict[str, Scale] = {}
     signals: dict[str, SignalEntry] = {}
     environment: dict[str, Environment]
     sources: dict[str, Source] = {}

@@ -55,7 +55,7 @@ def edited(text: str, values: Mapping[str, float], comments: Mapping[str, str] =
                 remarks.setdefault(span.statement.end, []).append((span.start, remark))
         else:
             token = _bare(value, digits)
-            at, new, end = _insertion(text, found, keys, token, remark)
+            at, new, end = insertion(text, found, keys, token, remark)
             replaced.append((at, at, new))
             if remark and end is not None:
                 remarks.setdefault(end, []).append((at, remark))
@@ -131,7 +131,7 @@ def _number(value: float, digits: int, exponent: str | None = None) -> str:
     return f"{value:.{digits}g}"
 
 
-def _insertion(text: str, found: Spans, keys: Keys, token: str, remark: str) -> tuple[int, str, int | None]:
+def insertion(text: str, found: Spans, keys: Keys, token: str, remark: str) -> tuple[int, str, int | None]:
     """Where a missing key goes, the text to put there, and the end of the value whose line the remark follows."""
     owner, key = keys[:-1], keys[-1]
     if (inline := found.values.get(owner)) is not None:

@@ -105,6 +105,9 @@ def load_of(machine: Machine, settings: Mapping[str, str], run: Run | None = Non
         logged = signal_values(run, [s for name, s in known.items() if name in wanted])
         values = {name: _held(column, name, run) for name, column in logged.items()}
         told = dict.fromkeys(values, str(run.folder))
+        for name in wanted - set(logged):  # what signal_values leaves out has a default
+            values[name] = np.full(len(time), known[name].default)
+            told[name] = "default: not logged"
     for name, value in fixed.items():
         values[name] = np.full(len(time), value)
         told[name] = "set"
@@ -130,7 +133,7 @@ def _setting(name: str, text: str, unit: str) -> float:
 def _read_by_laws(machine: Machine) -> set[str]:
     wired = {name for source in machine.sources.values() for name in source.signals.values()}
     wired |= {name for film in machine.films.values() for name in film.signals.values()}
-    return wired | {e.signal for e in machine.environment.values() if e.signal is not None}
+    return wired | {name for e in machine.environment.values() for name in (e.signal, e.switch) if name is not None}
 
 
 def _held(column: np.ndarray, name: str, run: Run) -> np.ndarray:
@@ -208,16 +211,22 @@ def _contact(machine: Machine, name: str, load: Load) -> Explanation:
     else:
         value = np.array([entry.conductance or 0.0])
         given = Input("conductance", value, "W/(m^2*K)", "of the joint, or per pad area", f"{path}.conductance")
+    all_given: tuple[Input, ...] = (given,)
+    if entry.switch is not None:
+        what = f"factor where signal {entry.switch} is 1; not in the value below"
+        all_given += (Input("switched", np.array([entry.switched or 1.0]), "1", what, f"{path}.switched"),)
     pairs = [entry.surfaces] if entry.surfaces else list(entry.pairs)
     place = ", ".join(" - ".join(pair) for pair in pairs)
     return Explanation(
-        path, "contact", "", "constant", "given", (given,), given.unit, given.value, None, "", np.array([True]), place
+        path, "contact", "", "constant", "given", all_given, given.unit, given.value, None, "", np.array([True]), place
     )
 
 
 def _environment(machine: Machine, name: str, load: Load) -> np.ndarray:
     air = wiring.environment(name, machine.environment[name], machine)
-    return (load.signals[air.signal] if air.signal else np.array([air.temperature])) + air.offset
+    measured = load.signals[air.signal] if air.signal else np.array([air.temperature])
+    switched = air.switched_offset * load.signals[air.switch] if air.switch else 0.0
+    return measured + air.offset + switched
 
 
 def _inputs(

@@ -112,6 +112,11 @@ def _place(place: str, where: str, machine: Machine, whole: bool, ends: bool, no
         yield Problem(f"'{place}' is a whole bar", where, f"name an end of it: '{name}.start' or '{name}.end'")
 
 
+def heated_place(place: str, where: str, machine: Machine) -> Iterator[Problem]:
+    """Is `place` a node, a bar or an end of a bar: where a source or a tank may be?"""
+    return _place(place, where, machine, whole=True, ends=True)
+
+
 def _contacts(machine: Machine) -> Iterator[Problem]:
     for name, contact in machine.contacts.items():
         if contact is None:
@@ -215,7 +220,7 @@ def _films(machine: Machine) -> Iterator[Problem]:
                 continue
             node, bar = machine.nodes.get(place), machine.bars.get(place)
             if film.area is None:
-                if owner.setdefault(place, name) != name:
+                if not film.additional and owner.setdefault(place, name) != name:
                     remedy = 'give one of them its part of the area: area = "0.05 m^2"'
                     yield Problem(f"'{place}' is also in films.{owner[place]}, with its whole area", where, remedy)
                 if node is not None and node.area is None:
@@ -267,7 +272,8 @@ def _tcp(machine: Machine) -> Iterator[Problem]:
 
 def bodies_without_film(machine: Machine, bodies: Iterable[tuple[str, ...]]) -> Iterator[Problem]:
     """Bodies (their members) that no film cools: they have no steady temperature of their own."""
-    cooled = {place for film in machine.films.values() if film is not None for place in film.surfaces}
+    films = [film for film in machine.films.values() if film is not None and not film.additional]
+    cooled = {place for film in films for place in film.surfaces}
     for members in bodies:
         if not cooled & set(members):
             shown = ", ".join(members[:6]) + (" ..." if len(members) > 6 else "")

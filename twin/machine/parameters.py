@@ -14,6 +14,7 @@ from fnmatch import fnmatchcase
 
 from twin.errors import DescriptionError, Problem, TwinError
 from twin.machine import wiring
+from twin.machine.bodies import TANKS, owner_of
 from twin.machine.check_lumped import GROWTH
 from twin.machine.description import Machine, ParameterEntry
 from twin.nearest import did_you_mean
@@ -33,9 +34,9 @@ UNKNOWN = 5.0  # a relative tolerance above 500 % is a slip: 30 for "30 %"
 def parameters(machine: Machine) -> tuple[Parameter, ...]:
     """The parameters that a calibration of the machine may fit, nominal values [SI] those of the description.
 
-    In the order of sections (materials, nodes, contacts, environment, sources, films, tcp) and of the description
-    within them. Left out: what is `fixed`, scale parameters whose nominal value is zero, environments of constant
-    temperature unless a table names them, and what nothing depends on.
+    In the order of sections (materials, nodes, contacts, tanks, environment, sources, films, tcp) and of the
+    description within them. Left out: what is `fixed`, scale parameters whose nominal value is zero, environments of
+    constant temperature unless a table names them, and what nothing depends on.
     Raises DescriptionError with all problems of the `[[parameters]]` tables.
     """
     declared, problems = _declared(machine)
@@ -69,7 +70,7 @@ class _Declared:
 
 def _every(machine: Machine) -> list[_Declared]:
     """All parameters of a machine at their defaults."""
-    found = [*_materials(machine), *_nodes(machine), *_contacts(machine), *_environments(machine)]
+    found = [*_materials(machine), *_nodes(machine), *_contacts(machine), *_tanks(machine), *_environments(machine)]
     for name, source in machine.sources.items():
         found.append(_scale(f"sources.{name}.gain", "source", (name,), source.gain, "1", GAIN_OF_SOURCE, WIDE))
     for name, film in machine.films.items():
@@ -88,8 +89,9 @@ def _scale(
 
 def _materials(machine: Machine) -> Iterator[_Declared]:
     """Of materials that are used."""
-    # The row of a bar that is a screw and in [tcp.expansion] too is no multiple of its material's expansion
-    mixed = {b.material for n, b in machine.bars.items() if n in machine.tcp.screws and n in machine.tcp.expansion}
+    # The row of a bar that is a screw and in [tcp.expansion] or [scales] too is no multiple of its material's expansion
+    other = {*machine.tcp.expansion, *(owner_of(scale.surface) for scale in machine.scales.values())}
+    mixed = {b.material for n, b in machine.bars.items() if n in machine.tcp.screws and n in other}
     for name, material in machine.materials.items():
         parts = [n for n, part in machine.parts.items() if part.material == name]
         nodes = [n for n, node in machine.nodes.items() if node.material == name]
@@ -122,6 +124,12 @@ def _contacts(machine: Machine) -> Iterator[_Declared]:
         else:
             key, value, unit = "conductance", wiring.joint_conductance(name, machine), "W/(m^2*K)"
         yield _scale(f"contacts.{name}.{key}", kind, (name,), value, unit, CONDUCTANCE, WIDE)
+
+
+def _tanks(machine: Machine) -> Iterator[_Declared]:
+    for name, tank in machine.tanks.items():
+        path = f"{TANKS}{name}.capacity"
+        yield _scale(path, "capacity", (f"{TANKS}{name}",), tank.capacity, "J/K", NODE_CAPACITY, WIDE)
 
 
 def _environments(machine: Machine) -> Iterator[_Declared]:

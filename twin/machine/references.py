@@ -15,27 +15,34 @@ from pathlib import Path
 
 from twin.errors import Problem, TwinError
 from twin.machine import description, wiring
+from twin.machine.added import added_problems
 from twin.machine.bodies import bodies_of
 from twin.machine.description import BOX_SURFACES, Machine
 from twin.machine.encoders import encoder_problems, scale_problems
 from twin.machine.kinematics import linear_axes, rail_moves
-from twin.machine.lumped_references import bodies_without_film, joint_law_problems, lumped_problems, misplaced
+from twin.machine.lumped_references import (
+    bodies_without_film,
+    heated_place,
+    joint_law_problems,
+    lumped_problems,
+    misplaced,
+)
 from twin.machine.parameters import parameter_problems
 from twin.nearest import did_you_mean, nearest
 from twin.units import parse_unit
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _NAMED = (
-    "materials", "parts", "nodes", "bars", "axes", "contacts", "signals", "environment", "sources", "films", "sensors",
-    "supports",
+    "materials", "parts", "nodes", "bars", "axes", "contacts", "tanks", "scales", "signals", "environment", "sources",
+    "films", "sensors", "supports",
 )  # fmt: skip
 
 
 def reference_problems(machine: Machine) -> list[Problem]:
     """All problems that need more than one entry, or more than its type, to be seen."""
     problems = [*_names(machine)]
-    of_meshes = (_parts, _axes, _contacts, _laws, _films, _sensors, _tcp, _supports, misplaced)
-    for check in (*((lumped_problems, _axes, _laws, _sensors) if machine.lumped else of_meshes), _poses):
+    of_meshes = (_parts, _axes, _contacts, _laws, _films, _sensors, _tcp, _supports, misplaced, _added)
+    for check in (*((lumped_problems, _axes, _laws, _sensors, _added) if machine.lumped else of_meshes), _poses):
         problems += check(machine)
     whole = not any(entry is None for section in _NAMED for entry in getattr(machine, section).values())
     return problems or (list(_motion(machine)) if whole else [])
@@ -107,7 +114,7 @@ def _surface(surface: str, where: str, machine: Machine, wildcard: bool = False)
         yield Problem(f"unknown part in '{surface}'", where, did_you_mean(part_name, machine.parts, "parts"))
     elif name == "*":
         if not wildcard:
-            yield Problem("'*' stands for surfaces in films only", where, "name the surface")
+            yield Problem("'*' stands for surfaces in films only, not in additional ones", where, "name the surface")
     elif (part := machine.parts[part_name]) and part.box and not part.mesh and name not in BOX_SURFACES:
         yield Problem(f"unknown surface '{surface}'", where, did_you_mean(name, BOX_SURFACES, "surfaces of a box"))
 
@@ -186,6 +193,11 @@ def _moving(entry: description.Contact, where: str, machine: Machine) -> Iterato
             yield Problem(f"'{pair[0]}' runs on its own part", f"{where}.pairs", "a pad runs on another part's rail")
 
 
+def _added(machine: Machine) -> Iterator[Problem]:
+    judge = heated_place if machine.lumped else _surface
+    yield from added_problems(machine, lambda place, where: judge(place, where, machine))
+
+
 def _laws(machine: Machine) -> Iterator[Problem]:
     yield from _each(machine.signals, lambda name: wiring.signal(name, machine.signals[name]))
     yield from _each(machine.environment, lambda name: wiring.environment(name, machine.environment[name], machine))
@@ -201,8 +213,8 @@ def _films(machine: Machine) -> Iterator[Problem]:
     for name, film in machine.films.items():
         for surface in film.surfaces if film is not None else ():
             where = f"films.{name}.surfaces"
-            yield from _surface(surface, where, machine, wildcard=True)
-            if owner.setdefault(surface, name) != name:
+            yield from _surface(surface, where, machine, wildcard=not film.additional)
+            if not film.additional and owner.setdefault(surface, name) != name:
                 yield Problem(f"'{surface}' is also in films.{owner[surface]}", where, "leave it to one of them")
     if not machine.films:
         yield Problem("no films", "films", "without a film no heat leaves the machine: add a [films.NAME]")

@@ -1,4 +1,7 @@
-"""Which surface exchanges heat through which film: every named surface is accounted for exactly once."""
+"""Which surface exchanges heat through which film: every named surface is accounted for exactly once.
+
+Additional films come on top of that: they account for no surface.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> 
         if (part, name) not in uses:
             problems.append(unknown_surface(surface, where, surfaces))
             return None
-        if use not in uses[part, name]:
+        if use and use not in uses[part, name]:
             uses[part, name].append(use)
         return part, name
 
@@ -40,8 +43,8 @@ def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> 
         where = f"films.{film_name}.surfaces"
         for surface in film.surfaces:
             part_name, name = split_surface(surface)
-            if name != "*":
-                key = claim(surface, f"films.{film_name}", where)
+            if name != "*" or film.additional:
+                key = claim(surface, "" if film.additional else f"films.{film_name}", where)
                 if key and key not in result[film_name]:
                     result[film_name].append(key)
             elif part_name not in surfaces:

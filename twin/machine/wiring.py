@@ -14,6 +14,7 @@ from twin.physics.laws import LAWS, Argument
 from twin.rom.load_model import AxisWiring, EnvironmentWiring, LawUse, Signal, Source
 from twin.units import parse_unit, to_si
 
+SWITCH = Argument("1", "a switch, 0 off and 1 on", low=0.0, high=1.0)
 PAINT = 0.9  # emissivity of painted and of rough oxidised surfaces (VDI-Waermeatlas, K3: 0.85 to 0.95)
 
 
@@ -33,14 +34,26 @@ def signal(name: str, entry: description.SignalEntry) -> Signal:
             ends.append(to_si(end if isinstance(end, str) else f"{float(end)!r} {entry.unit}", unit.si))
         except ValueError as e:
             raise DescriptionError(str(e), f"{where}.range", f"numbers in {entry.unit}, or strings with a unit") from e
+    default = entry.default
+    if default is not None:
+        try:
+            default = to_si(default if isinstance(default, str) else f"{float(default)!r} {entry.unit}", unit.si)
+        except ValueError as e:
+            raise DescriptionError(str(e), f"{where}.default", f"a number in {entry.unit}, or with a unit") from e
+    if not entry.factor:
+        raise DescriptionError("a factor of zero", f"{where}.factor", "logged values are multiplied by it")
     if entry.kind == "peak":
         ends = [e / math.sqrt(2.0) for e in ends]
+        default = None if default is None else default / math.sqrt(2.0)
     low, high = ends
     if not low < high:
         raise DescriptionError(
             f"the range {list(entry.range)} is empty", f"{where}.range", "give [low, high] with low < high"
         )
-    return Signal(name, entry.column or name, unit.si, entry.kind, low, high)
+    if default is not None and not low <= default <= high:
+        what = f"the default {entry.default} is outside the range {list(entry.range)}"
+        raise DescriptionError(what, f"{where}.default", "the model must be certified for it")
+    return Signal(name, entry.column or name, unit.si, entry.kind, low, high, default, entry.factor)
 
 
 def environment(name: str, entry: description.Environment, machine: Machine) -> EnvironmentWiring:
@@ -50,12 +63,25 @@ def environment(name: str, entry: description.Environment, machine: Machine) -> 
         raise DescriptionError(
             "give either a signal or a temperature", where, 'signal = "shop_air" or temperature = "20 degC"'
         )
-    if entry.signal is None:
-        constant = float(entry.temperature or 0.0)
-        return EnvironmentWiring(name, "", constant, entry.gradient, entry.height, entry.offset)
-    expect_signal(entry.signal, "degC", f"{where}.signal", machine)
-    reference = machine.machine.reference_temperature
-    return EnvironmentWiring(name, entry.signal, reference, entry.gradient, entry.height, entry.offset)
+    if (entry.switch is None) != ("switched_offset" not in entry.model_fields_set):
+        remedy = 'switch = "door" and switched_offset = "-3 K", or neither'
+        raise DescriptionError("a switch and what it switches belong together", f"{where}.switch", remedy)
+    if entry.switch is not None:
+        expect_switch(entry.switch, f"{where}.switch", machine)
+    temperature = float(entry.temperature or 0.0)
+    if entry.signal is not None:
+        expect_signal(entry.signal, "degC", f"{where}.signal", machine)
+        temperature = machine.machine.reference_temperature
+    return EnvironmentWiring(
+        name=name,
+        signal=entry.signal or "",
+        temperature=temperature,
+        gradient=entry.gradient,
+        height=entry.height,
+        offset=entry.offset,
+        switch=entry.switch or "",
+        switched_offset=entry.switched_offset,
+    )
 
 
 def axis(name: str, machine: Machine) -> AxisWiring:
@@ -107,6 +133,9 @@ def film_law(name: str, entry: description.Film, machine: Machine) -> LawUse:
         if entry.emissivity and not LAWS[use.law].radiates:
             what = f"surfaces of law '{use.law}' do not see their surroundings"
             problems.append(Problem(what, f"{where}.emissivity", "remove it: they do not radiate"))
+        if entry.additional and (entry.emissivity or entry.radiant is not None):
+            key, what = ("emissivity" if entry.emissivity else "radiant"), "an additional film does not radiate"
+            problems.append(Problem(what, f"{where}.{key}", "remove it: give it to the surface's own film"))
     except TwinError as e:
         raise DescriptionError.collect([*problems, *e.problems]) from e
     if problems:
@@ -115,7 +144,12 @@ def film_law(name: str, entry: description.Film, machine: Machine) -> LawUse:
 
 
 def emissivity(entry: description.Film) -> float:
-    """Of a film's surfaces: as described, else of paint where the law's surfaces see their surroundings."""
+    """Of a film's surfaces: as described, else of paint where the law's surfaces see their surroundings.
+
+    Zero of additional films: radiation is left to the surface's own.
+    """
+    if entry.additional:
+        return 0.0
     if entry.emissivity is not None:
         return entry.emissivity
     return PAINT if LAWS[entry.law].radiates else 0.0
@@ -234,6 +268,13 @@ def _names(
         if name not in given and name not in mistyped and argument.default is None:
             problems.append(Problem(f"law '{law}' needs '{name}'", where, f"{argument.meaning}, in {argument.unit}"))
     return problems
+
+
+def expect_switch(name: str, where: str, machine: Machine) -> None:
+    """Raise DescriptionError unless `name` is a signal without unit that stays within 0 .. 1."""
+    expect_signal(name, SWITCH.unit, where, machine)
+    if problems := _beyond(SWITCH, name, where, machine):
+        raise DescriptionError.collect(problems)
 
 
 def expect_signal(name: str, si: str, where: str, machine: Machine) -> None:

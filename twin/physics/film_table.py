@@ -198,6 +198,12 @@ FILMS: dict[str, Law] = {
         f"{_MIXED} of rotating_cylinder and free_horizontal_cylinder",
         Validity(forced_convection.mixed_rotating_cylinder_holds, f"Re < 4.3e5, Ra <= 1e12, {_AIR}"),
     ),
+    "switched_film": Law(
+        films.switched_film, "film", "assumed: what is switched is proportional to its time on",
+        {"switch": Argument("1", "0 off, 1 on", low=0.0, high=1.0)},
+        {"natural": Argument("W/(m^2*K)", "film coefficient where it is on")},
+        formula="h = h_on s",
+    ),
     "enclosed_gap": Law(
         films.enclosed_gap, "film", "assumed: the papers have no correlation for covers and enclosed gaps",
         {}, {"conductance": Argument("W/(m^2*K)", "convection and radiation through the gap together")},

@@ -21,6 +21,15 @@ def forced_film(speed, natural, forced, exponent):
     return natural + forced * jnp.where(v > 0.0, power, 0.0)
 
 
+def switched_film(switch, natural):
+    """A film that is switched, such as a coolant or a blast of air: alpha = alpha_on s, s = 0 off, 1 on.
+
+    An assumed form: between them s is the share of time on; off, it exchanges nothing. What the surface exchanges
+    besides belongs to its own film.
+    """
+    return switch * natural
+
+
 def enclosed_gap(conductance):
     """Heat through an enclosed gap or a cover, convection and radiation together, as a conductance per area.
 

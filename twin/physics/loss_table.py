@@ -21,6 +21,7 @@ _IRON = {
     "hysteresis": Argument("W*s", "iron loss per speed", 0.0),
     "eddy": Argument("W*s^2", "iron loss per speed squared", 0.0),
 }
+_EXPONENT = {"exponent": Argument("1", "exponent of the speed", 1.0, 0.1, 5.0)}
 _TURNING = {**_IRON, "friction_torque": Argument("N*m", "friction torque of bearings and seal", 0.0)}
 _EFFICIENCY = {"efficiency": Argument("1", "efficiency of the motor", None, 1e-3, 1.0)}
 _BEARING = {
@@ -184,6 +185,26 @@ LOSSES: dict[str, Law] = {
         heat.switched_heat, "loss", "given: electronics, pumps (paper 002, 2.2: switched on at warm-up)",
         {"switch": Argument("1", "0 off, 1 on", low=0.0, high=1.0)}, {"power": Argument("W", "heat while on")},
         formula="P = switch P_on",
+    ),
+    "speed_heat": Law(
+        heat.speed_heat, "loss", "assumed form; exponent 1: paper 004 eq (6)",
+        _AXIS_SPEED,
+        {
+            "power": Argument("W", "heat at the reference speed"),
+            "reference": Argument("m/s", "reference speed", None, 1e-9),
+            **_EXPONENT,
+        },
+        formula="P = P_ref (|v| / v_ref)^m",
+    ),
+    "turning_heat": Law(
+        heat.turning_heat, "loss", "assumed form; exponent 5/3: paper 002 eqs (4)-(6) without load",
+        _SHAFT_SPEED,
+        {
+            "power": Argument("W", "heat at the reference speed"),
+            "reference": Argument("1/s", "reference speed of rotation", None, 1e-9),
+            **_EXPONENT,
+        },
+        formula="P = P_ref (|n| / n_ref)^m",
     ),
     "power_share": Law(
         heat.power_share, "loss", "definition",

@@ -8,7 +8,7 @@ the step, so energy is neither lost nor gained.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from twin.physics.laws import LAWS
 from twin.rom.contact import dwell, dwell_by_segment, segment_borders
 from twin.rom.following import Following
 from twin.rom.law_values import law_values, laws_hold, states_of
-from twin.rom.load_model import LawUse, LoadModel, Pair
+from twin.rom.load_model import Joint, LawUse, LoadModel, Pair
 from twin.rom.sampling import Intervals, cut, path_points
 from twin.rom.tabulate import following_films, following_losses
 
@@ -34,13 +34,14 @@ class Drive:
     films: Following  # films whose law follows the surface temperature
     losses: Following  # sources whose law follows the temperature of their surface
     environment: np.ndarray  # (n, n_environments) degC, offsets included: what the machine feels, not what is measured
-    conductance: np.ndarray  # (n, n_pairs) W/K
+    conductance: np.ndarray  # (n, n_pairs) W/K, means over the steps where contacts are switched
     weight: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w, zero-padded to the longest rail
     square: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w_i^2
     neighbour: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w_i w_{i+1}; last column zero
     position: np.ndarray  # (n, n_axes) m at the end of each step
     flags: np.ndarray  # (n, n_flags) bool: flag_names[k] holds at some time in this step
     flag_names: tuple[str, ...]  # e.g. "signals.x_current above 20 A", "gap in loads"
+    switched: np.ndarray | None = None  # (n, n_environments) K of `environment` that switches bring; None: no switch
     radiation: bool = True  # False where `theta` is the whole coefficient of films (scenarios at the box's bounds)
 
     @property
@@ -69,7 +70,7 @@ def evaluate(
 
     Raises LogError for missing or empty signals and for times that do not increase.
     """
-    time, values, missing = _clean(load_model, time, signals)
+    time, values, missing, absent = _clean(load_model, time, signals)
     if n_steps is None:
         n_steps = max(1, int(np.ceil((time[-1] - time[0]) / dt - 1e-9)))
     t = time - time[0]  # small numbers: seconds since 1970 would cost seven digits
@@ -79,14 +80,23 @@ def evaluate(
     powers, powers_hold = _read_from_log([(s.use, s.gain) for s in load_model.sources], values, len(t))
     films, films_hold = _read_from_log([(f.use, f.gain) for f in load_model.films], values, len(t))
     joints = np.array([j.conductance for j in load_model.joints])
+    pairs = np.array([p.conductance * p.area for p in load_model.pairs])
     environments = _columns(
         [(values[e.signal] if e.signal else np.full(len(t), e.temperature)) + e.offset
          for e in load_model.environments], len(t)
     )  # fmt: skip
+    switched = None
+    if any(e.switch for e in load_model.environments):
+        switched = _columns(
+            [e.switched_offset * (values[e.switch] if e.switch else np.zeros(len(t)))
+             for e in load_model.environments], len(t)
+        )  # fmt: skip
+        environments = environments + switched
 
     path = {a.name: np.interp(np.append(intervals.start, intervals.end[-1]), t, values[a.position])
             for a in load_model.axes}  # fmt: skip
     flags = _flags(load_model, t, values, missing, path, intervals, dt)
+    flags |= _defaults(load_model, absent, n_steps)
     flags |= _outside("sources", [(s.name, s.use) for s in load_model.sources], powers_hold, intervals)
     flags |= _outside("films", [(f.name, f.use) for f in load_model.films], films_hold, intervals)
     weight, square, neighbour, contact_heat = _contacts(load_model, path, powers, intervals)
@@ -94,23 +104,25 @@ def evaluate(
         time=time[0] + edges,
         power=intervals.mean(powers),
         contact_heat=contact_heat,
-        theta=np.hstack([intervals.mean(films), np.tile(joints, (n_steps, 1))]),
+        theta=np.hstack([intervals.mean(films), joints * _switched(load_model.joints, values, intervals)]),
         films=following_films(load_model, values, environments, intervals),
         losses=following_losses(load_model, values, intervals),
         environment=intervals.mean(environments),
-        conductance=np.tile([p.conductance * p.area for p in load_model.pairs], (n_steps, 1)),
+        conductance=pairs * _switched(load_model.pairs, values, intervals),
         weight=weight,
         square=square,
         neighbour=neighbour,
         position=_columns([np.interp(edges[1:], t, values[a.position]) for a in load_model.axes], n_steps),
         flags=np.stack(list(flags.values()), axis=1),
         flag_names=tuple(flags),
+        switched=None if switched is None else intervals.mean(switched),
     )
 
 
 def measured_air(load_model: LoadModel, drive: Drive) -> np.ndarray:
-    """What sensors in the air show (n, n_environments) [degC]: the environments without their offsets."""
-    return drive.environment - np.array([e.offset for e in load_model.environments])
+    """What sensors in the air show (n, n_environments) [degC]: the environments without offsets, switched or not."""
+    shown = drive.environment - np.array([e.offset for e in load_model.environments])
+    return shown if drive.switched is None else shown - drive.switched
 
 
 def outside_flag(kind: str, name: str, text: str) -> str:
@@ -142,6 +154,21 @@ def _read_from_log(
     return result, hold
 
 
+def _switched(
+    contacts: Sequence[Joint] | Sequence[Pair], values: dict[str, np.ndarray], intervals: Intervals
+) -> np.ndarray:
+    """Means over steps (n_steps, len(contacts)) of the factors that switches give to conductances.
+
+    Above zero whatever is logged: values outside 0 .. 1 are clipped here, and flagged as outside the signal's range.
+    """
+    factor = np.ones((intervals.n_steps, len(contacts)))
+    for k in range(len(contacts)):
+        contact: Joint | Pair = contacts[k]
+        if contact.switch:
+            factor[:, k] += (contact.switched - 1.0) * intervals.mean(np.clip(values[contact.switch], 0.0, 1.0))
+    return factor
+
+
 def _columns(columns: list[np.ndarray], n: int) -> np.ndarray:
     """(n, len(columns)); also of no columns."""
     return np.stack(columns, axis=1) if columns else np.zeros((n, 0))
@@ -149,19 +176,22 @@ def _columns(columns: list[np.ndarray], n: int) -> np.ndarray:
 
 def _clean(
     load_model: LoadModel, time: np.ndarray, signals: Mapping[str, np.ndarray]
-) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Time, signals without gaps, and where values were missing."""
+) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray], list[str]]:
+    """Time, signals without gaps, where values were missing, and the signals that are at their defaults."""
     time = np.asarray(time, dtype=float)
     if time.ndim != 1 or len(time) == 0 or not np.all(np.diff(time) > 0.0) or not np.all(np.isfinite(time)):
         raise LogError("times do not increase strictly", "loads", "run `twin check` on the run folder")
     uses = [source.use for source in load_model.sources] + [film.use for film in load_model.films]
     needed = {name for use in uses for name in use.signals.values()}
     needed |= {a.position for a in load_model.axes} | {e.signal for e in load_model.environments if e.signal}
-    absent = sorted(name for name in needed if name not in signals)
+    needed |= {c.switch for c in load_model.joints + load_model.pairs if c.switch}
+    needed |= {e.switch for e in load_model.environments if e.switch}
+    defaults = {s.name: s.default for s in load_model.signals if s.default is not None and s.name not in signals}
+    absent = sorted(name for name in needed if name not in signals and name not in defaults)
     if absent:
         raise LogError(f"missing signals: {', '.join(absent)}", "loads", "log them, or run `twin check` to see columns")
-    values, missing = {}, {}
-    for name in sorted(needed | {s.name for s in load_model.signals if s.name in signals}):
+    values, missing = {name: np.full(len(time), value) for name, value in defaults.items()}, {}
+    for name in sorted((needed - set(defaults)) | {s.name for s in load_model.signals if s.name in signals}):
         raw = np.asarray(signals[name], dtype=float)
         if raw.shape != time.shape:
             raise LogError(f"{raw.size} values for {time.size} times", f"loads: {name}", "give one value per time")
@@ -173,7 +203,7 @@ def _clean(
         last = np.maximum.accumulate(np.where(lost, -1, np.arange(len(raw))))
         values[name] = raw[np.where(last < 0, np.argmin(lost), last)]  # before the first value: that first value
         missing[name] = lost
-    return time, values, missing
+    return time, values, missing, sorted(needed & set(defaults))
 
 
 def _pad_coordinate(pair: Pair, position: np.ndarray) -> np.ndarray:
@@ -217,6 +247,13 @@ def _contacts(
             contact_heat[:, i, rail.first_port : rail.first_port + n] += source.rail_share * under_pad.mean
             contact_heat[:, i, pair.pad_port] += (1.0 - source.rail_share) * mean
     return weight, square, neighbour, contact_heat
+
+
+def _defaults(load_model: LoadModel, absent: list[str], n_steps: int) -> dict[str, np.ndarray]:
+    """One flag per signal that the log has no column of, in the first step alone: nothing is wrong with the others."""
+    first = np.arange(n_steps) == 0
+    default = {s.name: f"{s.default:g} {s.unit}" for s in load_model.signals if s.default is not None}
+    return {f"signals.{name} not logged, default {default[name]} taken": first for name in absent}
 
 
 def _margin(low: float, high: float) -> float:

@@ -19,6 +19,8 @@ class Signal:
     kind: str  # "value", "rms" or "peak" (peak is converted to rms on reading)
     low: float  # certified range
     high: float
+    default: float | None = None  # SI, rms; where a log has no such column. None: the log must have it
+    factor: float = 1.0  # of logged values, before peaks are turned into rms
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class EnvironmentWiring:
     gradient: float = 0.0  # K/m upwards from `height`
     height: float = 0.0  # m, vertical machine coordinate
     offset: float = 0.0  # K: what surrounds the machine is warmer by this than `signal` or `temperature` says
+    switch: str = ""  # signal 0 .. 1
+    switched_offset: float = 0.0  # K: another offset, times the switch
 
 
 @dataclass(frozen=True)
@@ -79,17 +83,20 @@ class Film:
     gain: float = 1.0  # calibration factor of the convection
     emissivity: float = 0.0  # 0: no radiation
     radiant: int = 0  # environment at the radiant temperature
+    additional: bool = False  # on surfaces that have their film, or none, without it
 
 
 @dataclass(frozen=True)
 class Joint:
-    """The conductance [W/(m^2 K)] of a fixed contact inside a body: a constant parameter, an affine term."""
+    """The conductance [W/(m^2 K)] of a fixed contact inside a body: a parameter, an affine term."""
 
     name: str
     conductance: float
     low: float
     high: float
     key: str = "conductance"  # in the description; of lumped machines also "total", which is in W/K
+    switch: str = ""  # signal 0 .. 1; "": none
+    switched: float = 1.0  # factor of the conductance where the switch is 1
 
 
 @dataclass(frozen=True)
@@ -115,6 +122,8 @@ class Pair:
     conductance: float  # W/(m^2 K)
     assignment: str = "interpolated"  # heat and conductance, or "segment": to the one below the pad
     key: str = "conductance"  # as of joints; a total belongs to an area of 1 m^2
+    switch: str = ""  # as of joints
+    switched: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -132,7 +141,7 @@ class LoadModel:
     @property
     def surroundings(self) -> int:
         """The environment a machine at rest is as warm as: the first whose films radiate, hence no coolant."""
-        films = [f for f in self.films if f.emissivity > 0.0] or list(self.films)
+        films = [f for f in self.films if f.emissivity > 0.0] or [f for f in self.films if not f.additional]
         return min((f.environment for f in films), default=0)
 
     @property

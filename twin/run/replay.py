@@ -55,7 +55,8 @@ def replay(
             if run.initial_temperature is not None
             else float(measured_air(model.load_model, drive)[0, model.load_model.surroundings])
         )
-    first = [signals[axis.position] for axis in model.load_model.axes]
+    # a position that is not logged is at its default all the time
+    first = [signals.get(axis.position, drive.position[:, k]) for k, axis in enumerate(model.load_model.axes)]
     position = np.array([values[np.argmax(np.isfinite(values))] for values in first])
     return replay_drive(artefact, drive, position, substeps, initial, checkpoints, progress, interpolation)
 

@@ -1,0 +1,138 @@
+"""Effects hidden in data and looked for, hundreds of times: `python -m benchmarks campaign [--minutes M]`."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.campaign_table import write_tables
+from benchmarks.five_axis import FOLDER, machine
+from benchmarks.hidden_draw import Trial, draw
+from twin.build.workers import each
+from twin.calibrate.measured import measured
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.diagnose import Settings, prepare
+from twin.diagnose.gain import predicted
+from twin.diagnose.search import Search, search
+from twin.diagnose.study import with_measured
+from twin.diagnose.verdict import limits_of, unknown_of, verdict_of
+from twin.diagnose.whiten import measured_of
+from twin.diagnose.yardstick import Yardstick
+from twin.progress import bar
+
+OUT = Path("out/campaign")
+NOISE = 0.08  # K
+SETTINGS = Settings(temperature_sigma=NOISE)
+NULLS, EACH = 200, 10
+SIZES = (1.0, 0.5, 2.0)
+MORE = (("outside", 20), ("null_law", 10), ("pair", 10), ("two", 10), ("effect_and_sensor", 10))
+FIRST = 500  # seed of the first trial: none that anything was tuned on
+
+Item = tuple[str, float, int]
+
+
+def items() -> list[Item]:
+    """All trials, in an order in which an unfinished campaign is worth most."""
+    families = [f.name for f in FAMILIES if f.name != "coarse_model"]
+    result: list[Item] = []
+    for k in range(EACH):
+        result += [("null", 1.0, FIRST + i) for i in range(k * NULLS // EACH, (k + 1) * NULLS // EACH)]
+        result += [(family, size, FIRST + k) for size in SIZES for family in families]
+        result += [(name, 1.0, FIRST + i) for name, n in MORE for i in range(k * n // EACH, (k + 1) * n // EACH)]
+    return result
+
+
+@cache
+def yardstick() -> Yardstick:
+    """The nominal machine's, on the loads of the three runs, as `twin diagnose` makes it."""
+    from twin.rom.artefact import Artefact
+
+    trial = draw("null", 1.0, 0)
+    nothing: Any = Artefact
+    return prepare(nothing, machine(), trial.runs[:2], trial.runs[2:], SETTINGS)[2]
+
+
+def judged(yard: Yardstick, trial: Trial) -> dict[str, Any]:
+    """One trial: what was hidden, what was said, and what it was worth on the sealed run."""
+    began = time.perf_counter()
+    study = yard.study
+    plans = [
+        measured(study.bench.base, run, p.run.drive, p.run.name) for run, p in zip(trial.runs, study.runs, strict=True)
+    ]
+    found = search(yard, measured_of(with_measured(study, plans)))
+    verdict, causes = verdict_of(found, FAMILIES)
+    unknown = unknown_of(found) if verdict == "unknown" else None
+    return {
+        "family": trial.family,
+        "factor": trial.factor,
+        "seed": trial.seed,
+        "truth": [asdict(h) for h in trial.truth],
+        "verdict": verdict,
+        "causes": [
+            {"family": c.family, "place": c.place, "history": c.history, "amplitude": c.amplitude, "ci95": c.ci95,
+             "unit": c.unit, "statistic": c.statistic, "threshold": c.threshold,
+             "rivals": [(r.family, r.place) for r in c.rivals]}
+            for c in causes
+        ],
+        "unknown": None if unknown is None else [unknown.part, unknown.surface, unknown.statistic],
+        "evidence": max(found.steps[0].parts.values()),
+        "observed": found.steps[0].observed,
+        "variance": variance(found, plans[2].temperature, plans[2].tcp),
+        "seconds": time.perf_counter() - began,
+    }  # fmt: skip
+
+
+def variance(found: Search, temperature: np.ndarray, tcp: np.ndarray) -> tuple[float, float]:
+    """Mean square of the sealed run's residuals in units of the channels' noise: recalibrated, extended."""
+    study = found.yardstick.study
+    models = predicted(found, len(study.fitted))
+    sensors, probe = found.yardstick.whiten.channels[0]
+    result = []
+    for flat in (models.recalibrated, models.extended):
+        T, w = study.runs[len(study.fitted)].split(flat)
+        parts = [((temperature - T) / sensors.sigma).ravel(), ((tcp - w) / probe.sigma).ravel()]
+        result.append(float(np.nanmean(np.concatenate(parts) ** 2)))
+    return result[0], result[1]
+
+
+def _one(_: None, item: Item) -> None:
+    family, factor, seed = item
+    try:
+        result = judged(yardstick(), draw(family, factor, seed))
+    except Exception as e:  # a trial that fails is a result, too
+        result = {"family": family, "factor": factor, "seed": seed, "error": f"{type(e).__name__}: {e}"}
+    OUT.mkdir(parents=True, exist_ok=True)
+    with (OUT / f"trials-{os.getpid()}.jsonl").open("a", encoding="utf-8") as f:
+        f.write(json.dumps(result) + "\n")
+
+
+def results() -> list[dict[str, Any]]:
+    """All trials that were made."""
+    lines = [line for path in sorted(OUT.glob("trials-*.jsonl")) for line in path.read_text("utf-8").splitlines()]
+    return [json.loads(line) for line in lines]
+
+
+def main(minutes: float = float("inf")) -> None:
+    yard = yardstick()
+    done = {(r["family"], r["factor"], r["seed"]) for r in results()}
+    todo = [i for i in items() if i not in done]
+    began = time.perf_counter()
+    with bar("campaign", len(todo)) as advance:
+        for first in range(0, len(todo), 40):
+            if time.perf_counter() - began > 60.0 * minutes:
+                break
+            each(_one, None, todo[first : first + 40], lambda i: advance(f"{i[0]} x{i[1]:g}"), long=0.0)
+    write_tables(results(), limits_of(yard), OUT, FOLDER)
+
+
+if __name__ == "__main__":
+    import sys
+
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else float("inf"))

@@ -1,0 +1,123 @@
+"""Diagnoses of every verdict from random arrays that fit each other: what a report must be able to show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival, Series, Unknown, Verdict, Window
+
+FAMILIES = ("heat_source", "film_gain", "forced_convection", "joint", "zone", "sensor", "signal", "coolant", "sun")
+
+
+def heat(**changes: object) -> Cause:
+    rivals = (
+        Rival("loss_law", "sources.x_motor", "x_current^2", 71.0, "W", 402.0, 0.97, "a sensor on bed.x_motor"),
+        Rival("film_gain", "films.bed", "always", 0.62, "1", 120.0, -0.41),
+    )
+    cause = Cause(
+        "heat_source", "bed.x_motor", "sources.found_1", 84.97, (80.2, 89.7), "W", 431.2, 21.4, "x_current^2",
+        "x_current", 2.0, (), {}, rivals,
+    )  # fmt: skip
+    return replace(cause, **changes)
+
+
+SENSOR = Cause("sensor", "sensors.x_nut", "", 0.81 / 86400, (0.7 / 86400, 0.92 / 86400), "K/s", 312.0, 18.0, "drift")
+SIGNAL = Cause("signal", "signals.x_current", "signals.x_current.factor", 0.5, (0.48, 0.52), "1", 220.0, 19.0, "factor")
+SCALE = Cause("scale_expansion", "scales.x", "scales.found_1", 1.13e-5, (1.05e-5, 1.21e-5), "1/K", 90.0, 20.0)
+STEP = Cause(
+    "not_thermal", "tcp.y", "", 12.4e-6, (11.9e-6, 12.9e-6), "m", 150.0, 22.0, "step",
+    windows=(Window("run_1", 14400.0, 28800.0), Window("run_2", 0.0, 3600.0, 0.5)),
+)  # fmt: skip
+
+
+def series(run: str, rng: np.random.Generator, sensors: int = 6, bins: int = 60, sealed: bool = False) -> Series:
+    time = 300.0 * np.arange(1, bins + 1)
+    current = np.where((time % 14400) < 7200, 6.0, 0.0)
+    speed = np.where((time % 20000) < 4000, -0.3, 0.0)
+    warm = np.convolve(current**2 / 36, np.exp(-np.arange(bins) / 20) / 20)[:bins]
+    shape = np.exp(-np.arange(sensors) / 3)
+    delivered = 3.0 * warm[:, None] * shape + 0.05 * rng.standard_normal((bins, sensors))
+    noise = 0.05 * rng.standard_normal((bins, sensors))
+    tcp = 1e-6 * rng.standard_normal((bins // 6, 3))
+    return Series(
+        run=run,
+        time=time,
+        sensors=tuple(f"sensor_{k}" for k in range(sensors)),
+        delivered=delivered,
+        recalibrated=0.4 * delivered + noise,
+        extended=noise,
+        tcp_time=time[5::6],
+        tcp_delivered=tcp + 1e-5 * warm[5::6, None],
+        tcp_recalibrated=tcp + 4e-6 * warm[5::6, None],
+        tcp_extended=tcp,
+        loads={"x_current": current, "x_speed": speed, "ambient": 20.0 + np.sin(time / 9000), "idle": 0 * time},
+        sealed=sealed,
+        measured=21.0 + delivered,
+        tcp_measured=tcp + 2e-5 * warm[5::6, None],
+    )
+
+
+def gains(rng: np.random.Generator, sensors: int = 6) -> tuple[Gain, ...]:
+    temperatures = tuple(
+        Gain(f"sensor_{k}", "K", 1.2 / (k + 1), 0.6 / (k + 1), 0.05, (0.5 / (k + 1) - 0.15, 0.7 / (k + 1)), k < 4)
+        for k in range(sensors)
+    )
+    tcp = tuple(Gain(f"d{a}", "m", 9e-6, 4e-6, 1.1e-6, (2e-6, 4e-6), a != "z") for a in "xyz")
+    return temperatures + tcp
+
+
+def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
+    rng = np.random.default_rng(seed)
+    causes: dict[str, tuple[Cause, ...]] = {
+        "named": (heat(), SCALE),
+        "ambiguous": (heat(),),
+        "out_of_tolerance": (),
+        "unknown": (),
+        "sensor": (SENSOR,),
+        "signal": (SIGNAL,),
+        "nothing": (),
+    }
+    t = 1800.0 * np.arange(20)
+    power = 40.0 * np.sin(t / 9000) ** 2
+    ranked = tuple(
+        Rival(FAMILIES[k % len(FAMILIES)], f"bed.face_{k}", "x_speed", 90 / (k + 1), "W", 430 / (k + 1) ** 2, 0.98**k)
+        for k in range(10)
+    )
+    cosine = np.corrcoef(rng.standard_normal((10, 30)))
+    quiet = verdict in ("nothing", "out_of_tolerance")
+    return Diagnosis(
+        machine="five_axis",
+        verdict=verdict,
+        summary=("One run of 5 h was compared, another was sealed.",),
+        causes=causes[verdict],
+        pulls=tuple(
+            Pull(f"films.part_{k}.gain", 1.0, 1.0 + 0.1 * v, 0.4, v, "1") for k, v in enumerate(rng.standard_normal(18))
+        )
+        + ((Pull("sources.x_motor.gain", 1.0, 1.62, 0.2, 4.1, "1"),) if verdict == "out_of_tolerance" else ()),
+        limits=(
+            Limit("heat_source", "bed.left", 11.6, 4.2, 61.0, "W"),
+            Limit("film_gain", "films.bed", 0.21, 0.1, 0.8, "1"),
+            Limit("forced_convection", "films.bed", 3.4, 1.1, 12.0, "W/(m^2 K)"),
+            Limit("sensor", "sensors.bed", 0.31 / 86400, 0.1 / 86400, 0.9 / 86400, "K/s"),
+            Limit("not_thermal", "tcp.x", 2.3e-6, 2e-6, 4e-6, "m"),
+        ),
+        unknown=Unknown(
+            "column", "column.top", 96.0, 24.0,
+            {"run_1": (tuple(t), tuple(power), tuple(np.full(20, 6.0)))}, (("hydraulics", 0.83), ("x_speed", -0.1)),
+        ) if verdict == "unknown" else None,
+        gain=() if quiet else gains(rng),
+        ranked=ranked,
+        cosine=cosine,
+        nulls={family: 8.0 + 2.5 * rng.gumbel(size=60) for family in (*FAMILIES, "unknown")},
+        thresholds=dict.fromkeys((*FAMILIES, "unknown"), 21.4),
+        observed={family: 5.0 + k for k, family in enumerate(FAMILIES)}
+        | ({} if quiet else {"heat_source": 431.2, "film_gain": 120.0}),
+        whiteness=tuple((f"sensor_{k}", 0.95 - 0.02 * k, 0.2 * rng.standard_normal()) for k in range(6)),
+        series=(series("run_1", rng), series("sealed_run", rng, sealed=True)),
+        notes=("sensor_5 has 4 bins with too few samples: left out",),
+        seed=seed,
+        catalogue="1",
+        provenance={"artefact": "0123abc", "runs": ["run_1", "sealed_run"], "seconds": 412.0},
+    )  # fmt: skip

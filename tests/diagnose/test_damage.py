@@ -1,0 +1,188 @@
+"""Faults of logs: each does what it says, and nothing else."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from twin.diagnose.damage import DAMAGES, HEATING_TIME, damaged
+from twin.diagnose.damage_access import Damage
+from twin.errors import LogError
+from twin.logs.run import Run, Table, Tcp
+
+TIME = np.arange(0.0, 36000.0, 60.0)
+ROWS = np.arange(0.0, 36000.0, 1800.0)
+
+
+def a_run() -> Run:
+    """Ten hours: a machine that warms, an air that swings, a current that is on for half of each hour."""
+    current = np.where(TIME % 3600.0 < 1800.0, 8.0, 0.0)
+    air = 20.0 + 2.0 * np.sin(TIME / 6000.0)
+    a, b = 20.0 + 10.0 * (1.0 - np.exp(-TIME / 7200.0)), 20.0 + TIME / 7200.0
+    displacement = np.outer(ROWS / 36000.0, [10e-6, -4e-6, 1e-6]) + 5e-6
+    return Run(
+        loads=Table(TIME, {"current": current, "air": air}, {"current": "A", "air": "degC"}),
+        temperatures=Table(TIME, {"a": a, "b": b}, {"a": "degC", "b": "degC"}),
+        tcp=Tcp(ROWS, ("x",), np.zeros((len(ROWS), 1)), displacement),
+        initial_temperature=20.0,
+    )
+
+
+RUN = a_run()
+A, B = (RUN.temperatures.columns[n] for n in "ab")
+LATE, EARLY = TIME >= 14400.0, TIME < 14400.0
+SIZES = {"K": 0.6, "s": 1200.0, "1": 0.5, "": math.nan, "m": 4e-6, "rad": 0.1}
+PLACES = {"sensor": "sensors.a", "signal": "signals.current", "initial_state": "run"}
+
+
+def of_kind(family: str, history: str, **more) -> Damage:
+    unit = DAMAGES[family][history].unit
+    place = PLACES.get(family, "tcp.z" if history == "frame" else "tcp.dx")
+    signal = {"detached": "air", "load": "current"}.get(history, "")
+    other = "sensors.b" if history == "swapped" else ""
+    return Damage(family, place, SIZES[unit], history, signal, other, **more)
+
+
+def sensor(name: str, d: Damage) -> np.ndarray:
+    return damaged(RUN, d).temperatures.columns[name]
+
+
+@pytest.mark.parametrize(("family", "history"), [(f, h) for f, kinds in DAMAGES.items() for h in kinds])
+def test_one_table_changes_and_is_told_to_be_computed(family, history):
+    before = a_run()
+    after = damaged(RUN, of_kind(family, history))
+    table = {"sensor": "temperatures", "signal": "loads", "initial_state": "initial_temperature"}.get(family, "tcp")
+    for name in ("loads", "temperatures", "tcp"):
+        assert (getattr(after, name) is getattr(RUN, name)) == (name != table)
+    assert after.synthetic == (() if family == "initial_state" else (table,))
+    for name in ("a", "b"):  # pure: the run that is given stays
+        assert np.array_equal(RUN.temperatures.columns[name], before.temperatures.columns[name])
+    assert np.array_equal(RUN.loads.columns["current"], before.loads.columns["current"])
+    assert np.array_equal(RUN.tcp.displacement, before.tcp.displacement)
+
+
+def test_an_offset_from_a_time_on():
+    after = sensor("a", of_kind("sensor", "offset", start=14400.0))
+    assert np.array_equal(after[EARLY], A[EARLY])
+    assert after[LATE] - A[LATE] == pytest.approx(0.6)
+
+
+def test_a_drift_reaches_its_size_and_stays():
+    after = sensor("a", of_kind("sensor", "drift", start=7200.0, end=14400.0)) - A
+    assert after[TIME <= 7200.0] == pytest.approx(0.0)
+    assert after[TIME == 10800.0] == pytest.approx(0.3)
+    assert after[LATE] == pytest.approx(0.6)
+
+
+def test_a_lagging_sensor_follows_a_ramp_by_its_time_constant():
+    after = damaged(RUN, replace(of_kind("sensor", "lag"), place="sensors.b")).temperatures.columns["b"]
+    behind = (B - after) * 7200.0  # s
+    assert behind[0] == 0.0
+    assert behind[-1] == pytest.approx(1200.0, rel=0.03)
+    gaps = np.where((TIME > 9000.0) & (TIME < 12000.0), np.nan, B)
+    run = replace(RUN, temperatures=replace(RUN.temperatures, columns={"b": gaps}))
+    held = damaged(run, replace(of_kind("sensor", "lag"), place="sensors.b")).temperatures.columns["b"]
+    assert np.array_equal(np.isnan(held), np.isnan(gaps))
+    assert held[-1] == pytest.approx(after[-1], abs=1e-3)
+
+
+def test_a_detached_sensor_shows_the_air_in_part():
+    after = sensor("a", of_kind("sensor", "detached", start=14400.0))
+    air = RUN.loads.columns["air"]
+    assert after[LATE] == pytest.approx(0.5 * (A + air)[LATE])
+    assert np.array_equal(after[EARLY], A[EARLY])
+
+
+def test_a_stuck_sensor_keeps_its_value_for_a_time():
+    after = sensor("a", of_kind("sensor", "stuck", start=14400.0))
+    stuck = LATE & (TIME < 15600.0)
+    assert set(after[stuck]) == {A[TIME == 14400.0][0]}
+    assert np.array_equal(after[~stuck], A[~stuck])
+
+
+def test_swapped_sensors():
+    d = of_kind("sensor", "swapped")
+    assert np.array_equal(sensor("a", d), B)
+    assert np.array_equal(sensor("b", d), A)
+    with pytest.raises(LogError, match="itself"):
+        damaged(RUN, replace(d, other="sensors.a"))
+
+
+def test_signals():
+    current = RUN.loads.columns["current"]
+    assert np.array_equal(damaged(RUN, of_kind("signal", "factor")).loads.columns["current"], 0.5 * current)
+    mean = damaged(RUN, replace(of_kind("signal", "averaged"), size=3600.0)).loads.columns["current"]
+    assert mean == pytest.approx(4.0)  # the mean stays, its square does not
+    late = damaged(RUN, of_kind("signal", "clock")).loads.columns["current"]
+    assert np.array_equal(late[20:], current[:-20])
+    assert set(late[:20]) == {8.0}
+
+
+def displacement(d: Damage, run: Run = RUN) -> np.ndarray:
+    """um, what has been added."""
+    return 1e6 * (damaged(run, d).tcp.displacement - run.tcp.displacement)
+
+
+def test_a_slip_returns_and_a_step_stays():
+    slip = displacement(of_kind("slip", "step"))
+    assert slip[:, 0].tolist() == pytest.approx([0.0] * 5 + [4.0] * 10 + [0.0] * 5)
+    assert not slip[:, 1:].any()
+    step = displacement(of_kind("not_thermal", "step", start=18000.0))
+    assert step[:, 0].tolist() == pytest.approx([0.0] * 10 + [4.0] * 10)
+
+
+def test_rows_that_count_from_the_first_lose_what_that_one_has():
+    first = replace(RUN, tcp_reference="first")
+    assert displacement(of_kind("not_thermal", "step", end=18000.0), first)[:, 0].tolist() == pytest.approx(
+        [0.0] * 10 + [-4.0] * 10
+    )
+
+
+def test_measuring_devices():
+    assert displacement(of_kind("measurement", "drift"))[[0, -1], 0].tolist() == pytest.approx([0.0, 4.0])
+    warm = displacement(of_kind("measurement", "heating"))[:, 0]
+    assert warm[ROWS == HEATING_TIME] == pytest.approx(4.0 * (1.0 - math.exp(-1.0)))
+    turned = damaged(RUN, of_kind("measurement", "frame")).tcp.displacement
+    before = RUN.tcp.displacement
+    assert np.linalg.norm(turned, axis=1) == pytest.approx(np.linalg.norm(before, axis=1))
+    assert turned[:, 2] == pytest.approx(before[:, 2])
+    assert turned[:, 0] == pytest.approx(math.cos(0.1) * before[:, 0] - math.sin(0.1) * before[:, 1])
+
+
+def test_a_load_bends_where_it_acts():
+    bent = displacement(of_kind("not_thermal", "load"))
+    assert bent[:, 0].tolist() == pytest.approx([4.0, 0.0] * 10)  # the current is on at full hours
+
+
+def test_a_stated_temperature_is_off():
+    assert damaged(RUN, of_kind("initial_state", "offset")).initial_temperature == pytest.approx(20.6)
+    with pytest.raises(LogError, match="states no initial temperature"):
+        damaged(replace(RUN, initial_temperature=None), of_kind("initial_state", "offset"))
+
+
+@pytest.mark.parametrize(
+    ("d", "told"),
+    [
+        (Damage("sensor", "sensors.c", 1.0), "sensors of this run are: sensors.a, sensors.b"),
+        (Damage("sensor", "signals.current", 1.0), "no sensor"),
+        (Damage("signal", "signals.curent", 2.0), "did you mean 'signals.current'"),
+        (Damage("sensor", "sensors.a", 1.0, "ofset"), "did you mean 'offset'"),
+        (Damage("sensor", "sensors.a", 0.5, "detached"), "needs a column"),
+        (Damage("sensor", "sensors.a", 1.5, "detached", "air"), "share"),
+        (Damage("slip", "tcp.dw", 1e-6), "tcp.dx"),
+        (Damage("heat_source", "bed.top", 1.0), "no fault of a log"),
+        (Damage("not_thermal", "tcp.dx", 1e-6, "load", "force"), "no column 'force'"),
+    ],
+)
+def test_what_is_not_there_is_told(d, told):
+    with pytest.raises(LogError) as e:
+        damaged(RUN, d)
+    assert told in str(e.value)
+
+
+def test_faults_of_the_tool_need_its_measurements():
+    with pytest.raises(LogError, match=r"no tcp\.csv"):
+        damaged(replace(RUN, tcp=None), of_kind("slip", "step"))

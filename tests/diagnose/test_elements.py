@@ -1,0 +1,117 @@
+"""Elementary causes and readings: each once, each a column, of the size that its unit promises."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.hypotheses import Context
+from twin.diagnose.readings import DAY, readings_of
+
+
+@pytest.fixture(scope="module")
+def read():
+    """Readings of the fitted runs with their index, and the nominal outputs."""
+    study = small_case.study()
+    x = np.zeros(len(study.bench.parameters))
+    outputs = [study.outputs(k, x) for k in study.fitted]
+    J = [study.jacobian(k, x)[:, : len(x)] for k in study.fitted]
+    return *readings_of(study, small_case.nominal()[:2], outputs, J), outputs, J
+
+
+def test_every_column_has_one_name():
+    elements = small_case.elements()
+    assert sorted(elements.index.values()) == list(range(len(elements.columns)))
+    kinds = {kind for kind, _, _ in elements.index}
+    assert {"heat", "film", "group", "zone", "air", "joint", "contact", "capacity", "source", "start"} <= kinds
+    assert all(len(c.histories) == 3 for c in elements.columns)
+
+
+def test_every_reading_has_one_name(read):
+    columns, index, _, _ = read
+    assert sorted(index.values()) == list(range(columns.shape[1]))
+    assert np.isfinite(columns).all()
+    assert not set(index) & set(small_case.elements().index)
+
+
+def test_histories_are_of_order_one_and_the_same_signal_once():
+    histories = small_case.elements().histories
+    for name, values in {**histories.signals, **histories.speeds}.items():
+        assert max(v.max() for v in values) == pytest.approx(1.0, abs=1e-9), name
+    assert "spindle_current^2" in histories.signals
+    assert not any(name.startswith("x_position") for name in histories.signals)
+    # blocks fill the fitted runs and leave the sealed one alone
+    for k in (0, 1):
+        own = [(a, b) for i, a, b in histories.blocks if i == k]
+        assert own[0][0] == 0
+        assert own[-1][1] == small_case.study().runs[k].run.drive.n_steps
+        assert all(a[1] == b[0] for a, b in pairwise(own))
+    assert {i for i, _, _ in histories.blocks} == {0, 1}
+
+
+def test_sensor_faults_touch_one_sensor(read):
+    columns, index, outputs, _ = read
+    study = small_case.study()
+    first = study.runs[0].size
+    for kind in ("offset", "drift", "lag", "detached"):
+        T, w = study.runs[0].split(columns[:first, index[kind, "housing", "always"]])
+        assert T[:, 1].any(), kind
+        assert not T[:, [0, 2]].any()
+        assert not w.any()
+    hours = study.runs[0].measured.bin_time
+    T, _ = study.runs[0].split(columns[:first, index["drift", "housing", "always"]])
+    np.testing.assert_allclose(T[:, 1], hours / DAY, rtol=1e-5)
+    # two swapped sensors show what the other showed
+    T, _ = study.runs[0].split(columns[:first, index["swapped", "front<>housing", "always"]])
+    own, _ = study.runs[0].split(outputs[0])
+    np.testing.assert_allclose(T[:, 0], own[:, 1] - own[:, 0], atol=1e-5)
+    np.testing.assert_allclose(T[:, 0], -T[:, 1])
+
+
+def test_a_gain_is_a_declared_parameter(read):
+    columns, index, _, J = read
+    study = small_case.study()
+    for i, p in enumerate(study.bench.parameters):
+        wanted = np.concatenate([jac[:, i] for jac in J]) / study.scale[i]
+        np.testing.assert_allclose(columns[:, index["gain", p.path, "always"]], wanted, rtol=1e-5, atol=1e-12)
+
+
+def test_tcp_causes_touch_the_tcp_alone(read):
+    columns, index, _, _ = read
+    study = small_case.study()
+    plan = study.runs[1]
+    own = columns[study.runs[0].size :]
+    for (kind, place, _), c in index.items():
+        if kind in ("slip", "step", "probe", "frame", "heated", "scale", "load", "expansion"):
+            T, w = plan.split(own[:, c])
+            assert not T.any(), (kind, place)
+            if kind == "probe":
+                np.testing.assert_allclose(w[:, "xyz".index(place[1])], plan.measured.tcp_time, rtol=1e-6)
+    slips = [columns[:, index["slip", f"d{a}", "always"]] for a in "xz"]
+    assert all(s.any() and np.abs(s).max() <= 0.5 + 1e-6 for s in slips)
+
+
+def test_every_family_lists_hypotheses_over_columns_that_exist(read):
+    columns, of_reading, _, _ = read
+    study, elements = small_case.study(), small_case.elements()
+    first = len(elements.columns)
+    index = {**elements.index, **{key: first + c for key, c in of_reading.items()}}
+    context = Context(study, elements, index)
+    empty = []
+    for family in FAMILIES:
+        batches = family.batches(context)
+        if not batches:
+            empty.append(family.name)
+        for batch in batches:
+            assert batch.family == family.name
+            assert batch.columns.shape[0] == len(batch.places)
+            assert batch.columns.max() < first + columns.shape[1]
+            for when in batch.histories:
+                assert when.weights.shape == (batch.q, batch.columns.shape[1]), (family.name, when.name)
+                assert all(0.0 <= w.start < w.end for w in when.windows)
+    # no surface sources, hence none misplaced, where a part is one node; the reduced model is judged otherwise
+    assert set(empty) == {"coarse_model", "misplaced_source"}

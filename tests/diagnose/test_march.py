@@ -1,0 +1,127 @@
+"""The march of a diagnosis: the numbers of a calibration where nothing is hidden, and exact derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from twin.calibrate import march as plain
+from twin.diagnose.acted import Unit, slots_with
+from twin.diagnose.march import INNER, loads_for, no_slots, states_of
+from twin.diagnose.study import K
+
+KINDS = [("heat", "housing"), ("film", "bed"), ("capacity", "slide"), ("contact", "x_screw")]
+
+
+def units(kinds, study):
+    """Amplitudes that act in the middle of every run."""
+    gates = []
+    for planned in study.runs:
+        gate = np.zeros(planned.run.drive.n_steps)
+        gate[60:-30] = 1.0
+        gates.append(gate)
+    return [Unit(kind, place, -1, tuple(gates)) for kind, place in kinds]
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.6])
+def test_without_slots_it_is_the_march_of_a_calibration(spread):
+    """Steps of a minute, one matrix each: the same implicit Euler, at any parameters."""
+    study = small_case.study()
+    bench, model = study.bench, study.bench.base
+    planned = study.runs[0]
+    x = spread * np.random.default_rng(1).standard_normal(len(bench.parameters))
+    v = np.concatenate([x * study.scale, np.zeros(K)])
+    empty = no_slots(planned.run.drive.n_steps, 1, K, model.n, model)
+    got = states_of(bench.layout, bench.contacts, False, bench.system, study.effects,
+                    loads_for(model, planned.run.drive, 1), empty, planned.z0, v)  # fmt: skip
+    loads = plain.loads_for(model, planned.run.drive, 1)
+    wanted = plain.trajectory(
+        bench.layout, bench.contacts, False, bench.system, study.effects, loads, planned.z0, x * study.scale
+    )
+    assert np.ptp(wanted) > 1.0
+    np.testing.assert_allclose(got, wanted, atol=1e-9 * np.abs(wanted).max())
+
+
+def test_coarse_steps_stay_near_fine_ones():
+    """Five minutes share a matrix with the means of films and contacts. The nut strokes over the screw meanwhile: what
+    the screw shows of a single stroke is lost there."""
+    study = small_case.study()
+    bench, model, planned = study.bench, study.bench.base, study.runs[1]
+    x = np.zeros(len(bench.parameters))
+    fine = plain.trajectory(bench.layout, bench.contacts, False, bench.system, study.effects,
+                            plain.loads_for(model, planned.run.drive, 1), planned.z0, x)  # fmt: skip
+    coarse = study.states(1, x)
+    assert coarse.shape == (planned.run.drive.n_steps // INNER * INNER + 1, model.n)
+    C = np.asarray(bench.system.C)
+    error = np.abs((coarse - np.asarray(fine)) @ C.T).max(axis=0)
+    size = np.abs(np.asarray(fine) @ C.T).max(axis=0)
+    assert model.sensors == ("front", "housing", "screw_middle")
+    assert (error > 0.0).all()
+    assert (error[:2] < 1e-3 * size[:2]).all()
+    assert error[2] < 0.1 * size[2]
+
+
+def test_derivatives_by_parameters_and_amplitudes():
+    study = small_case.study()
+    x = 0.2 * np.random.default_rng(2).standard_normal(len(study.bench.parameters))
+    slots = slots_with(study, small_case.elements(), units(KINDS, study), 0)
+    a = [5.0, 2.0, 3000.0, 0.3]
+    J = study.jacobian(0, x, slots, a)
+    assert J.shape == (study.runs[0].size, len(x) + K)
+    every = [(k, 1e-3) for k in range(0, len(x), 6)] + [(len(x) + k, 1e-3 * a[k]) for k in range(K)]
+    for k, h in every:
+
+        def moved(by, k=k):
+            y, b = x.copy(), np.array(a)
+            if k < len(x):
+                y[k] += by
+            else:
+                b[k - len(x)] += by
+            return study.outputs(0, y, slots, b)
+
+        difference = (moved(h) - moved(-h)) / (2 * h)
+        scale = np.abs(difference).max()
+        if scale * h > 1e-11:  # parameters that nothing here depends on have no difference
+            assert np.abs(J[:, k] - difference).max() < 3e-3 * scale, k
+
+
+def test_derivatives_by_amplitudes_alone_are_the_same():
+    study = small_case.study()
+    x = np.zeros(len(study.bench.parameters))
+    slots = slots_with(study, small_case.elements(), units(KINDS, study), 1)
+    a = [5.0, 2.0, 3000.0, 0.3]
+    y, D = study.by_amplitudes(1, x, slots, a)
+    np.testing.assert_allclose(y, study.outputs(1, x, slots, a), rtol=1e-9)
+    np.testing.assert_allclose(D, study.jacobian(1, x, slots, a)[:, len(x) :], rtol=1e-6, atol=1e-12)
+    assert (np.abs(D).max(axis=0) > 0.0).all()
+
+
+def test_read_is_what_outputs_say():
+    study = small_case.study()
+    x = 0.3 * np.random.default_rng(3).standard_normal(len(study.bench.parameters))
+    T, w = study.read(0, study.states(0, x), x)
+    wanted_T, wanted_w = study.runs[0].split(study.outputs(0, x))
+    np.testing.assert_allclose(T, wanted_T, rtol=1e-12)
+    np.testing.assert_allclose(w, wanted_w, atol=1e-15)
+
+
+def test_more_amplitudes_than_slots_are_refused():
+    study = small_case.study()
+    many = units([("heat", "housing")] * (K + 1), study)
+    with pytest.raises(ValueError, match="more amplitudes than slots"):
+        slots_with(study, small_case.elements(), many, 0)
+
+
+def test_a_plan_for_every_run():
+    from twin.diagnose.study import make_study
+    from twin.errors import TwinError
+
+    study = small_case.study()
+    with pytest.raises(TwinError, match="a plan per run"):
+        make_study(study.bench, [study.runs[0].measured], [0])
+    again = make_study(study.bench, [p.measured for p in study.runs], range(1))
+    assert again.fitted == (0,)
+    assert replace(again, fitted=(0, 1)).fitted == study.fitted

@@ -1,0 +1,320 @@
+"""The report of a diagnosis: every verdict reads, nothing comes from outside, odd input does no harm."""
+
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from tests.diagnose.made_up import SENSOR, STEP, diagnosis, heat, series
+from twin.diagnose.diagnosis import VERDICTS, Diagnosis, Gain, Limit, Rival
+from twin.diagnose.report_evidence import candidates_picture, cosine_picture, nulls_picture
+from twin.diagnose.report_gain import broken
+from twin.diagnose.report_numbers import customary, number, quantity, size_words
+from twin.diagnose.report_page import page, plain, summary_lines, write_report
+from twin.diagnose.report_residuals import load_rows, loudest, on_masks, residual_map, with_gaps
+from twin.diagnose.report_tables import table, when
+from twin.diagnose.report_text import chance, evidence_sentence, near_interval, verdict_sentence
+from twin.errors import TwinError
+
+SECTIONS = {"evidence", "gain", "residuals", "decision", "pulls", "unknown", "limits", "notes"}
+VOID = {"meta", "br", "img", "hr", "link", "input"}
+
+
+class Reader(HTMLParser):
+    """Checks that tags are balanced and ids unique; keeps text, links and ids."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open, self.ids, self.links, self.text, self.sections = [], [], [], "", []
+
+    def handle_starttag(self, tag, attrs):
+        self.handle_startendtag(tag, attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        for key, value in attrs:
+            if key == "id":
+                self.ids.append(value)
+                if tag == "section":
+                    self.sections.append(value)
+            if key in ("href", "src", "xlink:href", "action", "data", "srcset"):
+                self.links.append(value)
+            assert not key.startswith("on"), f"{tag} has a handler {key}"
+        assert tag not in ("script", "iframe", "object", "link", "b", "img"), tag
+
+    def handle_endtag(self, tag):
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag, f"</{tag}> in {self.open}"
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.text += data
+
+
+def read(text: str) -> Reader:
+    reader = Reader()
+    reader.feed(text)
+    reader.close()
+    assert not reader.open
+    assert len(reader.ids) == len(set(reader.ids))
+    for link in reader.links:
+        assert link.startswith(("#", "data:image/png;base64,")), link
+        assert not link.startswith("#") or link[1:] in reader.ids, link
+    for target in re.findall(r"url\(#([^)]*)\)", text):
+        assert target in reader.ids, target
+    assert not re.search(r"https?:|=\"//|url\((?!#)|@import", text)
+    return reader
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Folder of a report per verdict."""
+    folders: dict[str, object] = {}
+
+    def get(verdict):
+        if verdict not in folders:
+            folder = tmp_path_factory.mktemp(verdict)
+            write_report(diagnosis(verdict), folder)
+            folders[verdict] = folder
+        return folders[verdict]
+
+    return get
+
+
+SAID = {  # what the reader of each verdict must find
+    "named": ("cause named", "85.0 W (95 % interval 80.2 to 89.7 W), following x_current²", "scale x: 11.30 µm/(m·K)"),
+    "ambiguous": ("either heat that", "; or a loss that follows", "71.0 W", "What would tell them apart",
+                  "a sensor on bed.x_motor"),
+    "unknown": ("part column, mostly at column.top", "its peak is 40 W (95 % interval 28 to 52 W)", "hydraulics"),
+    "out_of_tolerance": ("Declared values cannot hold: sources.x_motor.gain is 1.62 instead of 1.00 (+4.1",),
+    "sensor": ("sensor x_nut is at fault: drift, 0.81 K/day (95 % interval 0.70 to 0.92 K/day)",
+               "The model of the machine is left as it is"),
+    "signal": ("signal x_current is at fault: factor, 0.500", "0.480 to 0.520"),
+    "nothing": ("Nothing is missing that these data could show", "These data would have shown at least:", "11.6 W",
+                "3.40 W/(m²·K)", "0.310 K/day", "2.30 µm", "No family of causes passes its threshold"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_the_page_of_every_verdict_says_it_first_and_has_every_section(written, verdict):
+    reader = read((written(verdict) / "index.html").read_text(encoding="utf-8"))
+    sentence = verdict_sentence(diagnosis(verdict))
+    assert reader.text.index(sentence) < reader.text.index("One run of 5 h") < reader.text.index("What it rests on")
+    for text in SAID[verdict]:
+        assert text in reader.text, text
+    assert set(reader.sections) == SECTIONS
+    assert reader.sections[0] == ("limits" if verdict == "nothing" else "evidence")
+    for picture in ("Residuals of run_1", "by what is on", "Whiteness before and after", "What chance does",
+                    "Candidates, each alone", "How alike the candidates are", "Pulls of the declared",
+                    "sealed_run: measured and simulated"):  # fmt: skip
+        assert picture in reader.text, picture
+    assert ("Heat into column that nothing explains" in reader.text) == (verdict == "unknown")
+    assert ("Gain per channel" in reader.text) == (verdict not in ("nothing", "out_of_tolerance"))
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_report_json_is_the_diagnosis(written, verdict):
+    folder = written(verdict)
+    with open(folder / "report.json", encoding="utf-8") as f:
+        found = json.load(f)
+    assert found == plain(diagnosis(verdict).to_json())
+    assert found["verdict"] == verdict
+    assert [c["amplitude"] for c in found["causes"]] == [c.amplitude for c in diagnosis(verdict).causes]
+    assert len(found["nulls"]["heat_source"]) == 60
+    assert sorted(p.name for p in folder.iterdir()) == ["index.html", "report.json"]
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_a_terminal_gets_at_most_ten_lines_with_the_verdict(verdict):
+    lines = summary_lines(diagnosis(verdict))
+    assert len(lines) <= 10
+    assert all(line and "\n" not in line for line in lines)
+    assert verdict_sentence(diagnosis(verdict)) == lines[1]
+    assert any("would have shown at least" in line for line in lines) == (verdict == "nothing")
+    assert any("left as it is" in line for line in lines) == (verdict in ("sensor", "signal"))
+
+
+def test_equal_diagnoses_give_equal_pages(written):
+    assert page(diagnosis("sensor")) == (written("sensor") / "index.html").read_text(encoding="utf-8")
+
+
+EVIL = '<b onclick="x">&$x_{1}$ "ü\' </svg><script>'
+
+
+def odd() -> Diagnosis:
+    """Names of all kinds, missing bins, many sensors, no TCP, one run, values that are not numbers."""
+    rng = np.random.default_rng(1)
+    s = series("run", rng, sensors=200)
+    delivered = s.delivered.copy()
+    delivered[5:9] = np.nan
+    delivered[:, 7] = np.nan
+    nothing = np.zeros((0, 3))
+    s = replace(
+        s, run=EVIL, sensors=tuple(f"{EVIL} {k}" for k in range(200)), delivered=delivered, extended=delivered * np.nan,
+        time=np.concatenate([s.time[:20], s.time[20:] + 9000.0]), tcp_time=np.zeros(0), tcp_delivered=nothing,
+        tcp_recalibrated=nothing, tcp_extended=nothing, tcp_measured=None, measured=None, sealed=True,
+        loads={EVIL: s.loads["x_current"], "broken": s.time * np.nan},
+    )  # fmt: skip
+    d = diagnosis("ambiguous")
+    rival = Rival(EVIL, EVIL, EVIL, np.nan, EVIL, np.nan, np.nan, EVIL)
+    cause = heat(place=EVIL, parameter=EVIL, history=EVIL, amplitude=np.nan, ci95=(np.nan, np.inf), rivals=(rival,))
+    gain = (Gain(EVIL, "K", 1.0, np.nan, 0.3, (np.nan, np.nan), True), Gain("a", "K", 1.0, 0.5, 0.3, (0.1, 0.3), True))
+    return replace(
+        d,
+        machine=EVIL,
+        summary=(EVIL,),
+        causes=(cause,),
+        pulls=(replace(d.pulls[0], path=EVIL, pull=np.nan, sigma=np.nan), replace(d.pulls[1], path=EVIL, pull=6.0)),
+        limits=(Limit(EVIL, EVIL, np.inf, np.nan, np.inf, "W"),),
+        gain=gain,
+        ranked=(*d.ranked[:3], rival),
+        cosine=np.full((4, 4), np.nan),
+        nulls={EVIL: np.array([np.nan, 1.0]), "zone": np.zeros(0)},
+        thresholds={EVIL: 3.0, "zone": np.nan, "sun": 0.0},
+        observed={EVIL: np.nan},
+        whiteness=((EVIL, 0.9, np.nan), ("b", np.nan, np.nan)),
+        series=(s,),
+        notes=(EVIL,),
+        provenance={EVIL: {"a": np.float64("nan"), "b": EVIL}},
+    )
+
+
+def test_odd_names_and_missing_values_neither_break_the_page_nor_leave_it(tmp_path):
+    d = odd()
+    write_report(d, tmp_path)
+    reader = read((tmp_path / "index.html").read_text(encoding="utf-8"))
+    assert reader.text.count(EVIL) >= 12  # whole, as text
+    assert "160 sensors with smaller residuals are left out" in reader.text
+    found = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert found["machine"] == EVIL
+    assert found["causes"][0]["amplitude"] is None
+    assert found["causes"][0]["ci95"] == [None, None]
+    assert len(summary_lines(d)) <= 10
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_a_diagnosis_that_holds_nothing_but_its_verdict_is_a_page(verdict):
+    empty = replace(
+        diagnosis(verdict), summary=(), causes=(), pulls=(), limits=(), unknown=None, gain=(), ranked=(), nulls={},
+        cosine=np.zeros((0, 0)), thresholds={}, observed={}, whiteness=(), series=(), notes=(), provenance={},
+    )  # fmt: skip
+    reader = read(page(empty))
+    assert set(reader.sections) == SECTIONS
+    assert verdict_sentence(empty) in reader.text
+    assert "There are no residuals to draw." in reader.text
+    assert summary_lines(empty)[1:2] == [verdict_sentence(empty)]
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(TwinError, match="is a file"):
+        write_report(diagnosis("nothing"), tmp_path / "file")
+
+
+def test_units_are_those_of_engineers():
+    assert quantity(12.34e-6, "m") == "12.3 µm"
+    assert quantity(0.5 / 86400, "K/s") == "0.500 K/day"
+    assert quantity(600.0, "s") == "10.0 min"
+    assert quantity(12.0, "W/(m^2*K)") == quantity(12.0, "W/(m^2 K)") == quantity(12.0, "W/m^2/K") == "12.0 W/(m²·K)"
+    assert quantity(11.5e-6, "1/K") == "11.5 µm/(m·K)"
+    assert quantity(5000.0, "J/K") == "5.00 kJ/K"
+    assert quantity(1e-6 / 3600, "m/s") == "1.00 µm/h"
+    assert quantity(0.5, "m/s") == "30.0 m/min"
+    assert quantity(-2.5, "K") == "-2.50 K"
+    assert quantity(0.25, "1") == "0.250"
+    assert customary("W/m^2") == (1.0, "W/m²")
+
+
+def test_decimals_follow_the_interval():
+    assert size_words(84.97, (80.2, 89.7), "W") == "85.0 W (95 % interval 80.2 to 89.7 W)"
+    assert size_words(1234.4, (1100.0, 1400.0), "W") == "1230 W (95 % interval 1100 to 1400 W)"
+    assert size_words(2.5e-6, (2.45e-6, 2.55e-6), "m") == "2.500 µm (95 % interval 2.450 to 2.550 µm)"
+    assert size_words(-3.0, (-4.0, -2.0), "K") == "-3.0 K (95 % interval -4.0 to -2.0 K)"
+    assert size_words(np.nan, (0.0, 1.0), "K") == ""
+    assert number(-0.0001, 2) == "0.00"
+    assert number(np.inf) == "∞"
+
+
+def test_an_interval_from_a_statistic_is_that_of_a_linear_amplitude():
+    low, high = near_interval(Rival("heat_source", "a", "", 10.0, "W", 25.0, 0.0))  # sigma is 10 / 5
+    assert (low, high) == (pytest.approx(10 - 1.96 * 2), pytest.approx(10 + 1.96 * 2))
+
+
+def test_chance_counts_what_data_without_an_effect_gave():
+    values = np.arange(1.0, 101.0)
+    assert "more than 90.0 once in 10 (10 of 100 simulated data sets; the largest of them gave 100)" in chance(
+        values, 90.0
+    )
+    assert "more than 100 at most once in 33 (none of 100 simulated" in chance(values, 100.0)  # 3 / n: 95 % confidence
+    assert chance(np.zeros(0), 3.0) == chance(None, 3.0) == chance(values, np.nan) == ""
+    d = replace(diagnosis("named"), nulls={"heat_source": values})
+    assert evidence_sentence(d, "heat_source", 431.2, 95.0).startswith(
+        "These data give a statistic of 431; 95.0 is needed."
+    )
+    assert "once in 20" in evidence_sentence(d, "heat_source", 431.2, 95.0)
+
+
+def test_windows_are_told():
+    assert when(STEP) == "step; 4.0 h to 8.0 h of run_1; 0.0 h to 1.0 h of run_2 at 0.5"
+    assert when(SENSOR) == "drift"
+
+
+def test_gaps_stay_gaps_in_a_map():
+    edges, rows = with_gaps(np.array([1.0, 2.0, 3.0, 7.0, 8.0]), np.arange(10.0).reshape(5, 2))
+    np.testing.assert_allclose(edges, [0.5, 1.5, 2.5, 3.5, 6.5, 7.5, 8.5])
+    assert np.isnan(rows[3]).all()
+    np.testing.assert_array_equal(rows[4], [6.0, 7.0])
+    assert residual_map(replace(diagnosis("named").series[0], time=np.zeros(0))) is None
+
+
+def test_a_line_does_not_bridge_missing_bins():
+    hours, values = broken(np.array([0.0, 1.0, 2.0, 6.0, 7.0]), np.arange(5.0))
+    np.testing.assert_array_equal(hours, [0.0, 1.0, 2.0, np.nan, 6.0, 7.0])
+    np.testing.assert_array_equal(values, [0.0, 1.0, 2.0, np.nan, 3.0, 4.0])
+    np.testing.assert_array_equal(broken(np.zeros(1), np.ones(1)), [[0.0], [1.0]])
+
+
+def test_drives_that_go_together_are_one_state():
+    n = 100
+    on = np.arange(n) % 20 < 10
+    loads = {"current": 5.0 * on, "speed": -2.0 * on, "air": np.full(n, 20.0), "spindle": 1.0 * (np.arange(n) > 49)}
+    masks = on_masks(loads, n)
+    assert list(masks) == ["nothing", "current, speed", "spindle"]
+    np.testing.assert_array_equal(masks["current, speed"], on)
+    np.testing.assert_array_equal(masks["nothing"], ~on & (np.arange(n) <= 49))
+    names, rows = load_rows(loads | {"air": 20.0 + np.linspace(-1, 1, n)})
+    assert names == ["current", "speed", "air", "spindle"]
+    assert (rows.min(), rows.max()) == (0.0, 1.0)
+
+
+def test_the_loudest_sensors_are_shown():
+    s = series("run", np.random.default_rng(0), sensors=5)
+    delivered = np.zeros_like(s.delivered)
+    delivered[:, 3], delivered[:, 1], delivered[:, 0] = 2.0, 1.0, np.nan
+    assert loudest(replace(s, delivered=delivered), 2) == [3, 1]
+    assert loudest(replace(s, delivered=delivered))[-1] == 0
+
+
+def test_pictures_show_the_numbers_they_are_made_of():
+    d = diagnosis("named")
+    cells = [t.get_text() for t in cosine_picture(d).figure.axes[0].texts]
+    assert cells == [f"{v:.2f}" for v in d.cosine.ravel()]
+    bars = candidates_picture(d).figure.axes[0]
+    assert [b.get_width() for b in bars.patches] == pytest.approx([r.statistic for r in d.ranked])
+    assert bars.texts[0].get_text() == "90.0 W (81.5 to 98.5 W), x_speed"
+    marks = [
+        line for line in nulls_picture(d).figure.axes[0].lines if line.get_marker() == "D" and len(line.get_xdata())
+    ]
+    assert sorted(float(m.get_xdata()[0]) for m in marks) == pytest.approx(
+        sorted(v / 21.4 for v in d.observed.values())
+    )
+
+
+def test_long_tables_are_cut_and_say_so():
+    text = table(["a"], [[str(k)] for k in range(100)])
+    assert text.count("<td>") == 60
+    assert "40 more in report.json" in text

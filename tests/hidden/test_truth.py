@@ -1,0 +1,75 @@
+"""The other machine of hidden-effect trials: off by what it says, and not by more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.hidden_truth import ASIDE, FILMS, OFF, _felt, other_parameters, other_text
+from tests.hidden.load import MODEL
+from twin.logs.read import read_run
+from twin.machine.load import load_machine
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return load_machine(MODEL / "machine.toml"), load_machine(MODEL / "machine.toml", other_text(4))
+
+
+def test_a_seed_gives_one_machine():
+    assert other_text(4) == other_text(4)
+    assert other_text(4) != other_text(5)
+
+
+def test_names_and_wiring_are_those_of_the_shipped_machine(pair):
+    shipped, other = pair
+    for section in ("parts", "axes", "contacts", "signals", "environment", "sources", "films", "sensors", "supports"):
+        assert list(getattr(shipped, section)) == list(getattr(other, section))
+    for name, film in shipped.films.items():
+        assert other.films[name].surfaces == film.surfaces
+        assert other.films[name].environment == film.environment
+
+
+def test_films_follow_other_laws(pair):
+    shipped, other = pair
+    assert set(FILMS) == set(shipped.films)
+    for name, film in other.films.items():
+        law, values = film.law, dict(film.parameters)
+        assert (law, values) != (shipped.films[name].law, dict(shipped.films[name].parameters))
+
+
+def test_sensors_sit_some_millimetres_aside(pair):
+    shipped, other = pair
+    gaps = [
+        np.linalg.norm(np.subtract(other.sensors[name].position, sensor.position))
+        for name, sensor in shipped.sensors.items()
+        if sensor.position is not None
+    ]
+    assert max(gaps) < ASIDE + 1e-4
+    assert np.mean(gaps) > ASIDE / 2
+
+
+def test_parameters_are_off_by_their_half_widths():
+    factors: dict[str, list[float]] = {kind: [] for kind in OFF}
+    for p, value in other_parameters(4).values():
+        if p.kind in OFF:
+            gain = FILMS[p.path.split(".")[1]].gain if p.kind == "film" else 1.0
+            factors[p.kind].append(value / p.nominal / gain)
+    for kind, found in factors.items():
+        off = np.abs(np.array(found) - 1.0)
+        assert off.max() <= OFF[kind] + 1e-4, kind
+        assert off.max() > 0.1 * OFF[kind], kind
+
+
+def test_work_before_the_start_and_what_is_not_logged():
+    run = read_run(MODEL / "runs" / "diagnosis_1")
+    extra = {"hidden_1": np.linspace(0.0, 1.0, len(run.loads.time))}
+    felt, ahead = _felt(run, extra, 1.5)
+    assert ahead == 5400.0
+    assert np.all(np.diff(felt.loads.time) == 60.0)
+    assert felt.loads.units["hidden_1"] == "1"
+    np.testing.assert_array_equal(felt.loads.columns["hidden_1"][90:], extra["hidden_1"])
+    np.testing.assert_array_equal(felt.loads.columns["x_speed"][:90], run.loads.columns["x_speed"][:90])
+    same, late = _felt(run, {}, 0.0)
+    assert late == 0.0
+    np.testing.assert_array_equal(same.loads.time, run.loads.time)

@@ -1,0 +1,57 @@
+"""twin hide: a machine or a log with something in it that the description does not know."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command(
+    context_settings={"ignore_unknown_options": True},  # "-3 K" is a size
+    epilog="Example: twin hide heat_source bed.x_motor '10 W' models/five_axis -o out/hidden --from '4 h' --to '6 h' "
+    "--run models/five_axis/runs/experiment_a",
+)
+@click.argument("family")
+@click.argument("place")
+@click.argument("size")
+@click.argument("target", type=click.Path(), metavar="MACHINE|RUN")
+@click.option("-o", "--output", required=True, type=click.Path(), help="folder to write")
+@click.option("--history", default="", help="kind of a fault of a log: offset, drift, lag, ...")
+@click.option("--signal", default="", help="logged signal that it follows")
+@click.option("--exponent", default=1.0, show_default=True, help="of that signal")
+@click.option("--from", "start", help="time at which it begins, e.g. '4 h'")
+@click.option("--to", "end", help="time at which it ends")
+@click.option(
+    "--setting", multiple=True, metavar="NAME=VALUE", help="what a family needs besides: temperature='15 degC'"
+)
+@click.option("--run", "runs", multiple=True, type=click.Path(), help="run that gets the switch; repeat it")
+def command(
+    family: str, place: str, size: str, target: str, output: str, history: str, signal: str, exponent: float,
+    start: str | None, end: str | None, setting: tuple[str, ...], runs: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Hide an effect of SIZE ('10 W', '0.6 K', '3') at PLACE in a copy of a machine, or of a log.
+
+    FAMILY is one of `twin diagnose`. A machine's copy is a truth for `twin simulate`; sensor, signal, slip,
+    measurement, initial_state and not_thermal damage the copy of a run folder. hidden.json says what was hidden.
+    """
+    from pathlib import Path
+
+    from twin.cli.quantity import option
+    from twin.diagnose.hide import Hidden, hide
+    from twin.errors import TwinError
+
+    settings = dict(s.partition("=")[::2] for s in setting)
+    if unset := [s for s in setting if "=" not in s]:
+        raise TwinError(f"'{unset[0]}' has no value", "--setting", "write it like --setting temperature='15 degC'")
+    asked = Hidden(
+        family=family,
+        place=place,
+        size=size,
+        history=history,
+        signal=signal,
+        exponent=exponent,
+        start=None if start is None else option("--from", start, "s"),
+        end=None if end is None else option("--to", end, "s"),
+        settings=settings,
+    )
+    for line in hide(asked, Path(target), Path(output), [Path(run) for run in runs]):
+        click.echo(line)

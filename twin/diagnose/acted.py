@@ -1,0 +1,142 @@
+"""Hypotheses as slots of the march: the exact model with a cause switched on, for refits and for the sealed run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.calibrate.effects import contact_names
+from twin.diagnose.batch import Hypothesis
+from twin.diagnose.diagnosis import Window
+from twin.diagnose.elements import Elements
+from twin.diagnose.march import INNER, Slots
+from twin.diagnose.study import Study
+
+READINGS = frozenset({  # kinds that act on what is read, see `readings`
+    "gain", "offset", "drift", "lag", "detached", "swapped", "clock", "scale", "expansion", "slip", "step", "load",
+    "probe", "frame", "heated",
+})  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One amplitude of a cause: what it is, and when it acts."""
+
+    kind: str
+    place: str
+    column: int  # a column of the bank of the same vector, -1 if none
+    shapes: tuple[np.ndarray, ...]  # per run of the study (n_fine,): history of unit amplitude
+
+
+def units_of(
+    study: Study, elements: Elements, index: dict[tuple[str, str, str], int], h: Hypothesis
+) -> tuple[Unit, ...]:
+    """The amplitudes of a hypothesis in every run of the study, the sealed one included; none for readings.
+
+    Histories of logged signals go on in the sealed run; windows are there only where the hypothesis lasts.
+    """
+    kind = h.batch.kind
+    if kind in READINGS:
+        return ()
+    place = h.name.removeprefix("films.").removeprefix("environment.").removeprefix("contacts.")
+    if h.batch.family in ("heat_source", "sun", "coolant") or kind == "film":
+        place = h.name
+    columns, weights = h.combination()
+    if kind == "coolant":
+        half = weights.shape[1] // 2
+        return (
+            Unit("film", place, int(columns[0]), _shapes(study, elements, h, weights[0][:half])),
+            Unit("heat", place, int(columns[half]), _shapes(study, elements, h, weights[1][half:])),
+        )
+    if kind in ("moved", "start", "signal", "source", "gradient"):
+        place = h.name
+    units = []
+    for row in weights:
+        lead = int(columns[np.flatnonzero(row)[0]]) if row.any() else int(columns[0])
+        units.append(Unit(kind, place, lead, _shapes(study, elements, h, row)))
+    return tuple(units)
+
+
+def _shapes(study: Study, elements: Elements, h: Hypothesis, row: np.ndarray) -> tuple[np.ndarray, ...]:
+    when, blocks = h.when, elements.histories.blocks
+    result = []
+    for k, planned in enumerate(study.runs):
+        run = planned.run
+        n = run.drive.n_steps
+        if when.windows:
+            shape = np.zeros(n)
+            for b, (i, start, end) in enumerate(blocks):
+                if i == k:
+                    shape[start:end] = row[-len(blocks) + b]
+            if k not in study.fitted and _lasts(study, when.windows):
+                shape[:] = 1.0
+        elif when.signal:
+            values = run.signals.get(when.signal)
+            shape = np.zeros(n) if values is None else np.abs(values / when.reference) ** when.exponent
+        else:
+            shape = np.ones(n)
+        result.append(shape)
+    return tuple(result)
+
+
+def _lasts(study: Study, windows: Sequence[Window]) -> bool:
+    """Whether windows end with the last fitted run: the cause has come to stay."""
+    last = study.runs[study.fitted[-1]].run
+    end = last.drive.time[-1] - last.drive.time[0]
+    return (
+        any(w.run == last.name and w.end >= end - 1.0 for w in windows)
+        and len(windows) > 0
+        and all(w.level == 1.0 for w in windows)
+    )
+
+
+def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) -> Slots:
+    """The slots of run k with these amplitudes, in their order. Raises ValueError for more than there are slots."""
+    slots = study.slots(k)
+    bench, load = study.bench, study.bench.base.load_model
+    run = study.runs[k].run
+    n = slots.gate.shape[0]
+    if len(units) > slots.gate.shape[1]:
+        raise ValueError("more amplitudes than slots")
+    air = run.drive.environment - bench.base.reference_temperature
+    films = [f.name for f in load.films]
+    for s, unit in enumerate(units):
+        shape = unit.shapes[k]
+        fine = shape.reshape(n, INNER)
+        coarse = fine.mean(axis=1)
+        if unit.kind == "film":
+            p = [q.name for q in bench.places].index(unit.place)
+            film = bench.places[p].film
+            e = load.films[films.index(film)].environment if film else load.surroundings
+            slots.A[s], slots.M[s], slots.gate[:, s] = bench.A[p], bench.M[p], coarse
+            slots.rise[:, :, s] = air[:, e].reshape(n, INNER)
+        elif unit.kind == "group_film":
+            f = films.index(unit.place)
+            slots.A[s] = np.asarray(bench.system.A[0])[f]
+            slots.M[s], slots.gate[:, s] = np.asarray(bench.system.M)[:, f], coarse
+            slots.rise[:, :, s] = air[:, load.films[f].environment].reshape(n, INNER)
+        elif unit.kind == "group":
+            slots.film[:, s, films.index(unit.place)] = coarse
+        elif unit.kind == "air":
+            slots.environment[:, :, s, [e.name for e in load.environments].index(unit.place)] = fine
+        elif unit.kind == "joint":
+            slots.joint[:, s, [j.name for j in load.joints].index(unit.place)] = coarse
+        elif unit.kind == "contact":
+            slots.contact[:, s, contact_names(bench.base).index(unit.place)] = coarse
+        elif unit.kind == "capacity":
+            p = [q.name for q in bench.places].index(unit.place)
+            slots.E[s] = np.outer(bench.B[p], bench.B[p])
+        elif unit.kind == "heat":
+            p = [q.name for q in bench.places].index(unit.place)
+            slots.forcing[:, :, s] = fine[:, :, None] * bench.B[p]
+        else:  # a forcing that the bank knows: history of its column, or of its blocks, times its vector
+            column = elements.columns[unit.column]
+            vector, history = elements.vectors[k][column.vector], column.histories[k]
+            if unit.kind == "zone":
+                history = shape
+            if history is not None:
+                flow = vector if vector.ndim == 2 else np.broadcast_to(vector, (len(shape), len(vector)))
+                slots.forcing[:, :, s] = (flow * history[:, None]).reshape(n, INNER, -1)
+    return slots

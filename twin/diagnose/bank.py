@@ -1,0 +1,147 @@
+"""First-order responses of everything that may act anywhere, in one pass through the runs.
+
+About the calibrated trajectory z(t) a cause of small amplitude enters as a forcing f(t) = v(t) s(t): v the place (the
+input vector of a surface, the heat that its film would carry, the flow of a joint), s its history. All are stepped
+together as columns of one linear march with the matrices of the nominal run, so that thousands of hypotheses cost a few
+matrix products per step. The laws' own reaction is left out here, and is in the exact refit of what was chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import jax.numpy as jnp
+import numpy as np
+import scipy.linalg
+
+from twin.calibrate.effects import contact_names
+from twin.diagnose.march import INNER, Loads, _gamma
+from twin.diagnose.study import Study
+from twin.rom.following import FilmPlan, difference_place, film_state, read_table
+
+AT_ONCE = 700  # columns
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The nominal run k as the linear march needs it; n coarse steps of m fine ones, in fine steps (n m)."""
+
+    states: np.ndarray  # (n m + 1, r)
+    total: np.ndarray  # (n m, n_films) W/(m^2 K), radiation included
+    convection: np.ndarray  # (n m, n_films)
+    outer: np.ndarray  # (n m, n_films) K above the reference temperature
+    inverse: np.ndarray  # (n, r, r) of S
+    rate: float  # 1/s
+
+
+def nominal_run(study: Study, k: int) -> Nominal:
+    """Trajectory and matrices of run k at nominal parameters."""
+    bench = study.bench
+    states = study.states(k, np.zeros(len(bench.parameters)))
+    system, layout, load = bench.system, bench.layout, bench.base.load_model
+    run = study.runs[k].run
+    loads: Loads = run.loads
+    n, m = loads.environment.shape[:2]
+    n_films = layout.n_films
+    plan = FilmPlan.of(load)
+    area = np.where(np.asarray(system.film_area) > 0, system.film_area, 1.0)
+    P, A0, A = np.asarray(system.P[0]), np.asarray(system.A0[0]), np.asarray(system.A[0])
+    following = np.array(layout.following_films, dtype=int)
+    rate = float(np.asarray(loads.rate)[0])
+    total, convection, outer = (np.zeros((n * m, n_films)) for _ in range(3))
+    inverse = np.zeros((n, len(A0), len(A0)))
+    ones = np.ones(len(contact_names(bench.base)))
+    for i in range(n):
+        z = states[i * m]
+        surface = np.asarray(system.reference_temperature) + (np.asarray(system.film_rows) @ z) / area
+        h = np.asarray(loads.theta)[i, :n_films].copy()
+        if len(following):
+            air = plan.air(loads.environment[i].mean(axis=0), np.asarray(system.film_moment) / area)[following]
+            h[following] = read_table(
+                np, np.asarray(loads.film_table)[i], difference_place(np, surface[following] - air)
+            )
+        for j in range(m):
+            state = film_state(np, plan, h, surface, np.asarray(loads.environment)[i, j], 1.0)
+            total[i * m + j], convection[i * m + j] = state.total, h
+            outer[i * m + j] = state.outer - float(system.reference_temperature)
+        coefficients = np.concatenate([total[i * m : (i + 1) * m].mean(axis=0), np.asarray(loads.theta)[i, n_films:]])
+        one = replace(loads, diagonal=loads.diagonal[i], neighbour=loads.neighbour[i], weight=loads.weight[i])
+        S = rate * np.eye(len(A0)) + A0 + np.tensordot(coefficients - np.asarray(system.nominal), A, 1)
+        if P.shape[1]:
+            S = S + P @ np.asarray(_gamma(bench.contacts, one, jnp.asarray(ones), P.shape[1])) @ P.T
+        inverse[i] = scipy.linalg.cho_solve(scipy.linalg.cho_factor(S, lower=True), np.eye(len(S)))
+    return Nominal(states, total, convection, outer, inverse, rate)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A forcing: vector of a place or flow (n m, r) times a history (n m,), per run of the study."""
+
+    vector: int  # index of the vector
+    histories: tuple[np.ndarray | None, ...]  # per run of the study; None: not in that run
+
+
+def respond(
+    study: Study, nominal: Sequence[Nominal], vectors: Sequence[Sequence[np.ndarray]], columns: Sequence[Column]
+) -> np.ndarray:
+    """(m, n_columns) responses of all measured quantities of the fitted runs, float32.
+
+    vectors: per run of the study, (r,) constant or (n m, r) each.
+    """
+    total = sum(study.runs[k].size for k in study.fitted)
+    result = np.zeros((total, len(columns)), dtype=np.float32)
+    first = 0
+    for k in study.fitted:
+        planned, own = study.runs[k], nominal[k]
+        acting = [c for c, column in enumerate(columns) if column.histories[k] is not None]
+        for begin in range(0, len(acting), AT_ONCE):
+            chosen = acting[begin : begin + AT_ONCE]
+            made = _march(study, k, own, vectors[k], [columns[c] for c in chosen])
+            result[first : first + planned.size, chosen] = made
+        first += planned.size
+    return result
+
+
+def _march(
+    study: Study, k: int, nominal: Nominal, vectors: Sequence[np.ndarray], columns: Sequence[Column]
+) -> np.ndarray:
+    planned = study.runs[k]
+    (body,) = study.bench.base.bodies
+    fine, r = len(nominal.states) - 1, body.n
+    C = body.C[planned.measured.column]
+    used = sorted({c.vector for c in columns})
+    place = {v: j for j, v in enumerate(used)}
+    which = np.array([place[c.vector] for c in columns])
+    S = np.stack([np.asarray(c.histories[k], dtype=float) for c in columns], axis=1)  # (fine, n)
+    constant = [vectors[v] if vectors[v].ndim == 1 else None for v in used]
+    X = np.zeros((r, len(columns)))
+    T = np.zeros((fine + 1, len(C), len(columns)), dtype=np.float32)
+    step, share = planned.rows.step, planned.rows.share
+    needed = {int(s) for s in step} | {int(s) + 1 for s in step}
+    kept: dict[int, np.ndarray] = {}
+    if 0 in needed:
+        kept[0] = X.copy()
+    V = np.empty((r, len(used)))
+    for j, c in enumerate(constant):
+        if c is not None:
+            V[:, j] = c
+    changing = [(j, vectors[v]) for j, v in enumerate(used) if constant[j] is None]
+    rate = nominal.rate
+    for t in range(fine):
+        for j, vector in changing:
+            V[:, j] = vector[t]
+        X = nominal.inverse[t // INNER] @ (rate * X + V[:, which] * S[t])
+        T[t + 1] = C @ X
+        if t + 1 in needed:
+            kept[t + 1] = X
+    means = np.tensordot(planned.measured.mean_of.astype(np.float32), T, 1)
+    rows = np.asarray(planned.rows.row)  # (k, 3, r)
+    w = np.zeros((len(step), 3, len(columns)))
+    for q in range(len(step)):
+        now = kept[int(step[q])] + share[q] * (kept[int(step[q]) + 1] - kept[int(step[q])])
+        w[q] = rows[q] @ now
+    if planned.measured.from_first and len(w):
+        w = w - w[0]
+    n = len(columns)
+    return np.concatenate([means.reshape(-1, n), w.reshape(-1, n)])

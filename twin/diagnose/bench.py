@@ -1,0 +1,245 @@
+"""The test bench of a diagnosis: a small model of one machine in its runs, with places, ready for hypotheses.
+
+Made once per machine and loads, and cached: rich model with places -> trajectories on these loads -> window model.
+Measurements come later, so that hundreds of synthetic ones may share it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from twin.build.cache import cached, machine_hash
+from twin.build.full_model import FullModel, assemble
+from twin.build.pipeline import theta_bounds
+from twin.build.project import project
+from twin.build.rich_basis import RichOptions, rich_basis
+from twin.calibrate.march import Places as Contacts
+from twin.calibrate.march import places_of as contacts_of
+from twin.calibrate.window import merged, window_basis
+from twin.diagnose.march import INNER, Loads, loads_for
+from twin.diagnose.places import GHOST, Place, places_of, pruned, with_ghosts, with_places
+from twin.diagnose.training import Shared, snapshots
+from twin.errors import LogError
+from twin.logs.run import Run
+from twin.logs.signals import signal_values
+from twin.machine.description import Machine
+from twin.progress import Progress, silent
+from twin.rom.drive import Drive, evaluate, measured_air
+from twin.rom.model import MachineModel
+from twin.rom.parameter import Parameter
+from twin.run.system import Layout, System, prepare
+
+RICH = RichOptions(samples=10, tolerance=2e-2)
+FINE = 60.0  # s, steps of loads and of the truth beside them
+TRAINING_STEP = 120.0  # s
+TAIL = 6e-7  # share of the squared trajectories, in units of the noise, that is left out
+LARGEST = 190  # states
+LEAST_STEPS = 12
+
+
+@dataclass(frozen=True)
+class Probed:
+    """The rich model of a machine with places and ghosts of its sensors, cached."""
+
+    rich: MachineModel
+    places: tuple[Place, ...]
+    height: tuple[np.ndarray, ...]  # per body (n, n_films of the description): A_k @ height [m^3]
+
+
+@dataclass(frozen=True)
+class BenchRun:
+    """A run without its measurements."""
+
+    name: str
+    drive: Drive  # of the description, steps of FINE
+    signals: dict[str, np.ndarray]  # (n_steps,) means over the drive's steps, SI
+    start: float  # degC
+    stated_start: bool
+    loads: Loads
+
+
+@dataclass(frozen=True)
+class Bench:
+    """P places, r states in coordinates with E = 1."""
+
+    base: MachineModel  # the window model of the description
+    layout: Layout
+    system: System
+    contacts: Contacts
+    parameters: tuple[Parameter, ...]
+    places: tuple[Place, ...]
+    B: np.ndarray  # (P, r) 1 W at each place
+    A: np.ndarray  # (P, r, r) m^2: its film
+    M: np.ndarray  # (P, r) m^2
+    H: np.ndarray  # (r, n_films) m^3: what a gradient of the air does through each film
+    ghosts: np.ndarray  # (n_sensors, r): sensors moved aside; the sensors themselves on lumped machines
+    runs: tuple[BenchRun, ...]
+    reduction: tuple[float, float]  # K, m: rms of what the window leaves of held-out trajectories at the worst output
+
+
+def probed(machine: Machine, progress: Progress = silent) -> Probed:
+    """The rich model with places, cached by description and meshes."""
+
+    def make() -> Probed:
+        full = assemble(with_ghosts(machine), progress)
+        places = places_of(machine, full)
+        model = with_places(full, places)
+        height = _heights(machine, full, model)
+        n_films = len(full.thermal.load_model.films)
+        if machine.lumped:
+            bases = [np.diag(np.asarray(body.E.diagonal()) ** -0.5) for body in model.bodies]
+        else:
+            low, high = theta_bounds(model.load_model)
+            with progress("rich basis with places", RICH.samples * len(model.bodies)) as advance:
+                bases = [rich_basis(body, low, high, RICH, advance) for body in model.bodies]
+        bodies, heights = [], []
+        for body, V, h in zip(model.bodies, bases, height, strict=True):
+            small = project(replace(body, F=None), V)
+            bodies.append(replace(small, E=np.eye(small.n)))
+            heights.append(V.T @ h[:, :n_films])
+        return Probed(replace(model, bodies=tuple(bodies)), places, tuple(heights))
+
+    code = hashlib.sha256(
+        Path(places_of.__code__.co_filename).read_bytes()
+    ).hexdigest()  # the cache knows others' alone
+    return cached("probed", (machine_hash(machine), RICH, code), make)
+
+
+def _heights(machine: Machine, full: FullModel, model: MachineModel) -> list[np.ndarray]:
+    """Per body A_k @ height (n, n_films) of the description's films."""
+    axis = "xyz".index(machine.machine.vertical)
+    n_films = len(full.thermal.load_model.films)
+    result = []
+    for b, body in enumerate(model.bodies):
+        H = np.zeros((body.n, n_films))
+        if full.bodies:
+            z = np.zeros(body.n)
+            nodes = full.bodies[b].nodes[:, axis]
+            z[: len(nodes)] = nodes
+            for term, k in zip(body.A, body.theta, strict=True):
+                if k < n_films:
+                    H[:, k] = term @ z
+        result.append(H)
+    return result
+
+
+def run_names(runs: Sequence[Run]) -> list[str]:
+    """Short names of runs, each once."""
+    from twin.calibrate.problem import run_names as names
+
+    return names(runs)
+
+
+def fine_drive(model: MachineModel, run: Run, dt: float = FINE) -> Drive:
+    """A drive whose fine steps fill coarse ones: the last minutes of a log are held to the end of its coarse step.
+
+    Raises LogError for a log shorter than an hour.
+    """
+    load = model.load_model
+    span = float(run.loads.time[-1] - run.loads.time[0])
+    n = int(np.ceil(span / (dt * INNER) - 1e-9)) * INNER
+    if n < LEAST_STEPS * INNER:
+        raise LogError(f"the log covers {span / 60:.0f} min", str(run.folder), "a diagnosis needs an hour at least")
+    return evaluate(load, run.loads.time, signal_values(run, load.signals), dt, n)
+
+
+def make_bench(
+    machine: Machine, parameters: Sequence[Parameter], runs: Sequence[Run], progress: Progress = silent
+) -> Bench:
+    """The bench for a machine and the loads of runs, cached by both."""
+    rich = probed(machine, progress)
+    base = pruned(rich.rich)
+    load = base.load_model
+    names = run_names(runs)
+    drives = [fine_drive(base, run) for run in runs]
+    starts = [
+        run.initial_temperature if run.initial_temperature is not None
+        else float(measured_air(load, drive)[0, load.surroundings])
+        for run, drive in zip(runs, drives, strict=True)
+    ]  # fmt: skip
+    digest = hashlib.sha256()
+    for drive, start in zip(drives, starts, strict=True):
+        for part in (drive.time, drive.power, drive.theta, drive.environment, drive.films.value, drive.losses.value,
+                     drive.contact_heat, drive.weight, drive.square, drive.conductance, np.array(start)):  # fmt: skip
+            digest.update(np.ascontiguousarray(part).tobytes())
+    known = tuple((p.path, p.nominal, p.sigma, p.low, p.high) for p in parameters)
+
+    def make() -> tuple[np.ndarray, tuple[float, float]]:
+        coarse = tuple(fine_drive(base, run, TRAINING_STEP) for run in runs)
+        shared = Shared(rich.rich, base, tuple(parameters), rich.places, coarse, tuple(starts))
+        made = snapshots(shared, progress=progress)
+        held, train = made[-len(runs) :], made[: -len(runs)]
+        rows = _rows(rich.rich)
+        V = window_basis(rich.rich, train, np.zeros((rich.rich.n, 0)), 0.05, rows, TAIL, LARGEST)
+        X = np.column_stack(held)
+        left = rows @ (X - V @ (V.T @ X))
+        n = len(rich.rich.sensors)
+        rms = np.sqrt(np.mean(left**2, axis=1))
+        return V, (float(rms[:n].max(initial=0.0)) * 0.05, float(rms[n:].max(initial=0.0)) * 1e-6)
+
+    if machine.lumped:
+        V, reduction = np.eye(rich.rich.n), (0.0, 0.0)
+    else:
+        V, reduction = cached("window", (machine_hash(machine), known, digest.hexdigest(), TAIL, LARGEST), make)
+    return _assembled(rich, V, parameters, runs, names, drives, starts, reduction)
+
+
+def _rows(model: MachineModel) -> np.ndarray:
+    """Sensors (0.05 K) and the TCP at every pose (1 um) as rows over the states of all bodies."""
+    C, first = np.zeros((len(model.sensors), model.n)), 0
+    for body in model.bodies:
+        C[list(body.sensors), first : first + body.n] = body.C
+        first += body.n
+    G = np.concatenate([b.G.reshape(-1, b.n) for b in model.bodies], axis=1)
+    return np.vstack([C / 0.05, G / 1e-6])
+
+
+def _assembled(
+    rich: Probed, V: np.ndarray, parameters: Sequence[Parameter], runs: Sequence[Run], names: Sequence[str],
+    drives: Sequence[Drive], starts: Sequence[float], reduction: tuple[float, float],
+) -> Bench:  # fmt: skip
+    whole = merged(rich.rich, V)
+    (body,) = whole.bodies
+    body = replace(body, E=np.eye(body.n))
+    n_places = len(rich.places)
+    load = whole.load_model
+    n_films, n_sources = len(load.films) - n_places, len(load.sources) - n_places
+    real = [k for k, s in enumerate(whole.sensors) if not s.endswith(GHOST)]
+    ghost = [whole.sensors.index(whole.sensors[k] + GHOST) if whole.sensors[k] + GHOST in whole.sensors else k
+             for k in real]  # fmt: skip
+    parts = np.split(V, np.cumsum([b.n for b in rich.rich.bodies])[:-1])
+    H = np.sum([Vb.T @ h for Vb, h in zip(parts, rich.height, strict=True)], axis=0)
+    base = pruned(replace(whole, bodies=(replace(body, C=body.C[real], sensors=tuple(range(len(real)))),)))
+    base = replace(base, sensors=tuple(whole.sensors[k] for k in real))
+    prepared = prepare(base)
+    made = []
+    for run, name, drive, start in zip(runs, names, drives, starts, strict=True):
+        made.append(
+            BenchRun(name, drive, _means(base, run, drive), start, run.initial_temperature is not None,
+                     loads_for(base, drive))
+        )  # fmt: skip
+    return Bench(
+        base, prepared.layout, prepared.system, contacts_of(base), tuple(parameters), rich.places,
+        B=body.B[:, n_sources:].T.copy(), A=np.array(body.A[n_films : n_films + n_places]),
+        M=body.M[:, n_films : n_films + n_places].T.copy(), H=H, ghosts=body.C[ghost], runs=tuple(made),
+        reduction=reduction,
+    )  # fmt: skip
+
+
+def _means(model: MachineModel, run: Run, drive: Drive) -> dict[str, np.ndarray]:
+    """Signals at the middle of the drive's steps; what histories of hypotheses are made from."""
+    values = signal_values(run, model.load_model.signals)
+    middle = (drive.time[:-1] + drive.time[1:]) / 2
+    result = {}
+    for name, column in values.items():
+        good = np.isfinite(column)
+        if good.any():
+            time = run.loads.time[good]
+            last = np.clip(np.searchsorted(time, middle, side="right") - 1, 0, len(time) - 1)
+            result[name] = np.asarray(column)[good][last]
+    return result

@@ -1,0 +1,229 @@
+"""Logs with a fault that was not there: what channels, clocks and measurements get wrong, one pure function per kind.
+
+A fault acts from `start` to `end` [s]. Amplitudes are SI; all else in a run stays as it is. A damaged table counts as
+computed (`Run.synthetic`): nobody is to take it for a measurement.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.diagnose.damage_access import (
+    Damage,
+    acts,
+    column_at,
+    component,
+    grown,
+    load_of,
+    marked,
+    sensor_of,
+    tcp_time,
+    with_load,
+    with_sensors,
+    with_tcp,
+)  # fmt: skip
+from twin.errors import LogError
+from twin.logs.run import Run
+from twin.nearest import did_you_mean
+
+HEATING_TIME = 3600.0  # s: in which a measuring device warms up to 63 %
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A row of the table of damages."""
+
+    damaged: Callable[[Run, Damage], Run]
+    unit: str  # of the size; "" where it is a name
+    meaning: str
+
+
+def damaged(run: Run, damage: Damage) -> Run:
+    """The run with one fault. Raises LogError for kinds, channels and tables that are not there."""
+    return kind_of(damage.family, damage.history).damaged(run, damage)
+
+
+def kind_of(family: str, history: str) -> Kind:
+    """The kind of a fault. Raises LogError for an unknown one."""
+    kinds = DAMAGES.get(family)
+    if kinds is None:
+        raise LogError(f"'{family}' is no fault of a log", "", did_you_mean(family, DAMAGES, "faults of a log"))
+    if history and history not in kinds:
+        what = f"a fault of family '{family}' has no history '{history}'"
+        raise LogError(what, "--history", did_you_mean(history, kinds, "histories"))
+    return kinds[history or next(iter(kinds))]
+
+
+def _offset(run: Run, d: Damage) -> Run:
+    """Reads too much by a constant."""
+    table, name = sensor_of(run, d.place)
+    return with_sensors(run, {name: table.columns[name] + d.size * acts(table.time, d)})
+
+
+def _drift(run: Run, d: Damage) -> Run:
+    """Drifts in a straight line, by the size from the start of the fault to its end, and stays there."""
+    table, name = sensor_of(run, d.place)
+    return with_sensors(run, {name: table.columns[name] + d.size * grown(table.time, d)})
+
+
+def _lag(run: Run, d: Damage) -> Run:
+    """Follows with a time constant of the size [s]: a sensor in a thick well."""
+    table, name = sensor_of(run, d.place)
+    values = np.array(table.columns[name], dtype=float)
+    last = -1
+    for i in np.flatnonzero(acts(table.time, d) & np.isfinite(values)).tolist():
+        if last >= 0:
+            keep = math.exp(-(table.time[i] - table.time[last]) / d.size)
+            values[i] = keep * values[last] + (1.0 - keep) * values[i]
+        last = i
+    return with_sensors(run, {name: values})
+
+
+def _detached(run: Run, d: Damage) -> Run:
+    """Shows its surroundings, a column of either table, by a share: it has come off."""
+    table, name = sensor_of(run, d.place)
+    if not 0.0 < d.size <= 1.0:
+        raise LogError(f"a share of {d.size:g}", d.place, "give the share of the surroundings in what it shows: 0.5")
+    share = d.size * acts(table.time, d)
+    return with_sensors(run, {name: (1.0 - share) * table.columns[name] + share * column_at(run, d.signal, table.time)})
+
+
+def _stuck(run: Run, d: Damage) -> Run:
+    """Keeps the value that it has at the start of the fault, for the size [s]."""
+    table, name = sensor_of(run, d.place)
+    values = np.array(table.columns[name], dtype=float)
+    first = table.time[0] if d.start == -math.inf else d.start
+    kept = (table.time >= first) & (table.time < first + d.size)
+    if kept.any():
+        values[kept] = values[np.flatnonzero(kept)[0]]
+    return with_sensors(run, {name: values})
+
+
+def _swapped(run: Run, d: Damage) -> Run:
+    """Two sensors with each other's names."""
+    table, name = sensor_of(run, d.place)
+    _, other = sensor_of(run, d.other)
+    if other == name:
+        raise LogError("a sensor is swapped with itself", d.place, "name another sensor")
+    during = acts(table.time, d)
+    a, b = table.columns[name], table.columns[other]
+    return with_sensors(run, {name: np.where(during, b, a), other: np.where(during, a, b)})
+
+
+def _factor(run: Run, d: Damage) -> Run:
+    """Logged too large by a factor."""
+    name = load_of(run, d.place)
+    values = run.loads.columns[name]
+    return with_load(run, name, np.where(acts(run.loads.time, d), d.size * values, values))
+
+
+def _averaged(run: Run, d: Damage) -> Run:
+    """Logged as means over the size [s], weighted by the time until the next row: squares of it become too small."""
+    name = load_of(run, d.place)
+    time, values = run.loads.time, np.array(run.loads.columns[name], dtype=float)
+    weight = np.append(np.diff(time), 0.0)
+    weight[-1] = weight[-2] if len(weight) > 1 else 1.0
+    group = np.floor((time - time[0]) / d.size).astype(int)
+    during = acts(time, d) & np.isfinite(values)
+    total = np.bincount(group[during], (weight * values)[during], minlength=group.max() + 1)
+    span = np.bincount(group[during], weight[during], minlength=group.max() + 1)
+    values[during] = total[group[during]] / span[group[during]]
+    return with_load(run, name, values)
+
+
+def _clock(run: Run, d: Damage) -> Run:
+    """Stamped too late by the size [s]; values are held before the first row."""
+    name = load_of(run, d.place)
+    time, values = run.loads.time, run.loads.columns[name]
+    late = values[np.clip(np.searchsorted(time, time - d.size, side="right") - 1, 0, len(time) - 1)]
+    return with_load(run, name, np.where(acts(time, d), late, values))
+
+
+def _step(run: Run, d: Damage) -> Run:
+    """A displacement that comes at the start of the fault and goes at its end."""
+    time = tcp_time(run)
+    return with_tcp(run, d, acts(time, d).astype(float))
+
+
+def _slip(run: Run, d: Damage) -> Run:
+    """A joint slips as the machine warms and slips back as it cools: in the second and third quarter, unless told."""
+    time = tcp_time(run)
+    span = time[-1] - time[0]
+    start = time[0] + 0.25 * span if d.start == -math.inf else d.start
+    end = time[0] + 0.75 * span if d.end == math.inf else d.end
+    return _step(run, replace(d, start=start, end=end))
+
+
+def _measured_drift(run: Run, d: Damage) -> Run:
+    """The measuring device drifts in a straight line."""
+    return with_tcp(run, d, grown(tcp_time(run), d))
+
+
+def _heating(run: Run, d: Damage) -> Run:
+    """The measuring device warms up: 63 % of the size after `HEATING_TIME`."""
+    time = tcp_time(run)
+    since = np.clip(time - max(d.start, time[0]), 0.0, None)
+    return with_tcp(run, d, -np.expm1(-since / HEATING_TIME))
+
+
+def _frame(run: Run, d: Damage) -> Run:
+    """The measuring device stands turned about a machine axis by the size [rad]: components mix."""
+    time = tcp_time(run)
+    axis = component(d.place, ("x", "y", "z"))
+    assert run.tcp is not None
+    c, s = math.cos(d.size), math.sin(d.size)
+    turn = np.eye(3)
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    turn[a, a], turn[a, b], turn[b, a], turn[b, b] = c, -s, s, c
+    turned = np.where(acts(time, d)[:, None], run.tcp.displacement @ turn.T, run.tcp.displacement)
+    return marked(replace(run, tcp=replace(run.tcp, displacement=turned)), "tcp")
+
+
+def _load(run: Run, d: Damage) -> Run:
+    """A displacement by force or weight: the size where a column of the loads is largest, and in proportion below."""
+    time = tcp_time(run)
+    values = np.abs(column_at(run, d.signal, time))
+    top = float(np.nanmax(np.abs(run.loads.columns[d.signal]))) if d.signal in run.loads.columns else 0.0
+    if not top > 0.0:
+        raise LogError(f"column '{d.signal}' of loads.csv is zero or missing", "--signal", "name one that varies")
+    return with_tcp(run, d, np.nan_to_num(values / top) * acts(time, d))
+
+
+def _initial_state(run: Run, d: Damage) -> Run:
+    """The stated temperature at the start is off."""
+    if run.initial_temperature is None:
+        remedy = 'write initial_temperature = "20 degC" there'
+        raise LogError("states no initial temperature", str(run.folder / "run.toml"), remedy)
+    return replace(run, initial_temperature=run.initial_temperature + d.size)
+
+
+DAMAGES: dict[str, dict[str, Kind]] = {
+    "sensor": {
+        "offset": Kind(_offset, "K", "reads too much by a constant"),
+        "drift": Kind(_drift, "K", "drifts in a straight line, in all by this"),
+        "lag": Kind(_lag, "s", "follows with this time constant"),
+        "detached": Kind(_detached, "1", "shows its surroundings (--signal) by this share"),
+        "stuck": Kind(_stuck, "s", "keeps its value for this time"),
+        "swapped": Kind(_swapped, "", "has the name of this sensor, which has its name"),
+    },
+    "signal": {
+        "factor": Kind(_factor, "1", "is logged too large by this factor"),
+        "averaged": Kind(_averaged, "s", "is logged as means over this time"),
+        "clock": Kind(_clock, "s", "is stamped too late by this"),
+    },
+    "slip": {"step": Kind(_slip, "m", "a joint slips, and slips back")},
+    "initial_state": {"offset": Kind(_initial_state, "K", "the stated temperature is too high by this")},
+    "measurement": {
+        "drift": Kind(_measured_drift, "m", "the device drifts in a straight line, in all by this"),
+        "frame": Kind(_frame, "rad", "the device stands turned by this"),
+        "heating": Kind(_heating, "m", "the device warms up"),
+    },
+    "not_thermal": {
+        "step": Kind(_step, "m", "something moves"),
+        "load": Kind(_load, "m", "something bends with a load (--signal), at its largest by this"),
+    },
+}

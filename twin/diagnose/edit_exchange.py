@@ -1,0 +1,149 @@
+"""Causes in what a machine exchanges: films, joints, air, media, capacities behind a conductance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from twin.diagnose.diagnosis import Cause
+from twin.diagnose.site import (
+    Change,
+    Site,
+    environment_at,
+    figure,
+    film_at,
+    named,
+    quantity,
+    signal_of,
+    surfaces_of,
+    switch_of,
+)
+from twin.errors import DescriptionError
+
+TANK_TIME = 3600.0  # s: time constant of a tank whose conductance is not known
+
+
+def film_gain(site: Site, cause: Cause) -> Change:
+    """A film is stronger or weaker than declared, or its surface has more than it."""
+    if cause.place.startswith("films."):
+        _, name = named(site, cause.place, "films")
+        return Change(values={f"films.{name}.gain": site.machine.films[name].gain * cause.amplitude})
+    law, change = _film(site, cause)
+    return replace(change, tables=(_additional(site, cause, law), *change.tables))
+
+
+def forced_convection(site: Site, cause: Cause) -> Change:
+    """A surface has wind that follows a speed."""
+    name, unit = signal_of(site, cause)
+    if unit != "m/s":
+        raise DescriptionError(f"signal '{name}' is in {unit}", cause.place, "name a speed in m/s")
+    parameters = {
+        "natural": 0.0, "forced": quantity(cause.amplitude, "W/(m^2*K)"), "exponent": cause.exponent,
+    }  # fmt: skip
+    return Change(
+        (_additional(site, cause, {"law": "forced_film", "parameters": parameters, "signals": {"speed": name}}),)
+    )
+
+
+def coolant(site: Site, cause: Cause) -> Change:
+    """A medium of another temperature flows over a surface."""
+    if "temperature" not in cause.settings:
+        raise DescriptionError("needs the temperature of the medium", f"coolant at {cause.place}", "give it in degC")
+    law, change = _film(site, cause)
+    medium = (f"environment.{site.name}", {"temperature": f"{float(cause.settings['temperature']):.6g} degC"})
+    return replace(change, tables=(_additional(site, cause, law, site.name), medium, *change.tables))
+
+
+def joint(site: Site, cause: Cause) -> Change:
+    """A joint conducts otherwise than declared, always or while something is on."""
+    _, name = named(site, cause.place, "contacts")
+    contact = site.machine.contacts[name]
+    switch, change = switch_of(site, cause)
+    if switch:
+        _expect_no_switch(contact.switch, cause.place)
+        return replace(
+            change, values={f"contacts.{name}.switch": switch, f"contacts.{name}.switched": figure(cause.amplitude)}
+        )
+    if contact.total is not None:
+        return Change(values={f"contacts.{name}.total": contact.total * cause.amplitude})
+    if contact.joint is not None:
+        return Change(values={f"contacts.{name}.joint.gain": contact.joint.gain * cause.amplitude})
+    return Change(values={f"contacts.{name}.conductance": float(contact.conductance or 0.0) * cause.amplitude})
+
+
+def zone(site: Site, cause: Cause) -> Change:
+    """Air is not as it is measured: elsewhere, higher up, or while a door is open."""
+    if cause.place.startswith("films."):
+        return _own_air(site, cause)
+    _, name = named(site, cause.place, "environment")
+    entry, path = site.machine.environment[name], f"environment.{name}"
+    switch, change = switch_of(site, cause)
+    if cause.unit == "K/m":
+        if switch:
+            raise DescriptionError("a gradient has no switch", cause.place, "give it without windows")
+        height = (
+            {f"{path}.height": quantity(float(cause.settings["height"]), "m")} if "height" in cause.settings else {}
+        )
+        return Change(values={**height, f"{path}.gradient": quantity(entry.gradient + cause.amplitude, "K/m")})
+    if switch:
+        _expect_no_switch(entry.switch, cause.place)
+        switched = quantity(cause.amplitude, "K")
+        return replace(change, values={f"{path}.switch": switch, f"{path}.switched_offset": switched})
+    return Change(values={f"{path}.offset": entry.offset + cause.amplitude})
+
+
+def _own_air(site: Site, cause: Cause) -> Change:
+    """One film has air of its own: a copy of its environment, warmer or colder."""
+    _, name = named(site, cause.place, "films")
+    entry = dict(site.data["environment"][site.machine.films[name].environment])
+    switch, change = switch_of(site, cause)
+    if switch:
+        _expect_no_switch(site.machine.environment[site.machine.films[name].environment].switch, cause.place)
+        entry |= {"switch": switch, "switched_offset": quantity(cause.amplitude, "K")}
+    else:
+        described = site.machine.environment[site.machine.films[name].environment]
+        entry["offset"] = quantity(described.offset + cause.amplitude, "K")
+    tables = ((f"environment.{site.name}", entry), *change.tables)
+    return replace(change, tables=tables, values={f"films.{name}.environment": site.name})
+
+
+def capacity(site: Site, cause: Cause) -> Change:
+    """Something heavy hangs on a surface."""
+    (surface, *_) = surfaces_of(site, cause.place)
+    conductance = float(cause.settings.get("conductance", cause.amplitude / TANK_TIME))
+    entry = {
+        "surface": surface, "capacity": quantity(cause.amplitude, "J/K"), "conductance": quantity(conductance, "W/K"),
+    }  # fmt: skip
+    return Change(((f"tanks.{site.name}", entry),))
+
+
+def _film(site: Site, cause: Cause) -> tuple[dict[str, object], Change]:
+    """Law, parameters and signals of a film that is always there, or switched."""
+    switch, change = switch_of(site, cause)
+    natural = {"natural": quantity(cause.amplitude, "W/(m^2*K)")}
+    if switch:
+        return {"law": "switched_film", "parameters": natural, "signals": {"switch": switch}}, change
+    return {"law": "constant_film", "parameters": natural}, change
+
+
+def _expect_no_switch(switch: str | None, place: str) -> None:
+    if switch is not None:
+        remedy = "one entry has one switch: let its signal tell both histories"
+        raise DescriptionError(f"is switched by '{switch}' already", place, remedy)
+
+
+def _additional(site: Site, cause: Cause, law: Mapping[str, object], environment: str = "") -> tuple[str, Mapping]:
+    """An additional film at the place of a cause, to the environment of its own film."""
+    given = str(cause.settings.get("surfaces", ""))  # of a film: the description may say "part.*" only
+    surfaces = tuple(given.split(",")) if given else surfaces_of(site, cause.place)
+    machine = site.machine
+    entry: dict[str, object] = {
+        "law": law["law"],
+        "surfaces": list(surfaces),
+        "environment": environment or environment_at(machine, surfaces[0]),
+        "additional": True,
+    }
+    own, node = machine.films.get(film_at(machine, surfaces[0])), machine.nodes.get(surfaces[0])
+    if node is not None and node.area is None and own is not None and own.area is not None:
+        entry["area"] = own.area
+    return f"films.{site.name}", {**entry, **{k: v for k, v in law.items() if k != "law"}}

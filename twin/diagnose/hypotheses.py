@@ -1,0 +1,349 @@
+"""The hypotheses of every family of the catalogue, as batches: one function per family."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.diagnose.batch import Batch, History
+from twin.diagnose.diagnosis import Window
+from twin.diagnose.elements import Elements
+from twin.diagnose.places import Place
+from twin.diagnose.study import Study
+
+BELLS = (4.0, 6.0, 8.0, 10.0)  # h
+
+
+@dataclass(frozen=True)
+class Context:
+    """What families make their hypotheses from."""
+
+    study: Study
+    elements: Elements
+    index: dict[tuple[str, str, str], int]  # of all columns: elements first, readings after them
+
+    def named(self, kind: str) -> list[tuple[str, str, int]]:
+        """(place, history, column) of a kind."""
+        return [(p, h, c) for (k, p, h), c in self.index.items() if k == kind]
+
+    @property
+    def outer(self) -> list[Place]:
+        """Places with a film."""
+        return [p for p in self.study.bench.places if p.film]
+
+
+def _single(context: Context, family: str, kind: str, unit: str, sign: int = 0, smallest: float = 0.0,
+            fixed: bool = False) -> list[Batch]:  # fmt: skip
+    """Every column of a kind a hypothesis of its own."""
+    found = context.named(kind)
+    return [_batch(context, family, kind, unit, [(p, [c]) for p, h, c in found if h == name],
+                   (_history(context, name, np.ones((1, 1))),), sign, smallest, fixed)
+            for name in dict.fromkeys(h for _, h, _ in found)]  # fmt: skip
+
+
+def _batch(context: Context, family: str, kind: str, unit: str, rows: Sequence[tuple[str, Sequence[int]]],
+           histories: Sequence[History], sign: int = 0, smallest: float = 0.0,
+           fixed: bool = False) -> Batch:  # fmt: skip
+    return Batch(family, kind, unit, tuple(p for p, _ in rows), np.array([c for _, c in rows], dtype=int),
+                 tuple(histories), sign, fixed, smallest)  # fmt: skip
+
+
+def _history(context: Context, name: str, weights: np.ndarray) -> History:
+    signal, exponent, reference = context.elements.histories.unit.get(name, ("", 1.0, 1.0))
+    return History(name, weights, signal, exponent, reference)
+
+
+def _windows(context: Context) -> list[tuple[str, np.ndarray, tuple[Window, ...]]]:
+    """(name, (blocks,) 0 or 1, windows): every stretch of hours within a run, and from every hour on to the end."""
+    blocks = context.elements.histories.blocks
+    study = context.study
+    runs = [study.runs[k].run for k in study.fitted]
+    own = [[b for b, (i, _, _) in enumerate(blocks) if i == r] for r in range(len(runs))]
+
+    def part(r: int, first: int, last: int) -> tuple[np.ndarray, Window]:
+        dt = runs[r].drive.time[1] - runs[r].drive.time[0]
+        chosen = own[r][first : last + 1]
+        weights = np.zeros(len(blocks))
+        weights[chosen] = 1.0
+        return weights, Window(runs[r].name, blocks[chosen[0]][1] * dt, blocks[chosen[-1]][2] * dt)
+
+    result: list[tuple[str, np.ndarray, tuple[Window, ...]]] = []
+    for r, of_run in enumerate(own):
+        n = len(of_run)
+        for first in range(n):
+            for last in range(first, n):
+                weights, window = part(r, first, last)
+                name = f"from {window.start / 3600:.1f} h to {window.end / 3600:.1f} h of {window.run}"
+                result.append((name, weights, (window,)))
+            if r + 1 < len(own):  # on for good
+                weights, window = part(r, first, n - 1)
+                windows = [window]
+                for later in range(r + 1, len(own)):
+                    more, rest = part(later, 0, len(own[later]) - 1)
+                    weights, windows = weights + more, [*windows, rest]
+                result.append((f"from {window.start / 3600:.1f} h of {window.run} on", weights, tuple(windows)))
+    return result
+
+
+def _always(context: Context) -> tuple[str, np.ndarray, tuple[Window, ...]]:
+    return "always", np.ones(len(context.elements.histories.blocks)), ()
+
+
+def _stretches(context: Context) -> list[tuple[str, np.ndarray, tuple[Window, ...]]]:
+    """The windows beside "always": not the whole of all runs."""
+    return [w for w in _windows(context) if not w[1].all()]
+
+
+def _lasting(context: Context) -> list[tuple[str, np.ndarray, tuple[Window, ...]]]:
+    """From an hour on: to the end of the last run."""
+    last = context.study.runs[context.study.fitted[-1]].run.name
+    n = len(context.elements.histories.blocks)
+    return [w for w in _stretches(context) if w[1][n - 1] == 1.0 and w[2][-1].run == last]
+
+
+def _wide(one: np.ndarray, at: int, length: int) -> np.ndarray:
+    result = np.zeros(length)
+    result[at : at + len(one)] = one
+    return result
+
+
+def none(context: Context) -> list[Batch]:
+    """No hypotheses: decided otherwise."""
+    return []
+
+
+def film_gain(context: Context) -> list[Batch]:
+    """Films as a whole, and surfaces of their own."""
+    outer = {p.name for p in context.outer}
+    surfaces = [(p, [c]) for p, h, c in context.named("film") if h == "always" and p in outer]
+    one = (_history(context, "always", np.ones((1, 1))),)
+    batches = []
+    if groups := [(f"films.{p}", [c]) for p, h, c in context.named("group") if h == "always"]:
+        batches.append(_batch(context, "film_gain", "group", "1", groups, one, 0, 0.2))
+    if surfaces:
+        batches.append(_batch(context, "film_gain", "film", "W/(m^2*K)", surfaces, one, 0, 1.0))
+    return batches
+
+
+def forced_convection(context: Context) -> list[Batch]:
+    """Films and surfaces, with every speed."""
+    batches = []
+    for kind, prefix in (("group_film", "films."), ("film", "")):
+        speeds = context.elements.histories.speeds
+        rows: dict[str, list[int]] = {}
+        for p, h, c in context.named(kind):
+            if h in speeds:
+                rows.setdefault(prefix + p, []).append(c)
+        if rows and speeds:
+            histories = [_history(context, name, np.eye(len(speeds))[[i]]) for i, name in enumerate(speeds)]
+            batches.append(
+                _batch(context, "forced_convection", kind, "W/(m^2*K)", list(rows.items()), histories, 1, 1.0)
+            )
+    return batches
+
+
+def heat_source(context: Context) -> list[Batch]:
+    """Everywhere: always, with every load signal, and in every window."""
+    signals, blocks = context.elements.histories.signals, context.elements.block_of
+    n = len(signals) + len(context.elements.histories.blocks)
+    histories = [_history(context, name, np.eye(n)[[i]]) for i, name in enumerate(signals)]
+    histories += [
+        History(name, _wide(w, len(signals), n)[None], windows=windows) for name, w, windows in _stretches(context)
+    ]
+    rows = [
+        (p.name, [*(context.index["heat", p.name, s] for s in signals), *blocks["heat", p.name]])
+        for p in context.study.bench.places
+    ]
+    return [_batch(context, "heat_source", "heat", "W", rows, histories, 1, 1.0)]
+
+
+def loss_law(context: Context) -> list[Batch]:
+    """Gains of sources, and other shapes at their places."""
+    one = (_history(context, "always", np.ones((1, 1))),)
+    gains = [(path.removesuffix(".gain"), [c]) for path, _, c in context.named("gain") if path.startswith("sources.")]
+    batches = [_batch(context, "loss_law", "gain", "1", gains, one, 0, 0.15)] if gains else []
+    for name in dict.fromkeys(h for _, h, _ in context.named("source")):
+        rows = [(f"sources.{p}", [c]) for p, h, c in context.named("source") if h == name]
+        batches.append(
+            _batch(context, "loss_law", "source", "W", rows, (_history(context, name, np.ones((1, 1))),), 0, 1.0)
+        )
+    return batches
+
+
+def joint(context: Context) -> list[Batch]:
+    """Every contact: always, and from every hour on."""
+    batches = []
+    lasting = [_always(context), *_lasting(context)]
+    histories = [History(name, w[None], windows=windows) for name, w, windows in lasting]
+    for kind in ("joint", "contact"):
+        rows = [(f"contacts.{p}", list(c)) for (k, p), c in context.elements.block_of.items() if k == kind]
+        if rows:
+            batches.append(_batch(context, "joint", kind, "1", rows, histories, 0, 0.3))
+    return batches
+
+
+def zone(context: Context) -> list[Batch]:
+    """Air of environments and films, draughts, gradients: always and in every window."""
+    windows = [_always(context), *_stretches(context)]
+    histories = [History(name, w[None], windows=own) for name, w, own in windows]
+    batches = []
+    for kind, prefix, unit, smallest in (("air", "environment.", "K", 0.3), ("zone", "films.", "K", 0.5)):
+        rows = [(prefix + p, list(c)) for (k, p), c in context.elements.block_of.items() if k == kind]
+        if rows:
+            batches.append(_batch(context, "zone", kind, unit, rows, histories, 0, smallest))
+    gradients = [(f"environment.{p}", [c]) for p, _, c in context.named("gradient")]
+    if gradients:
+        one = (_history(context, "always", np.ones((1, 1))),)
+        batches.append(_batch(context, "zone", "gradient", "K/m", gradients, one, 0, 0.3))
+    return batches
+
+
+def sun(context: Context) -> list[Batch]:
+    """Bells on every outer surface, at the same hours of every run, an amplitude per run."""
+    study, blocks = context.study, context.elements.histories.blocks
+    n_runs = len(study.fitted)
+    hours = []
+    for i, start, end in blocks:
+        dt = study.runs[study.fitted[i]].run.drive.time[1] / 1.0 - study.runs[study.fitted[i]].run.drive.time[0]
+        hours.append((start + end) / 2 * dt / 3600.0)
+    longest = max(hours) if hours else 0.0
+    histories = []
+    for length in BELLS:
+        for centre in np.arange(length / 2, longest + 1.0, 1.0):
+            weights = np.zeros((n_runs, len(blocks)))
+            windows = []
+            for b, (i, start, end) in enumerate(blocks):
+                level = float(np.cos(np.pi * np.clip((hours[b] - centre) / length, -0.5, 0.5)))
+                weights[i, b] = level
+                run = study.runs[study.fitted[i]].run
+                dt = run.drive.time[1] - run.drive.time[0]
+                if level > 0.01:
+                    windows.append(Window(run.name, start * dt, end * dt, level))
+            if (np.abs(weights).sum(axis=1) > 0).all():
+                name = f"{max(centre - length / 2, 0):.0f} to {centre + length / 2:.0f} h of every run"
+                histories.append(History(name, weights, windows=tuple(windows)))
+    rows = [(p.name, list(context.elements.block_of["heat", p.name])) for p in context.outer]
+    return [_batch(context, "sun", "heat", "W", rows, histories, 1, 2.0)] if histories and rows else []
+
+
+def coolant(context: Context) -> list[Batch]:
+    """A film to a medium of its own temperature, in every window."""
+    blocks = context.elements.block_of
+    n = len(context.elements.histories.blocks)
+    histories = [
+        History(name, np.stack([_wide(w, 0, 2 * n), _wide(w, n, 2 * n)]), windows=windows)
+        for name, w, windows in _windows(context)
+    ]
+    rows = [(p.name, [*blocks["film", p.name], *blocks["heat", p.name]]) for p in context.outer]
+    return [_batch(context, "coolant", "coolant", "W/(m^2*K)", rows, histories, 1, 5.0)] if rows else []
+
+
+def sensor(context: Context) -> list[Batch]:
+    """Offset, drift, lag, lost contact of every sensor; every pair swapped."""
+    one = {kind: (History(kind, np.ones((1, 1))),) for kind in ("offset", "drift", "lag", "detached", "swapped")}
+    result = []
+    for kind, unit, sign, smallest in (
+        ("offset", "K", 0, 0.15), ("drift", "K/day", 0, 0.1), ("lag", "s", 1, 120.0), ("detached", "1", 1, 0.05),
+        ("swapped", "1", 1, 0.0),
+    ):  # fmt: skip
+        rows = [(f"sensors.{p}", [c]) for p, _, c in context.named(kind)]
+        if rows:
+            result.append(_batch(context, "sensor", kind, unit, rows, one[kind], sign, smallest, kind == "swapped"))
+    return result
+
+
+def signal(context: Context) -> list[Batch]:
+    """Exact factors of load signals; the clock of each run."""
+    rows = [(f"signals.{p}", [c]) for p, _, c in context.named("signal")]
+    clocks = [(f"runs.{p}", [c]) for p, _, c in context.named("clock")]
+    result = []
+    if rows:
+        one = (History("factor", np.ones((1, 1))),)
+        result.append(_batch(context, "signal", "signal", "1", rows, one, 1, 0.0, True))
+    if clocks:
+        result.append(_batch(context, "signal", "clock", "s", clocks, (History("clock", np.ones((1, 1))),), 0, 30.0))
+    return result
+
+
+def scale_expansion(context: Context) -> list[Batch]:
+    """Every axis with every part."""
+    return _single(context, "scale_expansion", "scale", "1/K", 0, 3e-7)
+
+
+def expansion(context: Context) -> list[Batch]:
+    """Every part, every material."""
+    one = (History("always", np.ones((1, 1))),)
+    gains = [(p, [c]) for p, _, c in context.named("gain") if p.endswith(".expansion")]
+    whole = "parts." if any(p.surfaces for p in context.study.bench.places) else "tcp.expansion."  # of lumped machines
+    parts = [(whole + p, [c]) for p, _, c in context.named("expansion")]
+    result = [_batch(context, "expansion", "expansion", "1", parts, one, 0, 0.05)] if parts else []
+    return result + ([_batch(context, "expansion", "gain", "1", gains, one, 0, 0.05)] if gains else [])
+
+
+def slip(context: Context) -> list[Batch]:
+    """Every TCP component."""
+    return _prefixed(_single(context, "slip", "slip", "m", 1, 1e-6), "tcp.")
+
+
+def capacity(context: Context) -> list[Batch]:
+    """Every surface."""
+    return _single(context, "capacity", "capacity", "J/K", 1, 2000.0)
+
+
+def initial_state(context: Context) -> list[Batch]:
+    """Every run and part."""
+    return _prefixed(_single(context, "initial_state", "start", "K", 0, 0.2), "runs.")
+
+
+def measurement(context: Context) -> list[Batch]:
+    """Drift, frame, growth within a measurement."""
+    result = []
+    for kind, history, unit, smallest in (
+        ("probe", "drift", "m/s", 1e-6 / 43200), ("frame", "frame", "1", 2e-6), ("heated", "heating", "m", 1e-6),
+    ):  # fmt: skip
+        rows = [(f"tcp.{p}", [c]) for p, _, c in context.named(kind)]
+        if rows:
+            one = (History(history, np.ones((1, 1))),)
+            result.append(_batch(context, "measurement", kind, unit, rows, one, 0, smallest))
+    return result
+
+
+def misplaced_source(context: Context) -> list[Batch]:
+    """Every surface source to every face of its part."""
+    return _prefixed(_single(context, "misplaced_source", "moved", "1", 1, 0.2), "sources.")
+
+
+def not_thermal(context: Context) -> list[Batch]:
+    """Steps and load-proportional displacements."""
+    rows: dict[str, list[tuple[str, int]]] = {}
+    for place, history, column in context.named("step"):
+        rows.setdefault(place, []).append((history, column))
+    result = []
+    study = context.study
+    if rows:
+        names = [h for h, _ in next(iter(rows.values()))]
+        n = len(names)
+        histories = []
+        for i, name in enumerate(names):
+            r, start = name.split(":")
+            run = study.runs[study.fitted[int(r)]].run
+            windows = (Window(run.name, float(start), float(run.drive.time[-1] - run.drive.time[0])),)
+            histories.append(
+                History(f"step at {float(start) / 3600:.1f} h of {run.name}", np.eye(n)[[i]], windows=windows)
+            )
+        of_place = [(f"tcp.{p}", [c for _, c in own]) for p, own in rows.items()]
+        result.append(_batch(context, "not_thermal", "step", "m", of_place, histories, 0, 2e-6))
+    loads = [(f"tcp.{p}", [c]) for p, _, c in context.named("load")]
+    if loads:
+        result.append(
+            _batch(context, "not_thermal", "load", "m per unit", loads, (History("load", np.ones((1, 1))),), 0, 0.0)
+        )
+    return result
+
+
+def _prefixed(batches: list[Batch], prefix: str) -> list[Batch]:
+    from dataclasses import replace
+
+    return [replace(b, places=tuple(prefix + p for p in b.places)) for b in batches]

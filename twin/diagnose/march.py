@@ -1,0 +1,282 @@
+"""The window model stepped through a run with hypotheses switched on: states and exact derivatives.
+
+As `twin.calibrate.march`, with three differences. Loads keep their own fine steps (60 s) inside a coarse one (300 s)
+that shares its matrix: a switched load stays sharp at a fifth of the factorisations. A fine step is a two-stage SDIRK
+step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one matrix for both stages), as implicit Euler
+of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold what the description lacks, each times an
+amplitude a_k that is differentiated like a parameter:
+
+    (E + sum a_k E_k) x' = -(A(theta (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
+                           + ... + sum a_k (gate_k rise_k M_k + forcing_k),      T_air + sum a_k environment_k
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import twin.run.jax_setup  # noqa: F401  isort: skip
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jax.scipy.linalg import cho_solve
+
+from twin.calibrate.effects import Effects, contact_names, factors
+from twin.calibrate.march import Places, Rows
+from twin.rom.drive import Drive
+from twin.rom.following import FilmPlan, difference_place, film_state, read_table, temperature_place
+from twin.rom.model import MachineModel
+from twin.run.stepping import inputs_of
+from twin.run.system import Array, Layout, System
+
+INNER = 5  # fine steps in a coarse one
+GAMMA = 1.0 - 0.5**0.5  # SDIRK2
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Loads:
+    """A run; n coarse steps of m fine ones."""
+
+    rate: Array  # (n,) 1/s of the fine steps
+    theta: Array  # (n, n_theta) W/(m^2 K): convection of films that read the log alone, then joints
+    film_table: Array  # (n, k, 65) W/(m^2 K) over DIFFERENCES
+    diagonal: Array  # (n, c, n_ports) W/K, as `twin.calibrate.march.Loads`
+    neighbour: Array  # (n, c, n_ports)
+    weight: Array  # (n, n_pairs, n_segments)
+    environment: Array  # (n, m, n_environments) degC
+    power: Array  # (n, m, n_sources) W
+    power_table: Array  # (n, m, l, 121) W over TEMPERATURES
+    contact_heat: Array  # (n, m, s, r) W, projected
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Slots:
+    """K hypotheses in window coordinates, as unit amplitudes."""
+
+    A: Array  # (K, r, r) per W/(m^2 K)
+    M: Array  # (K, r)
+    E: Array  # (K, r, r)
+    gate: Array  # (n, K): of A and M
+    rise: Array  # (n, m, K) K: medium of M above the reference temperature
+    forcing: Array  # (n, m, K, r)
+    film: Array  # (n, K, n_films): relative change of the convection of films
+    joint: Array  # (n, K, n_joints)
+    contact: Array  # (n, K, n_contacts)
+    environment: Array  # (n, m, K, n_environments) K
+    initial: Array  # (K, r)
+
+
+def no_slots(n: int, m: int, K: int, r: int, model: MachineModel) -> Slots:
+    """Slots that do nothing, as numpy arrays to be filled."""
+    load = model.load_model
+    return Slots(
+        A=np.zeros((K, r, r)), M=np.zeros((K, r)), E=np.zeros((K, r, r)), gate=np.zeros((n, K)),
+        rise=np.zeros((n, m, K)), forcing=np.zeros((n, m, K, r)), film=np.zeros((n, K, len(load.films))),
+        joint=np.zeros((n, K, len(load.joints))), contact=np.zeros((n, K, len(contact_names(model)))),
+        environment=np.zeros((n, m, K, len(load.environments))), initial=np.zeros((K, r)),
+    )  # fmt: skip
+
+
+def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> Loads:
+    """The loads of a run, from a drive of fine steps whose number is a multiple of m, for a model of one body."""
+    (body,) = model.bodies
+    names, pairs = contact_names(model), model.load_model.pairs
+    n = drive.n_steps // m
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return values.reshape(n, m, *values.shape[1:]).mean(axis=1)
+
+    def inner(values: np.ndarray) -> np.ndarray:
+        return values.reshape(n, m, *values.shape[1:])
+
+    own = []
+    for name in names:
+        mask = np.array([p.contact == name for p in pairs])
+        own.append(inputs_of(model.load_model, replace(drive, conductance=drive.conductance * mask), 1))
+    inputs = inputs_of(model.load_model, drive, 1)
+    none = np.zeros((n, 0, len(model.load_model.ports)))
+    return Loads(
+        rate=np.full(n, 1.0 / (drive.time[1] - drive.time[0])),
+        theta=mean(drive.theta),
+        film_table=mean(drive.films.value),
+        diagonal=np.stack([mean(np.asarray(i.contact_diagonal)) for i in own], axis=1) if own else none,
+        neighbour=np.stack([mean(np.asarray(i.contact_neighbour)) for i in own], axis=1) if own else none,
+        weight=mean(np.asarray(inputs.contact_weight)),
+        environment=inner(drive.environment),
+        power=inner(drive.power),
+        power_table=inner(drive.losses.value),
+        contact_heat=inner(drive.contact_heat @ body.P.T),
+    )
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Factors:
+    """What the parameters make of a model."""
+
+    source: jax.Array
+    film: jax.Array
+    joint: jax.Array
+    contact: jax.Array
+    environment: jax.Array
+    capacity: jax.Array
+
+
+def factors_at(effects: Effects, u: jax.Array) -> Factors:
+    """At u (n,), see `twin.calibrate.effects`."""
+    return Factors(
+        factors(effects.source, u), factors(effects.film, u), factors(effects.joint, u), factors(effects.contact, u),
+        jnp.asarray(effects.environment) @ u, factors(effects.capacity, u),
+    )  # fmt: skip
+
+
+def _gamma(places: Places, loads: Loads, contact: jax.Array, n_ports: int) -> jax.Array:
+    """Gamma (n_ports, n_ports) W/K of one step with the contacts scaled by contact (c,)."""
+    diagonal = contact @ jnp.asarray(loads.diagonal)
+    beside = (contact @ jnp.asarray(loads.neighbour))[:-1]
+    gamma = jnp.diag(diagonal)
+    i = np.arange(n_ports - 1)
+    gamma = gamma.at[i, i + 1].add(beside).at[i + 1, i].add(beside)
+    for k, c in enumerate(places.contact_of_pair):
+        pad, first, count = places.pad[k], places.first[k], places.count[k]
+        w = contact[c] * loads.weight[k, :count]
+        gamma = gamma.at[pad, first : first + count].add(-w).at[first : first + count, pad].add(-w)
+    return gamma
+
+
+def _step(
+    layout: Layout, places: Places, derivative: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
+    fixed: tuple[Array, Array, Array], z: jax.Array, now: tuple[Loads, Slots],
+) -> tuple[jax.Array, jax.Array]:  # fmt: skip
+    """The state after one coarse step, and those after its fine ones (m, r)."""
+    loads, slots = now
+    A_slots, M_slots, E_slots = (jnp.asarray(x) for x in fixed)
+    n, T_ref, r = layout.n_films, system.reference_temperature, z.shape[0]
+    following, losing = np.array(layout.following_films, dtype=int), np.array(layout.following_losses, dtype=int)
+    environment = jnp.asarray(loads.environment) + f.environment + jnp.einsum("k,mke->me", a, slots.environment)
+    film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
+    # films follow the state and the mean air at the step's start
+    plan = FilmPlan(
+        system.film_environment, system.film_radiant, system.film_emissivity, system.film_gradient, system.film_height
+    )
+    area = jnp.where(system.film_area > 0.0, system.film_area, 1.0)
+    surface = T_ref + (system.film_rows @ z) / area
+    convection = jnp.asarray(loads.theta)[:n]
+    if len(following):
+        air = plan.air(environment.mean(axis=0), system.film_moment / area)[following]
+        read = read_table(jnp, jnp.asarray(loads.film_table), difference_place(jnp, surface[following] - air))
+        convection = convection.at[following].set(read)
+    convection = convection * film_factor
+
+    def read_films(air: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+        state = film_state(jnp, plan, convection, surface, air, jnp.array(1.0))
+        return state.total, state.outer, state.lift
+
+    totals, outer, lift = jax.vmap(read_films)(environment)
+    total = totals.mean(axis=0)
+    joint_factor = f.joint * jnp.maximum(1.0 + a @ jnp.asarray(slots.joint), 0.02)
+    joints = jnp.asarray(loads.theta)[n:] * joint_factor
+    coefficients = jnp.concatenate([total, joints]) - jnp.asarray(system.nominal)
+    contact = f.contact * jnp.maximum(1.0 + a @ jnp.asarray(slots.contact), 0.02)
+    terms, P, rate = jnp.asarray(system.A[0]), jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / GAMMA
+    gate = a * jnp.asarray(slots.gate)
+
+    def E(x: jax.Array) -> jax.Array:
+        return x + jnp.tensordot(f.capacity - 1.0, jnp.asarray(effects.E) @ x, 1) + jnp.tensordot(a, E_slots @ x, 1)
+
+    def S(x: jax.Array) -> jax.Array:
+        gamma = _gamma(places, loads, contact, P.shape[1])
+        inside = jnp.asarray(system.A0[0]) @ x + coefficients @ (terms @ x) + gate @ (A_slots @ x)
+        return rate * E(x) + inside + P @ (gamma @ (P.T @ x))
+
+    held = jax.tree.map(lax.stop_gradient, (coefficients, f.capacity, contact, a, gate))
+    matrix = rate * jnp.eye(r) + jnp.asarray(system.A0[0]) + jnp.tensordot(held[0], terms, 1)
+    matrix = matrix + rate * jnp.tensordot(held[1] - 1.0, jnp.asarray(effects.E), 1)
+    matrix = matrix + jnp.tensordot(held[4], A_slots, 1) + rate * jnp.tensordot(held[3], E_slots, 1)
+    matrix = matrix + P @ _gamma(places, loads, held[2], P.shape[1]) @ P.T
+    factor = jnp.linalg.cholesky(matrix)
+    inverse = cho_solve((factor, True), jnp.eye(r)) if derivative else jnp.zeros((0, 0))
+
+    def solve(known: jax.Array) -> jax.Array:
+        if not derivative:
+            return jnp.asarray(cho_solve((factor, True), known))
+        solved = lax.stop_gradient(inverse @ lax.stop_gradient(known))
+        return solved + inverse @ (known - S(solved))
+
+    tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
+    winding = T_ref + system.source_rows @ z
+
+    def fine(x: jax.Array, i: jax.Array) -> tuple[jax.Array, jax.Array]:
+        power = jnp.asarray(loads.power)[i] * f.source
+        if len(losing):
+            power = power.at[losing].set(read_table(jnp, tables[i], temperature_place(jnp, winding)))
+        ports = jnp.tensordot(f.source[np.array(places.sources, dtype=int)], jnp.asarray(loads.contact_heat)[i], 1)
+        forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + system.B @ power + ports
+        forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ M_slots + a @ jnp.asarray(slots.forcing)[i]
+        middle = solve(rate * E(x) + forcing)
+        after = solve(rate * E(x + (1.0 - GAMMA) / GAMMA * (middle - x)) + forcing)
+        return after, after
+
+    m = loads.environment.shape[0]
+    return lax.scan(fine, z, jnp.arange(m))
+
+
+def trajectory(
+    layout: Layout, places: Places, derivative: bool, system: System, effects: Effects, loads: Loads, slots: Slots,
+    start: Array, v: Array,
+) -> jax.Array:  # fmt: skip
+    """States (n m + 1, r) at the fine steps from start (r,); v: parameters u of the machine, then amplitudes a (K,)."""
+    n = effects.source.shape[1]
+    v = jnp.asarray(v)
+    u, a = v[:n], v[n:]
+    f = factors_at(effects, u)
+    z0 = jnp.asarray(start) + a @ jnp.asarray(slots.initial)
+    fixed = (slots.A, slots.M, slots.E)
+    steps = replace(slots, A=jnp.zeros(len(loads.rate)), M=jnp.zeros(len(loads.rate)), E=jnp.zeros(len(loads.rate)),
+                    initial=jnp.zeros(len(loads.rate)))  # fmt: skip
+    one = partial(_step, layout, places, derivative, system, effects, f, a, fixed)
+    _, states = lax.scan(one, z0, (loads, steps))
+    return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0])])
+
+
+def outputs_of(
+    layout: Layout, places: Places, derivative: bool, from_first: bool, system: System, effects: Effects, loads: Loads,
+    slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
+) -> jax.Array:  # fmt: skip
+    """Means of sensors over bins (b s,) [degC], then TCP rows (k 3,) [m]."""
+    from twin.calibrate.march import displacements, temperatures
+
+    states = trajectory(layout, places, derivative, system, effects, loads, slots, start, v)
+    mean_of, column = bins
+    T = jnp.asarray(mean_of) @ temperatures(system, states)[:, column]
+    w = displacements(effects, rows, states, jnp.asarray(v))
+    return jnp.concatenate([T.ravel(), (w - w[0] if from_first else w).ravel()])
+
+
+outputs = partial(jax.jit, static_argnums=(0, 1, 2, 3))(outputs_of)
+states_of = partial(jax.jit, static_argnums=(0, 1, 2))(trajectory)
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def jacobian(layout: Layout, places: Places, from_first: bool, *rest: object) -> jax.Array:
+    """Derivatives (b s + k 3, n + K) of `outputs_of` by v."""
+    return jax.jacfwd(partial(outputs_of, layout, places, True, from_first), argnums=len(rest) - 1)(*rest)
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def by_amplitudes(
+    layout: Layout, places: Places, from_first: bool, system: System, effects: Effects, loads: Loads, slots: Slots,
+    rows: Rows, bins: tuple[Array, Array], start: Array, u: Array, a: Array,
+) -> tuple[jax.Array, jax.Array]:  # fmt: skip
+    """Derivatives (b s + k 3, K) of `outputs_of` by the amplitudes alone, and the outputs."""
+
+    def both(a: jax.Array) -> tuple[jax.Array, jax.Array]:
+        v = jnp.concatenate([jnp.asarray(u), a])
+        y = outputs_of(layout, places, True, from_first, system, effects, loads, slots, rows, bins, start, v)
+        return y, y
+
+    return jax.jacfwd(both, has_aux=True)(jnp.asarray(a))

@@ -1,0 +1,233 @@
+"""Synthetic measurements of a machine without any hidden cause, by a model that differs from the twin in its form.
+
+On the user's own loads: parameters drawn from their tolerances, and besides them everything that no parameter stands
+for: coefficients that differ from face to face and with load, heat that enters partly beside where it is described,
+sensors some millimetres off and with their own reading of every source, air that fluctuates locally, parts that do not
+start equally warm, white noise. What the twin's calibration leaves of these measurements is the yardstick of every
+statistic: form errors are learned from some of them, thresholds from the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.diagnose.march import INNER, Slots
+from twin.diagnose.study import Study
+from twin.run.system import Array
+
+
+@dataclass(frozen=True)
+class Form:
+    """How wrong the form of a description may be; standard deviations."""
+
+    local_film: float = 0.15  # of each face's coefficient against its group's
+    shape: float = 0.08  # of a film group's coefficient, slowly varying within a run
+    wind: float = 0.30  # of a film group's coefficient at the top speed of its law against that at rest
+    beside: float = 0.02  # share of a source's heat that enters another face of its part
+    aside: float = 0.5  # of 8 mm, by which sensors are off
+    reading: float = 0.03  # of what every source and every contact does to every channel
+    air: float = 0.15  # K, fluctuation of a zone's air
+    air_time: float = 1500.0  # s, its memory
+    start: float = 0.10  # K, of the bodies' initial temperatures
+    offset: float = 0.05  # K, of sensors
+    tcp_zero: float = 0.3e-6  # m
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """White noise of single readings."""
+
+    temperature: float = 0.1  # K
+    tcp: float = 1e-6  # m
+
+
+def null(
+    study: Study, J: list[np.ndarray], seed: int, instruments: Instruments, form: Form = Form(), spread: float = 0.6
+) -> np.ndarray:
+    """Measurements (m,) of the fitted runs without a cause; NaN where the plan has none. J: nominal Jacobians by run.
+
+    spread: of the parameters, in prior standard deviations.
+    """
+    rng = np.random.default_rng([seed, 17])
+    bench = study.bench
+    x = spread * np.clip(rng.standard_normal(len(bench.parameters)), -2.5, 2.5)
+    (body,) = bench.base.bodies
+    load = bench.base.load_model
+    local = np.clip(form.local_film * rng.standard_normal(len(bench.places)), -0.8, 0.8)
+    split = [_beside(study, j, rng, form) for j in range(len(load.sources))]
+    zone_phase = rng.uniform(0.0, 2 * np.pi, len(load.films))
+    shape = form.shape * rng.standard_normal(len(load.films))
+    wind = form.wind * rng.standard_normal(len(load.films))
+    readings = _readings(study, J, rng, form)
+    aside = form.aside * rng.standard_normal(len(bench.base.sensors))
+    offset = form.offset * rng.standard_normal(len(bench.base.sensors))
+    parts = []
+    for i, k in enumerate(study.fitted):
+        planned = study.runs[k]
+        slots = study.slots(k)
+        n = slots.gate.shape[0]
+        run = planned.run
+        films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in bench.places])
+        air = run.drive.environment.reshape(n, INNER, -1)
+        typical = _typical(study, k)
+        A, M, rise = np.zeros_like(body.A0), np.zeros(body.n), np.zeros((n, INNER))
+        for p in np.flatnonzero(films >= 0):
+            strength = local[p] * typical[films[p]]
+            A += strength * bench.A[p]
+            M += strength * bench.M[p]
+        surround = air[:, :, load.surroundings] - bench.base.reference_temperature
+        rise[:] = surround
+        hours = (np.arange(n) * INNER * (run.drive.time[1] - run.drive.time[0]) / 3600.0)[:, None]
+        period = rng.uniform(3.0, 9.0, len(load.films))
+        wobble = shape * np.sin(2 * np.pi * hours / period + zone_phase) + wind * _winds(study, k, n)
+        forcing = np.zeros((n, INNER, body.n))
+        for j, vector in enumerate(split):
+            if vector is not None:
+                forcing += _power(study, k, j)[:, :, None] * vector
+        fluctuation = _ornstein(rng, n * INNER, len(load.environments), form.air_time / 60.0) * form.air
+        initial = form.start * rng.standard_normal() * body.one if not run.stated_start else np.zeros(body.n)
+        initial = initial + 0.3 * form.start * _body_starts(study, rng)
+        filled = Slots(
+            A=_first(slots.A, A), M=_first(slots.M, M), E=slots.E, gate=_gate(slots.gate),
+            rise=_column(slots.rise, rise), forcing=_fill(slots.forcing, forcing), film=_row(slots.film, wobble),
+            joint=slots.joint, contact=slots.contact,
+            environment=_fill(slots.environment, fluctuation.reshape(n, INNER, -1)),
+            initial=_first(slots.initial, initial),
+        )  # fmt: skip
+        m = planned.measured
+        states = study.states(k, x, filled, (1.0,))
+        T, w = study.read(k, states, x)
+        own_T, own_w = planned.split(readings[i])
+        T, w = T + own_T, w + own_w
+        moved = m.mean_of @ (states @ (bench.ghosts - body.C).T)[:, m.column]
+        count = np.where(m.count > 0, m.count, 1.0)
+        T = T + aside[m.column] * moved + offset[m.column]
+        T = T + instruments.temperature / np.sqrt(count) * rng.standard_normal(T.shape)
+        row_sigma = instruments.tcp / m.row_weight(instruments.tcp)
+        w = w + row_sigma[:, None] * rng.standard_normal(w.shape) + form.tcp_zero * rng.standard_normal(3)
+        parts.append(np.concatenate([T.ravel(), w.ravel()]))
+    return np.concatenate(parts)
+
+
+def _first(zeros: Array, value: np.ndarray) -> np.ndarray:
+    result = np.array(zeros)
+    result[0] = value
+    return result
+
+
+def _gate(zeros: Array) -> np.ndarray:
+    result = np.array(zeros)
+    result[:, 0] = 1.0
+    return result
+
+
+def _column(zeros: Array, value: np.ndarray) -> np.ndarray:
+    result = np.array(zeros)
+    result[:, :, 0] = value
+    return result
+
+
+def _fill(zeros: Array, value: np.ndarray) -> np.ndarray:
+    result = np.array(zeros)
+    result[:, :, 0] = value
+    return result
+
+
+def _row(zeros: Array, value: np.ndarray) -> np.ndarray:
+    result = np.array(zeros)
+    result[:, 0] = value
+    return result
+
+
+def _ornstein(rng: np.random.Generator, n: int, columns: int, memory: float) -> np.ndarray:
+    """Unit Ornstein-Uhlenbeck noise (n, columns) with a memory of so many steps."""
+    phi = float(np.exp(-1.0 / memory))
+    white = rng.standard_normal((n, columns))
+    result = np.empty_like(white)
+    state = white[0]
+    for i in range(n):
+        state = phi * state + np.sqrt(1 - phi**2) * white[i]
+        result[i] = state
+    return result
+
+
+def _winds(study: Study, k: int, n: int) -> np.ndarray:
+    """(n, n_films) 0 .. 1: how fast the air of each film moves, as its law hears; 0 for films that hear no speed."""
+    load, run = study.bench.base.load_model, study.runs[k].run
+    units = {s.name: s.unit for s in load.signals}
+    result = np.zeros((n, len(load.films)))
+    for f, film in enumerate(load.films):
+        for signal in film.use.signals.values():
+            values = run.signals.get(signal)
+            if units.get(signal) in ("m/s", "1/s") and values is not None and np.any(values):
+                result[:, f] = (np.abs(values) / np.abs(values).max()).reshape(n, INNER).mean(axis=1)
+    return result
+
+
+def _typical(study: Study, k: int) -> np.ndarray:
+    """(n_films,) W/(m^2 K): the mean convection of each film in a run, at a rise of a few kelvin."""
+    drive = study.runs[k].run.drive
+    load = study.bench.base.load_model
+    result = drive.theta[:, : len(load.films)].mean(axis=0)
+    middle = drive.films.value.shape[2] // 2 + 15
+    result[list(drive.films.index)] = drive.films.value[:, :, middle].mean(axis=0)
+    return result
+
+
+def _power(study: Study, k: int, source: int) -> np.ndarray:
+    """(n, m) W of a source in a run, at a winding of 30 degC where its law follows one."""
+    drive = study.runs[k].run.drive
+    if source in drive.losses.index:
+        i = drive.losses.index.index(source)
+        place = int(np.searchsorted(drive.losses.grid, 30.0))
+        power = drive.losses.value[:, i, place]
+    else:
+        power = drive.power[:, source]
+    return power.reshape(-1, INNER)
+
+
+def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> np.ndarray | None:
+    """What of 1 W of a source enters elsewhere: (r,); None for contacts and machines without places beside it."""
+    bench = study.bench
+    (body,) = bench.base.bodies
+    if bench.base.load_model.sources[source].contact:
+        return None
+    B = body.B[:, body.sources.index(source)]
+    own = int(np.argmax([abs(B @ b) / np.linalg.norm(b) for b in bench.B]))
+    members = set(bench.places[own].members)
+    near = [p for p, place in enumerate(bench.places)
+            if set(place.members) & members and p != own and not place.name.startswith("contacts.")]  # fmt: skip
+    share = abs(form.beside * rng.standard_normal())
+    if not near:
+        return None
+    closeness = np.array([max(float(bench.B[p] @ B), 0.0) for p in near]) + 1e-12
+    chosen = int(rng.choice(len(near), p=closeness / closeness.sum()))
+    return np.asarray(share * (bench.B[near[chosen]] - B))
+
+
+def _body_starts(study: Study, rng: np.random.Generator) -> np.ndarray:
+    """(r,) the members by a random kelvin each."""
+    (body,) = study.bench.base.bodies
+    if body.E_members is None:
+        return np.zeros(body.n)
+    weights = rng.standard_normal(len(body.members))
+    return np.asarray(np.tensordot(weights, body.E_members @ body.one, 1))
+
+
+def _readings(study: Study, J: list[np.ndarray], rng: np.random.Generator, form: Form) -> list[np.ndarray]:
+    """Per fitted run (size,): each channel's own error of what every source and contact does to it."""
+    sources = [i for i, p in enumerate(study.bench.parameters) if p.kind in ("source", "contact", "joint")]
+    sigma = study.scale[sources]
+    names = study.bench.base.sensors
+    of_sensor = form.reading * rng.standard_normal((len(names), len(sources)))
+    of_tcp = form.reading * rng.standard_normal((3, len(sources)))
+    result = []
+    for jac, k in zip(J, study.fitted, strict=True):
+        planned = study.runs[k]
+        T, w = planned.split(jac[:, sources] / sigma)
+        T = T * of_sensor[planned.measured.column]
+        w = w * of_tcp
+        result.append(np.concatenate([T.sum(axis=2).ravel(), w.sum(axis=2).ravel()]))
+    return result

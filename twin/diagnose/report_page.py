@@ -1,0 +1,267 @@
+"""The report of a diagnosis: index.html, which needs nothing beside it, and report.json."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from twin.atomic import atomic_path, check_folder
+from twin.diagnose.diagnosis import Diagnosis
+from twin.diagnose.report_evidence import candidates_picture, cosine_picture, nulls_picture, pulls_picture
+from twin.diagnose.report_gain import gain_picture, overlay_picture, sealed_series, unknown_picture
+from twin.diagnose.report_pictures import Picture, inline_svg, rms
+from twin.diagnose.report_residuals import RUNS, by_load_state, residual_map, whiteness_picture
+from twin.diagnose.report_style import STYLE
+from twin.diagnose.report_tables import (
+    causes_table,
+    families_table,
+    gain_table,
+    limits_table,
+    pulls_table,
+    rivals_table,
+    table,
+)
+from twin.diagnose.report_text import (
+    beyond,
+    evidence_sentence,
+    gain_sentences,
+    limit_words,
+    place_words,
+    remedies,
+    summary_lines,
+    verdict_sentence,
+    what,
+)
+
+__all__ = ["page", "summary_lines", "write_report"]
+
+_LABELS = {
+    "named": "cause named",
+    "ambiguous": "ambiguous",
+    "unknown": "unknown heat",
+    "out_of_tolerance": "out of tolerance",
+    "sensor": "sensor at fault",
+    "signal": "signal at fault",
+    "nothing": "nothing found",
+}
+# What follows from a verdict, for who acts on it
+_FOLLOWS = {
+    "named": "The extended model whose gain is shown below holds this.",
+    "ambiguous": "The data allow more than one edit of the description; what to measure next is said below.",
+    "unknown": "Where the heat enters is known, its law is not; look below at when it comes.",
+    "out_of_tolerance": "The structure of the model holds; the declared values do not, or an effect hides in them.",
+    "sensor": "The model of the machine is left as it is; correct the channel, or leave it out, before you calibrate.",
+    "signal": "The laws of the machine are left as they are; correct what is logged or how it is declared.",
+    "nothing": "The model of the machine is left as it is. An effect below the following sizes could still be there.",
+}
+
+
+def write_report(diagnosis: Diagnosis, folder: Path) -> None:
+    """Write index.html and report.json into `folder`, each whole or not at all.
+
+    report.json is `Diagnosis.to_json` with null where a number is not finite.
+    Raises TwinError where the folder cannot be written.
+    """
+    check_folder(Path(folder))
+    facts = json.dumps(plain(diagnosis.to_json()), indent=1, allow_nan=False, ensure_ascii=False)
+    for name, text in (("index.html", page(diagnosis)), ("report.json", facts + "\n")):
+        with atomic_path(Path(folder) / name) as temporary:
+            # a lone surrogate of an odd file name must not lose the report
+            temporary.write_text(text, encoding="utf-8", errors="replace")
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON knows it: lists, dicts with text keys, None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(v) for key, v in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, Iterable):
+        return [plain(v) for v in value]
+    return str(value)
+
+
+def page(d: Diagnosis) -> str:
+    """The whole page."""
+    count = 0
+
+    def show(*pictures: Picture | None) -> str:
+        nonlocal count
+        shown = []
+        for picture in pictures:
+            if picture is None:
+                continue
+            count += 1
+            shown.append(_figure(picture, f"p{count}"))
+        return "\n".join(shown)
+
+    sections = [
+        ("evidence", "What it rests on", _evidence(d)),
+        ("gain", "Gain on the sealed run", _gain(d, show)),
+        ("residuals", "Residuals", _residuals(d, show)),
+        ("decision", "How it was decided", _decision(d, show)),
+        ("pulls", "Pulls", _pulls(d, show)),
+        ("unknown", "Heat that nothing explains", _unknown(d, show)),
+        ("limits", "Detection limits", _limits(d)),
+        ("notes", "Notes and provenance", _notes(d)),
+    ]
+    if d.verdict == "nothing":  # what would have been seen is the result then
+        sections.insert(0, sections.pop([name for name, _, _ in sections].index("limits")))
+    contents = " ".join(f'<a href="#{name}">{title}</a>' for name, title, _ in sections)
+    body = "\n".join(f'<section id="{name}"><h2>{title}</h2>\n{text}\n</section>' for name, title, text in sections)
+    title = escape(f"{d.machine}: diagnosis")
+    said = "".join(f"<p>{escape(text)}</p>" for text in d.summary)
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title><style>{STYLE}</style></head><body>
+<h1>{title}</h1>
+<div class="verdict {d.verdict}"><p class="label">{_LABELS[d.verdict]}</p>
+<p class="sentence">{escape(verdict_sentence(d))}</p><p>{_FOLLOWS[d.verdict]}</p></div>
+{said}
+<nav>{contents}</nav>
+{body}
+</body></html>
+"""
+
+
+def _figure(picture: Picture, name: str) -> str:
+    return (
+        f"<figure><h3>{escape(picture.title)}</h3>\n{inline_svg(picture.figure, name)}\n"
+        f'<figcaption id="{name}_caption">{escape(picture.caption)}</figcaption></figure>'
+    )
+
+
+def _items(texts: Iterable[str]) -> str:
+    items = "\n".join(f"<li>{escape(text)}</li>" for text in texts)
+    return f"<ul>\n{items}\n</ul>" if items else ""
+
+
+def _evidence(d: Diagnosis) -> str:
+    parts = []
+    if d.causes:
+        parts.append(causes_table(d.causes))
+        parts.append(
+            _items(
+                f"{place_words(c.place)}, {what(c.family)}: {evidence_sentence(d, c.family, c.statistic, c.threshold)}"
+                for c in d.causes
+            )
+        )
+    if d.unknown:
+        parts.append(_items([evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold)]))
+    if d.verdict == "out_of_tolerance":
+        parts.append(_items(_pull_sentences(d)))
+    if not parts:
+        best = max((k for k in d.observed if d.thresholds.get(k, 0) > 0), default=None,
+                   key=lambda k: d.observed[k] / d.thresholds[k])  # fmt: skip
+        parts.append("<p>No family of causes passes its threshold.</p>")
+        if best:
+            text = evidence_sentence(d, best, d.observed[best], d.thresholds[best])
+            parts.append(f"<p>{escape(f'The nearest is {what(best)}. {text}')}</p>")
+    parts += [_rivals(d)]
+    return "\n".join(parts)
+
+
+def _pull_sentences(d: Diagnosis) -> list[str]:
+    return [
+        f"{p.path} lies {p.pull:+.1f} standard deviations from what was declared; a right declaration does so "
+        f"once in {_once(abs(p.pull))}."
+        for p in beyond(d.pulls, 2.0)[:5]
+    ]
+
+
+def _once(sigmas: float) -> str:
+    chance = math.erfc(sigmas / math.sqrt(2))
+    return f"{1 / chance:.0f}" if chance > 1e-6 else "more than a million"
+
+
+def _rivals(d: Diagnosis) -> str:
+    parts = []
+    for c in d.causes:
+        if c.rivals:
+            parts.append(f"<h3>{escape(f'Rivals of {what(c.family)} at {place_words(c.place)}')}</h3>")
+            parts.append(rivals_table(c.rivals, False, d))
+    if remedies(d):
+        parts.append("<h3>What would tell them apart</h3>" + _items(remedies(d)))
+    elif d.verdict == "ambiguous":
+        parts.append("<p>No single measurement is known that would tell them apart.</p>")
+    return "\n".join(parts)
+
+
+def _gain(d: Diagnosis, show: Any) -> str:
+    if not d.gain:
+        why = "nothing was added to the model" if not d.causes else "no run was kept aside"
+        return f"<p>There is no gain to report: {why}.</p>" + show(overlay_picture(d))
+    sealed = sealed_series(d)
+    head = f"<p>{escape(f'Run {sealed.run} was opened once, after everything was decided.')}</p>" if sealed else ""
+    return head + _items(gain_sentences(d)) + show(gain_picture(d), overlay_picture(d)) + gain_table(d)
+
+
+def _residuals(d: Diagnosis, show: Any) -> str:
+    order = sorted(d.series, key=lambda s: (s.sealed, -float(np.nan_to_num(rms(s.delivered.ravel())))))
+    drawn = {s.run for s in order[:RUNS]} | {s.run for s in d.series if s.sealed}
+    maps = [residual_map(s) for s in d.series if s.run in drawn]
+    shown = show(*maps, by_load_state(d.series), whiteness_picture(d))
+    left_out = [s.run for s in d.series if s.run not in drawn]
+    if left_out:
+        shown += f"<p>{escape('Runs with smaller residuals, not drawn: ' + ', '.join(left_out))}</p>"
+    return shown or "<p>There are no residuals to draw.</p>"
+
+
+def _decision(d: Diagnosis, show: Any) -> str:
+    if not (d.observed or d.thresholds or d.ranked):
+        return "<p>No candidate was tried.</p>"
+    parts = [show(nulls_picture(d)), families_table(d) if d.observed or d.thresholds else ""]
+    parts.append(show(candidates_picture(d)))
+    if d.ranked:
+        parts.append(rivals_table(d.ranked, True, d))
+    parts.append(show(cosine_picture(d)))
+    return "\n".join(parts)
+
+
+def _pulls(d: Diagnosis, show: Any) -> str:
+    if not d.pulls:
+        return "<p>No declared parameter was fitted.</p>"
+    if not beyond(d.pulls, 2.0):
+        return "<p>No declared parameter was pulled by more than 2 standard deviations.</p>" + show(pulls_picture(d))
+    return show(pulls_picture(d)) + pulls_table(d)
+
+
+def _unknown(d: Diagnosis, show: Any) -> str:
+    if d.unknown is None:
+        return "<p>No heat was left over that the catalogue does not explain.</p>"
+    rows = [[name, f"{correlation:+.2f}"] for name, correlation in d.unknown.signals]
+    follows = table(["logged signal", "correlation with this heat"], rows, (1,)) if rows else ""
+    return show(unknown_picture(d)) + follows
+
+
+def _limits(d: Diagnosis) -> str:
+    if not d.limits:
+        return "<p>Detection limits were not determined.</p>"
+    lead = ""
+    if d.verdict == "nothing":
+        lead = "<p><strong>These data would have shown at least:</strong></p>" + _items(map(limit_words, d.limits))
+    text = (
+        "The smallest size of each effect that would have been named in these data; smaller ones may be there unseen."
+    )
+    return f"{lead}<p>{text}</p>{limits_table(d)}"
+
+
+def _notes(d: Diagnosis) -> str:
+    facts = [[str(key), _fact(value)] for key, value in d.provenance.items()]
+    facts += [["catalogue", d.catalogue], ["seed", str(d.seed)]]
+    return (_items(d.notes) or "<p>Nothing was excluded or held.</p>") + table(["", ""], facts)
+
+
+def _fact(value: Any) -> str:
+    text = value if isinstance(value, str) else json.dumps(plain(value), ensure_ascii=False)
+    return text if len(text) <= 300 else text[:300] + " … (all of it in report.json)"

@@ -1,0 +1,269 @@
+"""The words of a diagnosis: causes, places and chances, a sentence per verdict, ten lines for a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.diagnose.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival
+from twin.diagnose.report_numbers import interval_and_unit, number, quantity, size_words
+
+# What each family of the catalogue is, as the subject of "... at PLACE: SIZE".
+WHAT: dict[str, str] = {
+    "film_gain": "heat transfer other than declared",
+    "forced_convection": "cooling by air that motion drives",
+    "heat_source": "heat that the description lacks",
+    "loss_law": "a loss that follows another law than declared",
+    "joint": "a joint that conducts otherwise than declared",
+    "zone": "surroundings warmer or colder than declared",
+    "sun": "heat from the sun",
+    "coolant": "a medium that exchanges heat",
+    "sensor": "a temperature sensor at fault",
+    "signal": "a logged signal at fault",
+    "scale_expansion": "growth of a scale that the description lacks",
+    "expansion": "thermal expansion other than declared",
+    "slip": "a fixing that slips",
+    "capacity": "stored heat that the description lacks",
+    "initial_state": "another temperature at the start",
+    "coarse_model": "a model too coarse",
+    "measurement": "a TCP measurement at fault",
+    "misplaced_source": "a source declared at the wrong surface",
+    "not_thermal": "a deviation that is not thermal",
+}
+_KINDS = {
+    "sensors": "sensor", "signals": "signal", "films": "film", "contacts": "contact", "environment": "surroundings",
+    "sources": "source", "materials": "material", "parts": "part", "scales": "scale", "runs": "run", "tanks": "tank",
+}  # fmt: skip
+
+
+def near_interval(rival: Rival) -> tuple[float, float]:
+    """95 % interval of a candidate from its statistic alone, which is (amplitude / sigma)² where the amplitude enters
+    linearly."""
+    if not (rival.statistic > 0 and math.isfinite(rival.amplitude)):
+        return math.nan, math.nan
+    half = 1.96 * abs(rival.amplitude) / math.sqrt(rival.statistic)
+    return rival.amplitude - half, rival.amplitude + half
+
+
+def what(family: str) -> str:
+    return WHAT.get(family, family.replace("_", " "))
+
+
+def place_words(place: str) -> str:
+    """As "film bed" for "films.bed"; surfaces and the rest stay as they are."""
+    kind, dot, name = place.partition(".")
+    return f"{_KINDS[kind]} {name}" if dot and kind in _KINDS else place
+
+
+_KIND_OF_FAULT = ("sensor", "signal", "measurement", "not_thermal")  # families whose history says what kind it is
+
+
+def history_words(history: str) -> str:
+    return "" if history in ("", "always") else history.replace("^2", "²").replace("^3", "³")
+
+
+def cause_words(cause: Cause | Rival) -> str:
+    """As "heat that the description lacks at bed.x_motor: 85 W (95 % interval 80 to 90 W), following x_current²"."""
+    ci95 = cause.ci95 if isinstance(cause, Cause) else near_interval(cause)
+    where = place_words(cause.place)
+    if cause.family in ("sensor", "signal") and where:
+        head = f"{where} is at fault"
+    else:
+        head = what(cause.family) + (f" {'in' if where.startswith('run ') else 'at'} {where}" if where else "")
+    size = size_words(cause.amplitude, ci95, cause.unit)
+    history = history_words(cause.history)
+    if cause.family in _KIND_OF_FAULT:
+        said = [text for text in (history, size) if text]
+    else:  # "x_current²" is a signal to follow; "from 4 h of run_1 on" says all
+        said = [text for text in (size, f"following {history}" if history and " " not in history else history) if text]
+    return head + (f": {', '.join(said)}" if said else "")
+
+
+def limit_words(limit: Limit) -> str:
+    return f"{what(limit.family)}, {quantity(limit.size, limit.unit)}"
+
+
+def joined(items: Sequence[str]) -> str:
+    """One sentence of several items, which hold commas of their own: a; b; and c."""
+    if len(items) < 2:
+        return "".join(items)
+    return "; ".join(items[:-1]) + f"; and {items[-1]}"
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def beyond(pulls: Sequence[Pull], sigmas: float) -> list[Pull]:
+    """Parameters pulled further than so many prior standard deviations, the furthest first."""
+    return sorted((p for p in pulls if abs(p.pull) > sigmas), key=lambda p: -abs(p.pull))
+
+
+def pull_words(pull: Pull) -> str:
+    return (
+        f"{pull.path} is {quantity(pull.value, pull.unit)} instead of {quantity(pull.nominal, pull.unit)} "
+        f"({pull.pull:+.1f} standard deviations of what was declared)"
+    )
+
+
+def verdict_sentence(d: Diagnosis) -> str:
+    """The verdict in one sentence: what, where, how much, how sure."""
+    causes = joined([cause_words(c) for c in d.causes])
+    if d.verdict == "nothing":
+        seen = f"; {limit_words(d.limits[0])}, would have been seen" if d.limits else ""
+        return f"Nothing is missing that these data could show: within their noise the description explains them{seen}."
+    if d.verdict == "unknown":
+        return _sentence(_unknown_words(d) + (f"; named besides: {causes}" if causes else ""))
+    if d.verdict == "out_of_tolerance":
+        far = [pull_words(p) for p in beyond(d.pulls, 3.0)[:3]] or [pull_words(p) for p in beyond(d.pulls, 0.0)[:1]]
+        named = f"; with it: {causes}" if causes and far else ""
+        return _sentence(f"Declared values cannot hold: {joined(far) or causes or 'see the pulls'}{named}")
+    if d.verdict == "ambiguous":
+        return _sentence(_ambiguous_words(d))
+    if not causes:
+        return {
+            "sensor": "A temperature sensor is at fault, not the machine.",
+            "signal": "A logged signal is at fault, not the machine.",
+        }.get(d.verdict, "A cause was found, and none is listed.")
+    if d.verdict == "sensor":
+        return _sentence(f"Not the machine, but its measurement: {causes}")
+    if d.verdict == "signal":
+        return _sentence(f"Not the machine, but what was logged of its loads: {causes}")
+    if len(d.causes) == 1:
+        return _sentence(causes)
+    return _sentence(f"{len(d.causes)} causes act together: {causes}")
+
+
+def _unknown_words(d: Diagnosis) -> str:
+    if d.unknown is None:
+        return "the residuals hold an effect that nothing in the catalogue explains"
+    part, surface = d.unknown.part, d.unknown.surface
+    text = f"heat enters part {part}, mostly at {surface}, and nothing in the catalogue explains it"
+    largest, sigma, at, run = 0.0, math.nan, math.nan, ""
+    for name, (time, heat, spread) in d.unknown.histories.items():
+        for t, q, s in zip(time, heat, spread, strict=False):
+            if abs(q) > abs(largest):
+                largest, sigma, at, run = q, s, t, name
+    if not run:
+        return text
+    middle, low, high, unit = interval_and_unit(largest, largest - 1.96 * sigma, largest + 1.96 * sigma, "W")
+    return f"{text}; its peak is {middle} {unit} (95 % interval {low} to {high} {unit}), {at / 3600:.1f} h into {run}"
+
+
+def alternatives(d: Diagnosis) -> list[Cause | Rival]:
+    """What an ambiguous verdict leaves open, the likeliest first."""
+    if d.causes:
+        return [d.causes[0], *d.causes[0].rivals]
+    return list(d.ranked[:2])
+
+
+def _ambiguous_words(d: Diagnosis) -> str:
+    these = alternatives(d)
+    if not these:
+        return "something is missing, and these data do not tell what"
+    ways = "; or ".join(cause_words(c) for c in these[:3])
+    more = f"; or {len(these) - 3} more" if len(these) > 3 else ""
+    besides = joined([cause_words(c) for c in d.causes[1:]])
+    return f"something is missing, and these data do not tell what: either {ways}{more}" + (
+        f"; besides: {besides}" if besides else ""
+    )
+
+
+def remedies(d: Diagnosis) -> list[str]:
+    """What to measure so that rivals come apart, each once."""
+    found = [r.remedy for c in d.causes for r in c.rivals if r.remedy] + [r.remedy for r in d.ranked if r.remedy]
+    return list(dict.fromkeys(found))
+
+
+def chance(nulls: np.ndarray | None, threshold: float) -> str:
+    """How often data of a machine without an effect pass `threshold`; "" without simulated data sets."""
+    values = np.asarray([] if nulls is None else nulls, dtype=float)
+    values = values[np.isfinite(values)]
+    n, above = len(values), int((values > threshold).sum())
+    if not n or not math.isfinite(threshold):
+        return ""
+    most = f"the largest of them gave {number(float(values.max()))}"
+    if above:
+        return (
+            f"Data of a machine without this effect give more than {number(threshold)} once in {round(n / above)} "
+            f"({above} of {n} simulated data sets; {most})."
+        )
+    # none of n: with 95 % confidence the rate is below 3 / n
+    return (
+        f"Data of a machine without this effect give more than {number(threshold)} at most once in "
+        f"{max(1, round(n / 3))} (none of {n} simulated data sets; {most})."
+    )
+
+
+def evidence_sentence(d: Diagnosis, family: str, statistic: float, threshold: float) -> str:
+    """The statistic of one finding against its threshold, in plain words."""
+    text = f"These data give a statistic of {number(statistic)}; {number(threshold)} is needed."
+    return f"{text} {chance(d.nulls.get(family), threshold)}".strip()
+
+
+def rms_of(gains: Sequence[Gain]) -> tuple[float, float, float]:
+    """Root mean square over channels of one unit: as delivered, recalibrated, extended; NaN of none."""
+    rows = np.array([[g.delivered, g.recalibrated, g.extended] for g in gains], dtype=float).reshape(-1, 3)
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    if not len(rows):
+        return math.nan, math.nan, math.nan
+    a, b, c = np.sqrt((rows**2).mean(axis=0)).tolist()
+    return a, b, c
+
+
+def gain_sentences(d: Diagnosis) -> list[str]:
+    """What the extended model brings on the sealed run: the channels that the causes move, then the others."""
+    if not d.gain:
+        return []
+    result = []
+    for affected, which in ((True, "that the causes move"), (False, "that they do not move")):
+        for unit, name in (("K", "temperature"), ("m", "TCP direction")):
+            these = [g for g in d.gain if g.affected == affected and g.unit == unit]
+            a, b, c = (quantity(v, unit) for v in rms_of(these))
+            if not these:
+                continue
+            counted = f"{len(these)} {name}{'s' if len(these) > 1 else ''}"
+            better = sum(g.ci95[0] > 0 for g in these)
+            worse = sum(g.ci95[1] < 0 for g in these)
+            result.append(
+                f"{counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
+                f"noise included); better beyond chance in {better}, worse in {worse}."
+            )
+    return result
+
+
+def summary_lines(diagnosis: Diagnosis) -> list[str]:
+    """At most ten lines for a terminal: verdict, evidence, what would tell rivals apart, gain, limits."""
+    d = diagnosis
+    lines = [f"{d.machine}: {d.verdict.replace('_', ' ')}", verdict_sentence(d)]
+    several = len(d.causes) > 1
+    lines += [
+        (f"{c.place}: " if several else "") + evidence_sentence(d, c.family, c.statistic, c.threshold)
+        for c in d.causes[:2]
+    ]
+    if d.unknown and not d.causes:
+        lines.append(evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold))
+    if d.verdict in ("sensor", "signal"):
+        lines.append("The model of the machine is left as it is.")
+    if d.verdict in ("ambiguous", "named") and remedies(d):
+        lines.append(f"To tell rivals apart: {remedies(d)[0]}")
+    if d.unknown and d.unknown.signals:
+        name, correlation = d.unknown.signals[0]
+        lines.append(f"The unexplained heat follows {name} best (correlation {correlation:+.2f}).")
+    lines += [f"Sealed run: {text}" for text in gain_sentences(d)[:2]]
+    far = beyond(d.pulls, 2.0)
+    if far and d.verdict != "out_of_tolerance":
+        lines.append(f"Worth a look: {joined([pull_words(p) for p in far[:2]])}.")
+    if d.limits and d.verdict == "nothing":
+        lines.append(f"These data would have shown at least: {joined([limit_words(x) for x in d.limits[:5]])}.")
+    before, after = (np.array([w[k] for w in d.whiteness], dtype=float) for k in (1, 2))
+    if np.isfinite(before).any() and np.isfinite(after).any():
+        lines.append(
+            f"What is left is correlated by {np.nanmedian(after):.2f} from bin to bin (median of channels; "
+            f"{np.nanmedian(before):.2f} before)."
+        )
+    if d.notes:
+        lines.append(f"Note: {d.notes[0]}" + (f" ({len(d.notes) - 1} more in the report)" if len(d.notes) > 1 else ""))
+    return [" ".join(line.split()) for line in lines[:10]]

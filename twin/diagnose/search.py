@@ -1,0 +1,238 @@
+"""Forward selection: name the best cause, refit everything exactly, look again, until nothing passes its threshold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from twin.diagnose.acted import Unit, slots_with, units_of
+from twin.diagnose.batch import GROWTH, Hypothesis, best, grown
+from twin.diagnose.fitter import Fitted, bounds
+from twin.diagnose.sight import Sight, sight
+from twin.diagnose.study import K, Study
+from twin.diagnose.unknown import Heat, evidence
+from twin.diagnose.yardstick import Yardstick
+
+WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
+MOST = 3  # causes
+REFITS = 2  # passes of an exact refit
+AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
+NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A cause with its amplitudes after the last refit."""
+
+    hypothesis: Hypothesis
+    units: tuple[Unit, ...]
+    amplitude: np.ndarray  # (q,)
+    covariance: np.ndarray  # (q, q)
+    statistic: float
+    threshold: float
+    rivals: tuple[tuple[Hypothesis, float], ...]  # within NEAR, with the cosine to this one
+
+
+@dataclass(frozen=True)
+class Step:
+    """What the search saw before it accepted something, or stopped."""
+
+    ranked: tuple[Hypothesis, ...]  # the best of every family and place
+    cosine: np.ndarray  # (n, n) among the ranked
+    observed: dict[str, float]  # per family, and "unknown"
+    parts: dict[str, float]  # evidence of unknown heat per part
+
+
+@dataclass(frozen=True)
+class Search:
+    """The whole search."""
+
+    yardstick: Yardstick
+    x0: np.ndarray  # (n,) calibrated without a cause
+    x: np.ndarray  # (n,) with the accepted ones
+    accepted: tuple[Accepted, ...]
+    steps: tuple[Step, ...]  # one more than accepted
+    residual: np.ndarray  # (m,) linearised, of the last fit, accepted amplitudes left in
+    g: np.ndarray  # (n_columns,) after the accepted ones
+    heat: Heat  # likewise
+    covariance: np.ndarray  # (n, n) of x
+
+
+def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
+    """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
+    fitted = yard.fitter(y)
+    x0, accepted, steps = fitted.x, list[Accepted](), list[Step]()
+    while True:
+        seen = sight(yard.columns, fitted.projector, yard.whiten(fitted.residual))
+        ranked = _distinct(best(seen.ready, seen.g))
+        parts = evidence(seen.heat, seen.g)
+        top = ranked[:10]
+        steps.append(Step(tuple(top), _cosines(yard, fitted, top), seen.largest(), parts))
+        used = sum((len(a.units) for a in accepted), 0)
+        passing = [
+            h for h in ranked
+            if h.statistic > yard.thresholds[h.family] and used + h.batch.q <= K and not _again(h, accepted)
+        ]  # fmt: skip
+        if not passing or len(accepted) >= most:
+            break
+        passing = [_with_more_windows(seen, h) for h in passing[:AHEAD]]
+        chosen = max(passing, key=lambda h: _worth(yard, h))
+        rivals = _rivals(yard, fitted, chosen, [*passing, *ranked])
+        start = np.array(chosen.amplitude)
+        units = units_of(yard.study, yard.elements, yard.index, chosen)
+        accepted.append(
+            Accepted(chosen, units, start, np.eye(len(start)), chosen.statistic, yard.thresholds[chosen.family], rivals)
+        )
+        fitted, accepted = refit(yard, y, fitted.x, accepted)
+    n = len(x0)
+    N = fitted.projector.N
+    covariance = scipy.linalg.inv(np.eye(N.shape[1]) + N.T @ N)[:n, :n]
+    return Search(yard, x0, fitted.x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance)
+
+
+def _with_more_windows(seen: Sight, h: Hypothesis) -> Hypothesis:
+    k = next(i for i, own in enumerate(seen.ready) if own.batch is h.batch)
+    return grown(h, seen.g, seen.blocks[k][h.place])
+
+
+def _worth(yard: Yardstick, h: Hypothesis) -> float:
+    """A statistic beyond its threshold, less what further windows cost."""
+    more = max(len(h.when.windows) - 1, 0) if h.family not in ("sun", "joint") else 0
+    return h.statistic - yard.thresholds[h.family] - GROWTH / 2 * more
+
+
+def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
+    return any(h.family == a.hypothesis.family and h.name == a.hypothesis.name and h.when.name == a.hypothesis.when.name
+               for a in accepted)  # fmt: skip
+
+
+def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]) -> tuple[Fitted, list[Accepted]]:
+    """Parameters and all amplitudes with the exact model. The residual has the accepted causes in its projector."""
+    study, fitter = yard.study, yard.fitter
+    low, high = bounds(study)
+    units = [u for a in accepted for u in a.units]
+    slots = [slots_with(study, yard.elements, units, k) for k in study.fitted] if units else []
+    # amplitudes in the order of the accepted: those of slots are stepped, those of readings are linear
+    stepped = np.concatenate([np.full(len(a.amplitude), bool(a.units)) for a in accepted])
+    amplitude = np.concatenate([a.amplitude for a in accepted])
+    D = np.zeros((len(y), len(amplitude)))
+    linear = [_readings(yard, a.hypothesis) for a in accepted if not a.units]
+    if linear:
+        D[:, ~stepped] = np.hstack(linear)
+    gains = gains_of(study, accepted)
+    for _ in range(REFITS):
+        there = shifted(study, x, gains, amplitude)
+        _, J = fitter.surrogate.at(there)
+        for i, j in gains:  # a parameter beyond its prior: its own column, per unit of the amplitude
+            D[:, i] = yard.whiten(J[:, [j]])[:, 0] / study.scale[j]
+        if units:
+            parts = [
+                study.by_amplitudes(k, there, slot, amplitude[stepped])
+                for k, slot in zip(study.fitted, slots, strict=True)
+            ]
+            f = np.concatenate([p for p, _ in parts])
+            exact = np.vstack([d for _, d in parts])[:, : int(stepped.sum())]
+            D[:, stepped] = yard.whiten(exact)
+        else:
+            f, exact = np.concatenate([study.outputs(k, there) for k in study.fitted]), np.zeros((len(y), 0))
+        residual = y - f + J @ x + exact @ amplitude[stepped]
+        white = yard.whiten(residual)
+        for i, _ in gains:
+            white = white + D[:, i] * amplitude[i]
+        projector = fitter.projector(J)
+        PD = projector(D)
+        F = D.T @ PD
+        found = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ white)
+        nuisance = np.clip(projector.most_likely(white - D @ found)[: len(x)], low, high)
+        step = np.abs(found - amplitude) * np.sqrt(np.diag(F))
+        moved = max(float(np.abs(nuisance - x).max(initial=0.0)), float(step.max(initial=0.0)))
+        x, amplitude = nuisance, _limited(found, accepted)
+        if moved < 0.1:
+            break
+    inverse = np.linalg.pinv(F)
+    result, first = [], 0
+    for a in accepted:
+        own = slice(first, first + len(a.amplitude))
+        result.append(replace(a, amplitude=amplitude[own], covariance=inverse[own, own]))
+        first = own.stop
+    free = fitter.projector(J, WIDE * D * np.sqrt(np.diag(inverse)))
+    return Fitted(x, J, residual, free), result
+
+
+def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
+    """(amplitude, parameter) of causes that are a declared parameter beyond its tolerance."""
+    paths = [p.path for p in study.bench.parameters]
+    result, first = [], 0
+    for a in accepted:
+        if a.hypothesis.batch.kind == "gain":
+            name = a.hypothesis.name
+            result.append((first, paths.index(name if name in paths else f"{name}.gain")))
+        first += len(a.amplitude)
+    return result
+
+
+def shifted(study: Study, x: np.ndarray, gains: Sequence[tuple[int, int]], amplitude: np.ndarray) -> np.ndarray:
+    """(n,) the parameters with the shifts of causes that are parameters, in prior standard deviations."""
+    there = x.copy()
+    for i, j in gains:
+        there[j] += amplitude[i] / study.scale[j]
+    return there
+
+
+def _limited(found: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
+    """Amplitudes that no exchange becomes negative by: relative changes stay above -0.97."""
+    result, first = found.copy(), 0
+    for a in accepted:
+        if a.hypothesis.batch.kind in ("group", "joint", "contact", "expansion"):
+            result[first] = max(result[first], -0.97)
+        first += len(a.amplitude)
+    return result
+
+
+def _readings(yard: Yardstick, h: Hypothesis) -> np.ndarray:
+    columns, weights = h.combination()
+    return np.asarray(yard.columns.raw[:, columns].astype(float) @ weights.T)
+
+
+def _distinct(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The best of every family, place and kind."""
+    seen: set[tuple[str, str, str]] = set()
+    result = []
+    for h in ranked:
+        key = (h.family, h.name, h.batch.kind)
+        if key not in seen:
+            seen.add(key)
+            result.append(h)
+    return result
+
+
+def _direction(yard: Yardstick, h: Hypothesis) -> np.ndarray:
+    """(m,) white response at the fitted amplitudes."""
+    return np.asarray(_readings(yard, h) @ np.array(h.amplitude))
+
+
+def _cosines(yard: Yardstick, fitted: Fitted, hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+    if not hypotheses:
+        return np.zeros((0, 0))
+    D = np.stack([_direction(yard, h) for h in hypotheses], axis=1)
+    gram = D.T @ fitted.projector(D)
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
+    return np.asarray(np.clip(gram / np.outer(size, size), -1.0, 1.0))
+
+
+def _rivals(
+    yard: Yardstick, fitted: Fitted, chosen: Hypothesis, ranked: Sequence[Hypothesis]
+) -> tuple[tuple[Hypothesis, float], ...]:
+    """Other explanations nearly as likely, with their cosines."""
+    others, seen = [], {(chosen.family, chosen.name, chosen.batch.kind)}
+    for h in sorted(ranked, key=lambda h: -h.statistic):
+        key = (h.family, h.name, h.batch.kind)
+        if key not in seen and h.statistic > max(chosen.statistic - NEAR, 0.5 * yard.thresholds[h.family]):
+            seen.add(key)
+            others.append(h)
+    others = others[:8]
+    cosine = _cosines(yard, fitted, [chosen, *others])
+    return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(others))

@@ -1,0 +1,99 @@
+"""Trajectories of the rich model with places, on the user's own runs, that a window model is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.build.compress import TRAINING_FOLLOW, TRAINING_KEEP
+from twin.build.stepper import CoupledStepper
+from twin.build.workers import each
+from twin.diagnose.acting import Acting, with_acting
+from twin.diagnose.places import Place, pruned
+from twin.progress import Progress, silent
+from twin.rom.apply import with_values
+from twin.rom.drive import Drive
+from twin.rom.model import MachineModel
+from twin.rom.parameter import Parameter
+from twin.rom.rescale import rescaled
+
+SPREAD = 1.2  # prior standard deviations
+DRAWS = 12
+ACTIVE = 10  # places with a film in one draw
+WARM = 3.0  # K: what a drawn heat would warm its surface by if only a film of 20 W/(m^2 K) took it away
+EVERY = 3  # steps between snapshots
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What all draws have in common."""
+
+    rich: MachineModel  # with places
+    base: MachineModel  # pruned of all places
+    parameters: tuple[Parameter, ...]
+    places: tuple[Place, ...]
+    drives: tuple[Drive, ...]  # per run, of the description
+    starts: tuple[float, ...]  # degC
+
+
+@dataclass(frozen=True)
+class Draw:
+    run: int
+    seed: int  # of parameters and places; 0: nominal, nothing acts
+
+
+def values_of(parameters: Sequence[Parameter], seed: int, spread: float = SPREAD) -> dict[str, float]:
+    """Parameters drawn from their priors, within bounds; nominal ones for seed 0."""
+    if seed == 0:
+        return {}
+    x = np.clip(spread * np.random.default_rng([seed, 1]).standard_normal(len(parameters)), -2.5, 2.5)
+    return {p.path: float(np.clip(p.value(float(c)), p.low, p.high)) for p, c in zip(parameters, x, strict=True)}
+
+
+def drawn(places: Sequence[Place], drive: Drive, air: Sequence[float], seed: int) -> Acting:
+    """Heat in blocks at every place, a film in blocks at some; air (n,) degC: mean of the environments."""
+    if seed == 0:
+        return Acting()
+    rng = np.random.default_rng([seed, 2])
+    n, dt = drive.n_steps, drive.time[1] - drive.time[0]
+
+    def blocks() -> np.ndarray:
+        edges = np.cumsum(rng.uniform(1200.0, 10800.0, 1 + int(n * dt / 1200.0)))
+        block = np.searchsorted(edges, dt * np.arange(n))
+        return (rng.standard_normal(block[-1] + 1) * (rng.random(block[-1] + 1) < 0.6))[block]
+
+    power = {p.name: WARM * 20.0 * min(p.area, 0.05) * blocks() for p in places}
+    some = rng.choice(len(places), min(ACTIVE, len(places)), replace=False)
+    film = {places[k].name: 10.0 * np.abs(blocks()) for k in some}
+    medium = {name: np.asarray(air) + rng.choice([0.0, -4.0, 4.0]) for name in film}
+    return Acting(power, film, medium)
+
+
+def trajectory(shared: Shared, draw: Draw) -> np.ndarray:
+    """States (N, m) of one run at one draw, every third step."""
+    values = values_of(shared.parameters, draw.seed)
+    drive = shared.drives[draw.run]
+    acting = drawn(shared.places, drive, drive.environment.mean(axis=1), draw.seed)
+    model = pruned(shared.rich, [p.name for p in shared.places], list(acting.film))
+    there = with_values(model, shared.parameters, values)
+    base = with_values(shared.base, shared.parameters, values)
+    own = rescaled(drive, shared.base.load_model, base.load_model)
+    stepper = CoupledStepper(there, keep=TRAINING_KEEP, follow=TRAINING_FOLLOW)
+    start = stepper.uniform(shared.starts[draw.run])
+    if draw.seed:
+        rng = np.random.default_rng([draw.seed, 3, draw.run])
+        start = [x + rng.standard_normal() * b.one for x, b in zip(start, there.bodies, strict=True)]
+    states = [np.concatenate(start)]
+    for k, x, _ in stepper.run(with_acting(own, there.load_model, acting), start):
+        if k % EVERY == EVERY - 1:
+            states.append(np.concatenate(x))
+    return np.column_stack(states)
+
+
+def snapshots(shared: Shared, draws: int = DRAWS, progress: Progress = silent) -> list[np.ndarray]:
+    """(N, m) of every run at the nominal values and at `draws` draws."""
+    items = [Draw(run, seed) for seed in range(draws + 1) for run in range(len(shared.drives))]
+    with progress("trajectories with places", len(items)) as advance:
+        return each(trajectory, shared, items, lambda d: advance(f"run {d.run + 1}, draw {d.seed}"))

@@ -1,0 +1,189 @@
+"""From a search to a verdict, its causes in the words of a description, and what is left unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.batch import Hypothesis
+from twin.diagnose.catalogue import Family
+from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
+from twin.diagnose.fitter import bounds
+from twin.diagnose.search import Accepted, Search
+from twin.diagnose.sight import sight
+from twin.diagnose.unknown import history
+from twin.diagnose.yardstick import Yardstick
+
+APART = 10.0  # likelihood-ratio units that LR (1 - cos^2) must exceed for two causes to be told apart
+CLOSE = 6.0  # within which a rival of another family, or another part, makes a verdict ambiguous
+POWER = 1.645  # one-sided 95 %
+REMAINDER = 0.35  # of the evidence for unknown heat that a name must explain to stand
+KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
+PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
+
+
+def cause_of(a: Accepted) -> Cause:
+    """A cause as reports and edits take it: factors as factors, differences as differences."""
+    h = a.hypothesis
+    kind, unit = h.batch.kind, h.batch.unit
+    value, sigma = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
+    low, high = value - 1.96 * sigma, value + 1.96 * sigma
+    settings: dict[str, float | str] = {}
+    if kind in ("group", "joint", "contact", "expansion"):  # relative changes
+        value, low, high = 1.0 + value, max(1.0 + low, 0.0), 1.0 + high
+    elif kind == "gain":
+        value, low, high = float(np.exp(value)), float(np.exp(low)), float(np.exp(high))
+    place = h.name
+    history_name, exponent = h.when.name, h.when.exponent
+    if h.family == "signal" and kind == "signal":
+        place, factor = place.split("*")
+        value = low = high = float(factor)
+    elif h.family == "misplaced_source":
+        place, surface = place.split(">")
+        settings["surface"] = surface
+    elif h.family == "scale_expansion":
+        place, part = place.split("<")
+        settings["part"] = part
+    elif h.family == "coolant" and len(a.amplitude) > 1 and value > 0:
+        settings["temperature_difference"] = float(a.amplitude[1]) / value
+    elif h.family == "sun" and len(a.amplitude) > 1:
+        # one size, a level per day
+        top = float(max(a.amplitude))
+        scale = top / value if value else 1.0
+        value, low, high = value * scale, low * scale, high * scale
+    if h.when.signal:
+        settings["reference"] = h.when.reference
+    windows = h.when.windows
+    if h.family == "sun" and len(a.amplitude) > 1 and value > 0:
+        order = list(dict.fromkeys(w.run for w in windows))
+        windows = tuple(
+            replace(w, level=w.level * max(float(a.amplitude[order.index(w.run)]), 0.0) / value) for w in windows
+        )
+    return Cause(
+        family=h.family, place=place, parameter="", amplitude=value, ci95=(low, high), unit=unit,
+        statistic=float(a.statistic), threshold=float(a.threshold), history=history_name, signal=h.when.signal,
+        exponent=exponent, windows=windows, settings=settings,
+        rivals=tuple(_rival(a.hypothesis, other, cosine) for other, cosine in a.rivals),
+    )  # fmt: skip
+
+
+def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
+    """A hypothesis in a row of a table."""
+    return Rival(h.family, h.name, h.when.name, h.amplitude[0], h.batch.unit, h.statistic, cosine, remedy)
+
+
+def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float) -> Rival:
+    separable = min(chosen.statistic, other.statistic) * (1.0 - cosine**2) > APART
+    return rival_of(other, cosine, "" if separable else remedy(chosen, other))
+
+
+def remedy(a: Hypothesis, b: Hypothesis) -> str:
+    """What would tell two causes apart that these data do not."""
+    if a.name != b.name and a.when.name == b.when.name:
+        return f"a temperature sensor between {a.name} and {b.name}, nearer to one of them"
+    signals = [h.when.signal for h in (a, b) if h.when.signal]
+    if a.name == b.name and a.when.signal and a.when.signal == b.when.signal:
+        return f"a run with {a.when.signal} held for 2 h each at a third, two thirds and all of its range"
+    if signals:
+        return f"a run in which {' and '.join(dict.fromkeys(signals))} work alone, and one in which they rest"
+    if a.name == b.name:
+        both = f"{a.family} and {b.family}"
+        return f"a run in which the air is 5 K colder, and one that cools from standstill: {both} differ there"
+    return f"temperature sensors at {a.name} and at {b.name}"
+
+
+def _part(name: str) -> str:
+    """What a place belongs to: the first part of its name, or all of a name of the description."""
+    head = name.split(".")[0]
+    return name.split(">")[0].split("<")[0] if head in KINDS else head
+
+
+def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tuple[Cause, ...]]:
+    """The verdict, and the causes it rests on."""
+    groups = {f.name: f.group for f in families}
+    thresholds = found.yardstick.thresholds
+    left = max(found.steps[-1].parts.values(), default=0.0)
+    before = max(found.steps[0].parts.values(), default=0.0)
+    causes = tuple(cause_of(a) for a in found.accepted)
+    if left > thresholds["unknown"] and (not causes or left > REMAINDER * before):
+        return "unknown", tuple(c for c in causes if groups.get(c.family) in ("sensor", "signal"))
+    if not causes:
+        return "nothing", ()
+    lead, chosen = causes[0], found.accepted[0]
+    group = groups.get(lead.family, "machine")
+    for other, cosine in chosen.rivals:
+        near = other.statistic > chosen.hypothesis.statistic - CLOSE
+        apart = min(chosen.hypothesis.statistic, other.statistic) * (1.0 - cosine**2) > APART
+        same = other.family == lead.family and _part(other.name) == _part(chosen.hypothesis.name)
+        if same and chosen.hypothesis.when.signal and other.when.name != chosen.hypothesis.when.name:
+            same = False
+        if near and not apart and not same and other.statistic > thresholds[other.family]:
+            return "ambiguous", causes
+    if group in ("sensor", "signal"):
+        return ("sensor", causes) if group == "sensor" else ("signal", causes)
+    declared = lead.family in PLAIN and not lead.windows and not lead.signal
+    whole = lead.place.split(".")[0] in ("films", "contacts", "sources", "materials")
+    return ("out_of_tolerance" if declared and whole else "named"), causes
+
+
+def unknown_of(found: Search) -> Unknown | None:
+    """The unknown heat, where its evidence passes."""
+    yard = found.yardstick
+    parts = found.steps[-1].parts
+    if not parts or max(parts.values()) <= yard.thresholds["unknown"]:
+        return None
+    part = max(parts, key=lambda p: parts[p])
+    surface, heat, sigma = history(found.heat, found.g, part)
+    study = yard.study
+    histories = {}
+    blocks = yard.elements.histories.blocks
+    for k in study.fitted:
+        run = study.runs[k].run
+        dt = float(run.drive.time[1] - run.drive.time[0])
+        own = [b for b, (i, _, _) in enumerate(blocks) if i == k]
+        when = tuple((blocks[b][1] + blocks[b][2]) / 2 * dt for b in own)
+        histories[run.name] = (when, tuple(map(float, heat[own])), tuple(map(float, sigma[own])))
+    correlated = []
+    for signal in study.runs[0].run.signals:
+        means = []
+        for i, start, end in blocks:
+            values = study.runs[i].run.signals.get(signal)
+            means.append(float(np.abs(values[start:end]).mean()) if values is not None else 0.0)
+        if np.ptp(means) > 0 and np.ptp(heat) > 0:
+            correlated.append((signal, float(np.corrcoef(means, heat)[0, 1])))
+    correlated.sort(key=lambda s: -abs(s[1]))
+    return Unknown(part, surface, parts[part], yard.thresholds["unknown"], histories, tuple(correlated[:5]))
+
+
+def pulls_of(found: Search) -> tuple[Pull, ...]:
+    """How far the last fit moved every declared parameter."""
+    low, high = bounds(found.yardstick.study)
+    sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    return tuple(
+        Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit)
+        for p, c, s in zip(found.yardstick.study.bench.parameters, np.clip(found.x, low, high), sigma, strict=True)
+    )
+
+
+def limits_of(yard: Yardstick) -> tuple[Limit, ...]:
+    """Per family and unit the size that would have been named in 95 of 100 cases, over its places."""
+    result: dict[tuple[str, str], list[tuple[float, str]]] = {}
+    n = len(yard.study.bench.parameters)
+    _, J = yard.fitter.surrogate.at(np.zeros(n))
+    for own in sight(yard.columns, yard.fitter.projector(J), np.zeros(len(J))).ready:
+        batch = own.batch
+        if batch.fixed:
+            continue
+        sizes = (np.sqrt(yard.thresholds[batch.family]) + POWER) / np.sqrt(np.maximum(own.information, 1e-30))
+        sizes = np.maximum(sizes, batch.smallest)
+        plain = [i for i, h in enumerate(batch.histories) if not h.windows] or list(range(sizes.shape[1]))
+        for p, name in enumerate(batch.places):
+            result.setdefault((batch.family, batch.unit), []).append((float(np.median(sizes[p, plain])), name))
+    limits = []
+    for (family, unit), sizes_of in result.items():
+        ordered = sorted(sizes_of)
+        median, place = ordered[len(ordered) // 2]
+        limits.append(Limit(family, place, median, ordered[0][0], ordered[-1][0], unit))
+    return tuple(limits)

@@ -1,0 +1,209 @@
+"""The yardstick of a study: what calibration can absorb, what form errors look like, and what chance produces.
+
+Made from synthetic measurements without a cause (`nulls`), once per machine, loads, plan of measurements and
+instruments, and cached: the channels' noise and the low-rank covariance of form errors from some of them, the null
+distribution of every family's best statistic from the others. Thresholds follow from a Gumbel tail per family, at one
+common tail probability chosen so that a set of measurements without a cause passes any of them in ALARM of all cases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.build.workers import each
+from twin.calibrate.noise import Channels, estimated
+from twin.diagnose.bank import Nominal, nominal_run, respond
+from twin.diagnose.catalogue import Family
+from twin.diagnose.elements import Elements, elements_of, slim
+from twin.diagnose.fitter import Fitter
+from twin.diagnose.hypotheses import Context
+from twin.diagnose.nulls import Form, Instruments, null
+from twin.diagnose.readings import readings_of
+from twin.diagnose.sight import Columns, sight
+from twin.diagnose.study import Study
+from twin.diagnose.surrogate import make_surrogate
+from twin.diagnose.unknown import heat_of
+from twin.diagnose.whiten import Whitener, offsets
+from twin.progress import Progress, silent
+
+FORM, NULLS = 60, 200
+MODES = 45
+OFFSET = 0.1  # K, prior of every sensor's constant error
+TCP_ZERO = 0.5e-6  # m, prior of every TCP component's constant error
+ALARM = 0.03
+
+
+@dataclass(frozen=True)
+class Yardstick:
+    """m measured numbers, n columns (elements, then readings)."""
+
+    study: Study
+    fitter: Fitter
+    elements: Elements
+    nominal: tuple[Nominal, ...]
+    index: dict[tuple[str, str, str], int]
+    columns: Columns
+    nulls: dict[str, np.ndarray]  # per family, and "unknown": largest statistic in every null
+    thresholds: dict[str, float]
+
+    @property
+    def whiten(self) -> Whitener:
+        return self.fitter.whiten
+
+
+def _null_residual(shared: tuple[Fitter, list[np.ndarray], Instruments, Form], seed: int) -> np.ndarray:
+    """What a calibration leaves of a null (m,)."""
+    fitter, J, instruments, form = shared
+    fitted = fitter(null(fitter.study, J, seed, instruments, form))
+    n = len(fitted.x)
+    found = fitted.projector.most_likely(fitter.whiten(fitted.residual))
+    return fitted.residual - fitted.J @ found[:n]
+
+
+def _null_largest(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Columns], seed: int) -> dict[str, float]:
+    """The largest statistic of every family in a null."""
+    fitter, J, instruments, form, columns = shared
+    fitted = fitter(null(fitter.study, J, seed, instruments, form))
+    return sight(columns, fitted.projector, fitter.whiten(fitted.residual)).largest()
+
+
+def instruments_of(study: Study, temperature: float, tcp: float) -> Instruments:
+    """White noise of the instruments: TCP as the runs tell, where they do."""
+    told = [m.tcp_sigma for m in (study.runs[k].measured for k in study.fitted) if m.tcp_sigma is not None]
+    good = np.concatenate([t[np.isfinite(t) & (t > 0.0)] for t in told]) if told else np.zeros(0)
+    return Instruments(temperature, float(np.median(good)) if len(good) else tcp)
+
+
+def make_yardstick(
+    study: Study,
+    families: Sequence[Family],
+    instruments: Instruments,
+    form: Form = Form(),
+    counts: tuple[int, int] = (FORM, NULLS),
+    progress: Progress = silent,
+) -> Yardstick:
+    """The yardstick of a study."""
+    surrogate = make_surrogate(study, progress)
+    J = surrogate.J * surrogate.rate(np.zeros(len(study.bench.parameters)))
+    J_of, y_of = _by_run(study, J), _by_run(study, surrogate.y0)
+    with progress("responses of elementary causes", 2) as advance:
+        nominal = tuple(nominal_run(study, k) for k in range(len(study.runs)))
+        elements = elements_of(study, nominal)
+        advance("elements")
+        readings, of_reading = readings_of(study, nominal[: len(y_of)], y_of, J_of)
+        raw = np.hstack([respond(study, nominal, elements.vectors, elements.columns), readings])
+        advance("responses")
+    first = len(elements.columns)
+    index = {**elements.index, **{key: first + c for key, c in of_reading.items()}}
+    floors = _floors(study, instruments)
+    whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
+    offset, zero = OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study)
+    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero)]))
+    with progress("measurements without a cause: form", counts[0]) as advance:
+        shared = (fitter, J_of, instruments, form)
+        left = np.stack(each(_null_residual, shared, list(range(counts[0])), lambda _: advance("")), axis=1)
+    whiten = Whitener(study, _channels(study, left, floors))
+    U, s, _ = np.linalg.svd(whiten(left), full_matrices=False)
+    variance = s**2 / max(counts[0], 1)
+    kept = min(MODES, int(np.sum(variance > 3.0)))
+    modes = U[:, :kept] * np.sqrt(np.maximum(variance[:kept] - 1.0, 0.0))
+    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero), modes]))
+    context = Context(study, elements, index)
+    batches = [b for f in families for b in f.batches(context) if b.columns.size]
+    columns = Columns.of(_whitened(whiten, raw), batches, heat_of(study, elements))
+    with progress("measurements without a cause: thresholds", counts[1]) as advance:
+        seeds = list(range(10_000, 10_000 + counts[1]))
+        largest = each(_null_largest, (fitter, J_of, instruments, form, columns), seeds, lambda _: advance(""))
+    names = [*(f.name for f in families), "unknown"]
+    nulls = {name: np.array([of_null.get(name, 0.0) for of_null in largest]) for name in names}
+    small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
+    return Yardstick(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls))
+
+
+def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:
+    """(m, ...) of all fitted runs cut into runs."""
+    ends = np.cumsum([study.runs[k].size for k in study.fitted])
+    return np.split(values, ends[:-1])
+
+
+def _whitened(whiten: Whitener, raw: np.ndarray) -> np.ndarray:
+    """Columns (m, n) in white units, some thousand at a time: in double precision they are gigabytes."""
+    result = np.empty_like(raw)
+    for first in range(0, raw.shape[1], 1000):
+        result[:, first : first + 1000] = whiten(raw[:, first : first + 1000].astype(float))
+    return result
+
+
+def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[str, float]:
+    """Per family the statistic that a common tail probability allows, so that `alarm` of all nulls pass any of them.
+
+    Gumbel tail by moments above the median (Embrechts, Klueppelberg, Mikosch, Modelling Extremal Events, 1997, ch. 6).
+    """
+    tails = {name: _gumbel(values) for name, values in nulls.items() if len(values) and values.max() > 0.0}
+    if not tails:
+        return dict.fromkeys(nulls, 0.0)
+    table = np.stack([nulls[name] for name in tails], axis=1)
+
+    def limits(p: float) -> np.ndarray:
+        return np.array([at - scale * np.log(-np.log1p(-p)) for at, scale in tails.values()])
+
+    low, high = 1e-6, 0.3
+    for _ in range(40):
+        p = np.sqrt(low * high)
+        share = float(np.mean(np.any(table > limits(p), axis=1)))
+        low, high = (p, high) if share <= alarm else (low, p)
+    found = dict(zip(tails, limits(low), strict=True))
+    return {name: float(max(found.get(name, 9.0), 9.0)) for name in nulls}
+
+
+def _gumbel(values: np.ndarray) -> tuple[float, float]:
+    """Location and scale of a Gumbel law with the upper half's quantiles (50 % and 97 %) of the values."""
+    a, b = np.quantile(values, [0.5, 0.97])
+    scale = max((b - a) / (-np.log(-np.log(0.97)) + np.log(-np.log(0.5))), 1e-3)
+    return float(a + scale * np.log(-np.log(0.5))), float(scale)
+
+
+def _floors(study: Study, instruments: Instruments) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Per fitted run the standard deviations of bin means (s,) and of TCP components (3,)."""
+    result = []
+    for k in study.fitted:
+        m = study.runs[k].measured
+        count = np.median(np.where(m.count > 0, m.count, np.nan), axis=0) if len(m.count) else np.ones(len(m.sensors))
+        sensors = instruments.temperature / np.sqrt(np.nan_to_num(count, nan=1.0).clip(1.0))
+        result.append((sensors, np.full(3, instruments.tcp)))
+    return result
+
+
+def _tcp_zero(study: Study) -> np.ndarray:
+    """(m, 3) 1 m on one TCP component in all fitted runs."""
+    blocks = []
+    for k in study.fitted:
+        planned = study.runs[k]
+        (b, s), (rows, _) = planned.shapes
+        blocks.append(np.vstack([np.zeros((b * s, 3)), np.tile(np.eye(3), (rows, 1))]))
+    return np.vstack(blocks)
+
+
+def _channels(
+    study: Study, leftover: np.ndarray, floors: list[tuple[np.ndarray, np.ndarray]]
+) -> tuple[tuple[Channels, Channels], ...]:
+    """Noise of every channel from leftovers (m, sets): memory of what the modes of form will not hold, capped."""
+    result, first = [], 0
+    for k, (sensors, tcp) in zip(study.fitted, floors, strict=True):
+        planned = study.runs[k]
+        T, w = planned.split(leftover[first : first + planned.size])
+        first += planned.size
+        result.append((_pooled(T, sensors), _pooled(w, tcp)))
+    return tuple(result)
+
+
+def _pooled(values: np.ndarray, floor: np.ndarray) -> Channels:
+    """From (rows, channels, sets): sets one after the other, kept apart by a missing row."""
+    if not values.size:
+        return Channels(floor, np.zeros(len(floor)))
+    _, channels, sets = values.shape
+    apart = np.concatenate([values, np.full((1, channels, sets), np.nan)])
+    return estimated(apart.transpose(2, 0, 1).reshape(-1, channels), floor, cap=0.9)
