@@ -1,4 +1,4 @@
-"""Effects hidden in data and looked for, hundreds of times: `python -m benchmarks campaign [--minutes M]`."""
+"""Effects hidden in data and looked for, hundreds of times: `python -m benchmarks.campaign [MINUTES]`."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -38,8 +39,9 @@ def main() -> None:
     for name, artefact in (("calibrated", calibrated), ("as_guessed", start)):
         folder = OUT / name
         lines = told("diagnose", artefact, OUT / "training", "--sealed", OUT / "sealed", "-o", folder)
-        print(f"   -- diagnosis of the twin {name.replace('_', ' ')}, {folder / 'index.html'}")
-        print("".join(f"   {line}\n" for line in lines if not line.startswith("Note")), end="")
+        print(f"   -- the twin {name.replace('_', ' ')}; {(folder / 'index.html').relative_to(ROOT)}")
+        first = next(i for i, line in enumerate(lines) if line.startswith("spindle_only:"))
+        print("".join(f"   {line}\n" for line in lines[first:] if not line.startswith("Note")), end="")
         print_report(json.loads((folder / "report.json").read_text(encoding="utf-8")))
 
 
@@ -50,6 +52,7 @@ def write_runs(data: Path) -> None:
     for name in ("training", "sealed"):
         run = read_run(OUT / "as_calibrated" / name)
         assert run.tcp is not None
+        shutil.rmtree(OUT / name, ignore_errors=True)  # a copy of the last time; measured runs are never written over
         write_run(OUT / name, replace(run, initial_temperature=None, tcp=replace(run.tcp, sigma=None)))
 
 
@@ -64,10 +67,10 @@ def told(*arguments: object) -> Sequence[str]:
 
 
 def print_report(report: Mapping[str, Any]) -> None:
-    print(f"   {'best candidates':60}{'statistic':>10}{'needed':>9}")
+    print(f"   {'best candidates':72}{'statistic':>10}{'needed':>9}")
     for r in report["ranked"][:RANKED]:
         text = f"{r['family']} at {r['place']}, {r['history']}: {r['amplitude']:.3g} {r['unit']}"
-        print(f"   {text:60}{r['statistic']:10.1f}{report['thresholds'][r['family']]:9.1f}")
+        print(f"   {text:72}{r['statistic']:10.1f}{report['thresholds'][r['family']]:9.1f}")
     print(f"   {'rms [um] of hours 24 to 32':32}{'delivered':>11}{'calibrated':>12}{'extended':>10}{'gain, 95 %':>20}")
     for g in report["gain"]:
         low, high = (1e6 * v for v in g["ci95"])

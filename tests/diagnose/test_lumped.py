@@ -77,12 +77,14 @@ def test_a_place_is_a_node_with_the_area_of_its_film() -> None:
     assert own == pytest.approx([p.area for p in places])  # a W/(m^2 K) more on a node is as much as on its film
 
 
+@pytest.mark.slow
 def test_nothing_hidden_is_nothing(made: Path) -> None:
     found = diagnosed(made, "nothing")
     assert found["verdict"] == "nothing"
     assert found["causes"] == []
 
 
+@pytest.mark.slow
 def test_heat_is_named_at_its_node_and_helps_on_another_day(made: Path) -> None:
     found = diagnosed(made, "heat", "--sealed", made / "sealed")
     assert found["verdict"] == "named"
@@ -98,6 +100,7 @@ def test_heat_is_named_at_its_node_and_helps_on_another_day(made: Path) -> None:
     assert source.use.parameters["power"] == pytest.approx(cause["amplitude"], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_drifting_sensor_is_blamed_itself(made: Path) -> None:
     found = diagnosed(made, "drift")
     assert found["verdict"] == "sensor"
@@ -105,11 +108,12 @@ def test_a_drifting_sensor_is_blamed_itself(made: Path) -> None:
     assert not (made / "diagnosis_drift" / "machine.toml").exists()  # the description is not at fault
 
 
+@pytest.mark.slow
 def test_displacements_alone_from_their_first_row_on_are_enough(made: Path) -> None:
     """As the measured spindle has it: no sensor on the machine, and deviations that count from the first."""
     run = made / "tcp_only"
     twin(
-        "simulate", made / "hidden", made / "monday", "-o", run, "--tcp-every", "10 min", "--noise-tcp", "0.1 um",
+        "simulate", made / "hidden", made / "monday", "-o", run, "--tcp-every", "20 min", "--noise-tcp", "0.1 um",
         "--seed", 4,
     )  # fmt: skip
     (run / "temperatures.csv").unlink()

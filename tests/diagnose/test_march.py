@@ -28,7 +28,7 @@ def units(kinds, study):
 
 @pytest.mark.parametrize("spread", [0.0, 0.6])
 def test_without_slots_it_is_the_march_of_a_calibration(spread):
-    """Steps of a minute, one matrix each: the same implicit Euler, at any parameters."""
+    """Steps of a minute, one matrix each, beside implicit Euler of a second and a half, at any parameters."""
     study = small_case.study()
     bench, model = study.bench, study.bench.base
     planned = study.runs[0]
@@ -37,12 +37,15 @@ def test_without_slots_it_is_the_march_of_a_calibration(spread):
     empty = no_slots(planned.run.drive.n_steps, 1, K, model.n, model)
     got = states_of(bench.layout, bench.contacts, False, bench.system, study.effects,
                     loads_for(model, planned.run.drive, 1), empty, planned.z0, v)  # fmt: skip
-    loads = plain.loads_for(model, planned.run.drive, 1)
+    loads = plain.loads_for(model, planned.run.drive, 40)
     wanted = plain.trajectory(
         bench.layout, bench.contacts, False, bench.system, study.effects, loads, planned.z0, x * study.scale
     )
     assert np.ptp(wanted) > 1.0
-    np.testing.assert_allclose(got, wanted, atol=1e-9 * np.abs(wanted).max())
+    got, wanted = (np.asarray(s) @ np.asarray(bench.system.C).T for s in (got, wanted))
+    error = got - wanted  # the largest where a load switches a node of less than a minute
+    assert np.abs(error).max() < 0.02 * np.abs(wanted).max()
+    assert np.sqrt(np.mean(error**2)) < 2e-3 * np.abs(wanted).max()
 
 
 def test_coarse_steps_stay_near_fine_ones():
@@ -52,15 +55,15 @@ def test_coarse_steps_stay_near_fine_ones():
     bench, model, planned = study.bench, study.bench.base, study.runs[1]
     x = np.zeros(len(bench.parameters))
     fine = plain.trajectory(bench.layout, bench.contacts, False, bench.system, study.effects,
-                            plain.loads_for(model, planned.run.drive, 1), planned.z0, x)  # fmt: skip
+                            plain.loads_for(model, planned.run.drive, 40), planned.z0, x)  # fmt: skip
     coarse = study.states(1, x)
     assert coarse.shape == (planned.run.drive.n_steps // INNER * INNER + 1, model.n)
     C = np.asarray(bench.system.C)
-    error = np.abs((coarse - np.asarray(fine)) @ C.T).max(axis=0)
+    error = np.sqrt(np.mean(((coarse - np.asarray(fine)) @ C.T) ** 2, axis=0))
     size = np.abs(np.asarray(fine) @ C.T).max(axis=0)
     assert model.sensors == ("front", "housing", "screw_middle")
     assert (error > 0.0).all()
-    assert (error[:2] < 1e-3 * size[:2]).all()
+    assert (error[:2] < 0.01 * size[:2]).all()
     assert error[2] < 0.1 * size[2]
 
 

@@ -120,7 +120,7 @@ def test_heat_at_a_place_warms_what_is_there():
     by = dict(zip(full.thermal.sensors, change, strict=True))
     assert by["plate"] > 1.0
     assert by["plate"] > 1.5 * by["slide"] > 0.0
-    assert abs(by["bed_front"]) < 0.01
+    assert abs(by["bed_front"]) < 0.03
 
 
 def test_ghosts_stand_beside_their_sensors():

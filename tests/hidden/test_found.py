@@ -25,7 +25,7 @@ from twin.diagnose.whiten import measured_of
 from twin.diagnose.yardstick import Yardstick
 from twin.machine.load import load_machine
 
-SETTINGS = Settings(temperature_sigma=0.08, form=40, nulls=60)
+SETTINGS = Settings(temperature_sigma=0.08, form=30, nulls=40)
 
 
 @pytest.fixture(scope="session")
@@ -35,8 +35,7 @@ def yardstick() -> Yardstick:
     folder().mkdir(parents=True, exist_ok=True)
     with (folder() / "yardstick.lock").open("w") as lock:  # one process makes it, the others wait
         fcntl.flock(lock, fcntl.LOCK_EX)
-        made = prepare(None, machine, runs[:2], runs[2:], SETTINGS)[2]
-    return made
+        return prepare(None, machine, runs[:2], runs[2:], SETTINGS)[2]
 
 
 def diagnosed(yard: Yardstick, name: str) -> tuple[Search, Verdict, tuple[Cause, ...]]:

@@ -164,6 +164,7 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
         inverse = np.linalg.inv(F + scale * np.eye(h.batch.q))
         a = np.einsum("hqr,hr->hq", inverse, num)
         statistic = np.einsum("hq,hq->h", num, a)
+        statistic = np.where(np.abs(a[:, 0]) < h.batch.smallest, 0.0, statistic)
         if h.batch.sign:
             statistic = np.where(h.batch.sign * a[:, 0] < 0.0, 0.0, statistic)
         k = int(np.argmax(statistic))

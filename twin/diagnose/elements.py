@@ -27,6 +27,7 @@ import numpy as np
 from twin.calibrate.effects import contact_names
 from twin.diagnose.bank import Column, Nominal
 from twin.diagnose.march import INNER
+from twin.diagnose.places import beside
 from twin.diagnose.study import Study
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place
@@ -211,10 +212,9 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         for name, history in _law_histories(study, j, histories).items():
             column(("source", source.name, name), v, history)
         own_place = int(np.argmax([abs(B @ b) / np.linalg.norm(b) for b in bench.B]))
-        for p, place in enumerate(bench.places):
-            if set(place.members) & set(bench.places[own_place].members) and p != own_place:
-                v = vector([bench.B[p] - B] * len(runs))
-                column(("moved", f"{source.name}>{place.name}", "always"), v, [q[:, j] for q in powers])
+        for p in beside(bench.places, own_place):
+            v = vector([bench.B[p] - B] * len(runs))
+            column(("moved", f"{source.name}>{bench.places[p].name}", "always"), v, [q[:, j] for q in powers])
     for name, factor, of in _signals(study, nominal, powers):
         column(("signal", f"{name}*{factor:.6g}", "always"), vector(of), always)
     for i in range(len(study.fitted)):

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.diagnose.march import INNER, Slots
+from twin.diagnose.places import beside
 from twin.diagnose.study import Study
 from twin.run.system import Array
 
@@ -196,9 +197,7 @@ def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> 
         return None
     B = body.B[:, body.sources.index(source)]
     own = int(np.argmax([abs(B @ b) / np.linalg.norm(b) for b in bench.B]))
-    members = set(bench.places[own].members)
-    near = [p for p, place in enumerate(bench.places)
-            if set(place.members) & members and p != own and not place.name.startswith("contacts.")]  # fmt: skip
+    near = [p for p in beside(bench.places, own) if not bench.places[p].name.startswith("contacts.")]
     share = abs(form.beside * rng.standard_normal())
     if not near:
         return None

@@ -97,6 +97,12 @@ def places_of(machine: Machine, full: FullModel) -> tuple[Place, ...]:
     return tuple(found)
 
 
+def beside(places: Sequence[Place], own: int) -> list[int]:
+    """Where heat described at a place might enter instead: elsewhere on its part; of nodes every other one."""
+    members = set(places[own].members)
+    return [p for p, place in enumerate(places) if p != own and (not place.surfaces or members & set(place.members))]
+
+
 def _area(machine: Machine, member: str, film: str) -> float:
     """m^2 of a node or bar: of the film that it has, else all it has; one where the description does not say."""
     if film:

@@ -20,6 +20,7 @@ from twin.diagnose.study import Study
 from twin.progress import Progress, silent
 
 STEP = 0.8  # prior standard deviations between the two Jacobians of a second derivative
+STRONG = 50.0  # units of noise, summed over all rows, by which a parameter must move outputs to be bent
 CONDUCTS = ("film", "joint", "contact")
 
 
@@ -56,17 +57,32 @@ def _jacobian(study: Study, x: np.ndarray) -> np.ndarray:
 
 
 def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
-    """From n + 1 exact Jacobians."""
+    """From exact Jacobians: the nominal one, and one per parameter that moves outputs far."""
     parameters = study.bench.parameters
     n = len(parameters)
     form = np.array([0 if p.scale == "linear" else -1 if p.kind in CONDUCTS else 1 for p in parameters])
     y0 = np.concatenate([study.outputs(k, np.zeros(n)) for k in study.fitted])
     bare = Surrogate(study.scale, form, y0, np.zeros((len(y0), n)), np.zeros((0, n, n), dtype=np.float32))
-    points = [np.zeros(n), *(STEP * np.eye(n))]
+    J = _jacobian(study, np.zeros(n)) / bare.rate(np.zeros(n))
+    strong = np.flatnonzero(np.linalg.norm((J * bare.rate(np.zeros(n))) / _units(study)[:, None], axis=0) > STRONG)
+    points = [STEP * np.eye(n)[i] for i in strong]
     with progress("derivatives by the parameters", len(points)) as advance:
         made = each(_jacobian, study, points, lambda _: advance(""))
-    J = made[0] / bare.rate(points[0])
     H = np.zeros((len(y0), n, n), dtype=np.float32)
-    for i, (x, jac) in enumerate(zip(points[1:], made[1:], strict=True)):
+    for i, x, jac in zip(strong, points, made, strict=True):
         H[:, :, i] = (jac / bare.rate(x) - J) / bare.t(x)[i]
-    return Surrogate(study.scale, form, y0, J, (H + H.transpose(0, 2, 1)) / 2)
+    weak = np.setdiff1d(np.arange(n), strong)
+    for i in weak:  # what a strong parameter does to it is known; two weak ones bend nothing that counts
+        H[:, strong, i] = H[:, i, strong]
+    H[np.ix_(np.arange(len(y0)), strong, strong)] += H[np.ix_(np.arange(len(y0)), strong, strong)].transpose(0, 2, 1)
+    H[np.ix_(np.arange(len(y0)), strong, strong)] /= 2
+    return Surrogate(study.scale, form, y0, J, H)
+
+
+def _units(study: Study) -> np.ndarray:
+    """(m,) of what counts: 0.05 K, 1 um."""
+    parts = []
+    for k in study.fitted:
+        (b, s), (rows, _) = study.runs[k].shapes
+        parts.append(np.concatenate([np.full(b * s, 0.05), np.full(3 * rows, 1e-6)]))
+    return np.concatenate(parts)

@@ -29,7 +29,13 @@ class Whitener:
     channels: tuple[tuple[Channels, Channels], ...]
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        """values (m, ...) of all fitted runs, one after the other -> the same, of unit variance; NaN yields zero."""
+        """values (m, ...) of all fitted runs, one after the other -> the same, of unit variance.
+
+        What the study did not measure yields zero, in data and responses alike, and so does NaN.
+        """
+        lost = missing(self.study)
+        if lost.any():
+            values = np.where(lost.reshape(-1, *([1] * (values.ndim - 1))), np.nan, values)
         parts, first = [], 0
         for k, (sensors, tcp) in zip(self.study.fitted, self.channels, strict=True):
             planned = self.study.runs[k]

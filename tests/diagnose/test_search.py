@@ -1,0 +1,90 @@
+"""From measurements to a verdict on the lumped machine: what is hidden is named, and nothing where nothing is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from twin.diagnose.acted import Unit, slots_with
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.gain import predicted
+from twin.diagnose.search import search
+from twin.diagnose.verdict import limits_of, pulls_of, verdict_of
+
+pytestmark = pytest.mark.slow  # the yardstick of 64 synthetic measurements
+
+
+def measured(kind="", place="", size=0.0, seed=0):
+    """(m,) what the machine shows with noise, and a cause that always acts."""
+    study = small_case.study()
+    rng = np.random.default_rng(seed)
+    x = 0.5 * rng.standard_normal(len(study.bench.parameters))
+    always = tuple(np.ones(p.run.drive.n_steps) for p in study.runs)
+    units = [Unit(kind, place, -1, always)] if kind else []
+    parts = []
+    for k in study.fitted:
+        slots = slots_with(study, small_case.elements(), units, k)
+        (b, s), (rows, _) = study.runs[k].shapes
+        sigma = np.concatenate([np.full(b * s, small_case.NOISE / np.sqrt(5)), np.full(rows * 3, 3e-7)])
+        parts.append(study.outputs(k, x, slots, [size] if units else []) + sigma * rng.standard_normal(len(sigma)))
+    return np.concatenate(parts)
+
+
+def test_nothing_is_found_where_nothing_is():
+    found = search(small_case.yardstick(), measured(seed=1))
+    assert verdict_of(found, FAMILIES) == ("nothing", ())
+    assert not found.accepted
+    assert all(abs(p.pull) < 5.0 for p in pulls_of(found))
+    models = predicted(found, 2)
+    np.testing.assert_array_equal(models.extended, models.recalibrated)
+
+
+def test_a_sensor_that_is_off_is_a_sensor_that_is_off():
+    study, y = small_case.study(), measured(seed=2)
+    first = 0
+    for k in study.fitted:
+        (b, s), _ = study.runs[k].shapes
+        drift = study.runs[k].measured.bin_time * 3.0 / 14400.0
+        y[first : first + b * s].reshape(b, s)[:, 1] += drift  # 3 K in four hours
+        first += study.runs[k].size
+    found = search(small_case.yardstick(), y)
+    verdict, causes = verdict_of(found, FAMILIES)
+    assert verdict == "sensor"
+    assert (causes[0].family, causes[0].place, causes[0].history) == ("sensor", "sensors.housing", "drift")
+    assert causes[0].amplitude == pytest.approx(18.0, rel=0.1)  # K/day
+
+
+def test_hidden_heat_is_refitted_with_the_exact_model():
+    """300 W at the housing: the extended model follows the machine where the recalibrated one cannot."""
+    y = measured("heat", "housing", 300.0, seed=3)
+    found = search(small_case.yardstick(), y)
+    verdict, causes = verdict_of(found, FAMILIES)
+    assert verdict in ("named", "ambiguous")
+    assert causes[0].statistic > causes[0].threshold
+    families = {causes[0].family, *(r.family for r in causes[0].rivals)}
+    assert "heat_source" in families
+    study = small_case.study()
+    left = []
+    for k in study.fitted:
+        models = predicted(found, k)
+        own = y[: study.runs[0].size] if k == 0 else y[study.runs[0].size :]
+        T = [study.runs[k].split(own - m)[0] for m in (models.recalibrated, models.extended)]
+        left.append([float(np.sqrt(np.nanmean(t**2))) for t in T])
+    plain, extended = np.mean(left, axis=0)
+    assert plain > 3.0
+    assert extended < 0.5 * plain  # the rest counts as errors of form, which are large on so coarse a machine
+
+
+def test_limits_are_sizes_that_would_pass():
+    limits = limits_of(small_case.yardstick())
+    assert {"heat_source", "film_gain", "sensor"} <= {limit.family for limit in limits}
+    for limit in limits:
+        assert 0.0 < limit.smallest <= limit.size <= limit.largest, limit
+    wide = replace(
+        small_case.yardstick(), thresholds={f: 4.0 * t for f, t in small_case.yardstick().thresholds.items()}
+    )
+    by = {(limit.family, limit.unit): limit.size for limit in limits}
+    assert all(limit.size >= by[limit.family, limit.unit] for limit in limits_of(wide))
