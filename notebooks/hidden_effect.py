@@ -23,12 +23,13 @@
 # commands `twin build`, `hide`, `simulate` and `diagnose` do the same.
 
 # %%
+from io import BytesIO
 from pathlib import Path
 from tempfile import mkdtemp
 
-import matplotlib.pyplot as plt
 import numpy as np
-from IPython.display import Markdown
+from IPython.display import Image, Markdown
+from matplotlib.figure import Figure
 
 from twin.build.product import build_artefact
 from twin.build.simulate import Noise, simulate_run
@@ -197,13 +198,16 @@ Markdown("\n".join(rows))
 # %%
 sealed = diagnosis.series[-1]
 column = sealed.sensors.index("column")
-figure, axes = plt.subplots(figsize=(8, 3), dpi=80)
+figure = Figure(figsize=(8, 3), layout="constrained")
+axes = figure.subplots()
 for label in ("delivered", "recalibrated", "extended"):
     axes.plot(sealed.time / 3600.0, getattr(sealed, label)[:, column], label=label)
 axes.axhline(0.0, color="0.6", linewidth=0.8)
 axes.set(xlabel="hours of Wednesday", ylabel="K", title="column: measured minus simulated")
 axes.legend(frameon=False)
-plt.show()
+png = BytesIO()
+figure.savefig(png, format="png", dpi=80)
+Image(png.getvalue())
 
 # %% [markdown]
 # The numbers above are asserted whenever this notebook is executed.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,10 +34,16 @@ class Fitter:
     whiten: Whitener
     others: np.ndarray  # (m, q) white nuisance columns besides the parameters: offsets, modes of form errors
 
+    @cached_property
+    def gram(self) -> np.ndarray:
+        """(q, q) of the other columns: the same for all data."""
+        return np.asarray(self.others.T @ self.others)
+
     def projector(self, J: np.ndarray, more: np.ndarray | None = None) -> Projector:
         """For parameters with Jacobian J; more: white columns without prior (large variance), (m, k)."""
-        parts = [self.whiten(J), self.others]
-        return Projector.of(np.hstack(parts if more is None else [*parts, more]))
+        own = self.whiten(J) if more is None else np.hstack([self.whiten(J), more])
+        cross = own.T @ self.others
+        return Projector.of(np.hstack([own, self.others]), np.block([[own.T @ own, cross], [cross.T, self.gram]]))
 
     def __call__(self, y: np.ndarray) -> Fitted:
         """Most likely parameters of measurements y (m,), NaN where missing."""

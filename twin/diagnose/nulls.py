@@ -23,13 +23,13 @@ from twin.run.system import Array
 class Form:
     """How wrong the form of a description may be; standard deviations."""
 
-    local_film: float = 0.15  # of each face's coefficient against its group's
-    shape: float = 0.08  # of a film group's coefficient, slowly varying within a run
-    wind: float = 0.30  # of a film group's coefficient at the top speed of its law against that at rest
+    local_film: float = 0.12  # of each face's coefficient against its group's
+    shape: float = 0.05  # of a film group's coefficient, slowly varying within a run
+    wind: float = 0.25  # of a film group's coefficient at the top speed of its law against that at rest
     beside: float = 0.02  # share of a source's heat that enters another face of its part
-    aside: float = 0.5  # of 8 mm, by which sensors are off
-    reading: float = 0.03  # of what every source and every contact does to every channel
-    air: float = 0.15  # K, fluctuation of a zone's air
+    aside: float = 0.4  # of 8 mm, by which sensors are off
+    reading: float = 0.02  # of what every source and every contact does to every channel
+    air: float = 0.12  # K, fluctuation of a zone's air
     air_time: float = 1500.0  # s, its memory
     start: float = 0.10  # K, of the bodies' initial temperatures
     offset: float = 0.05  # K, of sensors
@@ -72,10 +72,10 @@ def null(
         run = planned.run
         films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in bench.places])
         air = run.drive.environment.reshape(n, INNER, -1)
-        typical = _typical(study, k)
+        usual = typical(study, k)
         A, M, rise = np.zeros_like(body.A0), np.zeros(body.n), np.zeros((n, INNER))
         for p in np.flatnonzero(films >= 0):
-            strength = local[p] * typical[films[p]]
+            strength = local[p] * usual[films[p]]
             A += strength * bench.A[p]
             M += strength * bench.M[p]
         surround = air[:, :, load.surroundings] - bench.base.reference_temperature
@@ -167,7 +167,7 @@ def _winds(study: Study, k: int, n: int) -> np.ndarray:
     return result
 
 
-def _typical(study: Study, k: int) -> np.ndarray:
+def typical(study: Study, k: int) -> np.ndarray:
     """(n_films,) W/(m^2 K): the mean convection of each film in a run, at a rise of a few kelvin."""
     drive = study.runs[k].run.drive
     load = study.bench.base.load_model

@@ -18,8 +18,9 @@ from twin.diagnose.yardstick import Yardstick
 
 WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
 MOST = 3  # causes
-REFITS = 2  # passes of an exact refit
+REFITS = 5  # passes of an exact refit
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
+AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
 NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
 
 
@@ -79,7 +80,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         if not passing or len(accepted) >= most:
             break
         passing = [_with_more_windows(seen, h) for h in passing[:AHEAD]]
-        chosen = max(passing, key=lambda h: _worth(yard, h))
+        chosen = max(passing, key=_worth)
         rivals = _rivals(yard, fitted, chosen, [*passing, *ranked])
         start = np.array(chosen.amplitude)
         units = units_of(yard.study, yard.elements, yard.index, chosen)
@@ -98,10 +99,11 @@ def _with_more_windows(seen: Sight, h: Hypothesis) -> Hypothesis:
     return grown(h, seen.g, seen.blocks[k][h.place])
 
 
-def _worth(yard: Yardstick, h: Hypothesis) -> float:
-    """A statistic beyond its threshold, less what further windows cost."""
+def _worth(h: Hypothesis) -> float:
+    """A statistic less the price of its freedom: how many like it were tried, amplitudes, further windows."""
+    tried = len(h.batch.places) * len(h.batch.histories)
     more = max(len(h.when.windows) - 1, 0) if h.family not in ("sun", "joint") else 0
-    return h.statistic - yard.thresholds[h.family] - GROWTH / 2 * more
+    return h.statistic - 2.0 * float(np.log(tried)) - AMPLITUDE * (h.batch.q - 1) - GROWTH / 2 * more
 
 
 def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from twin.diagnose.batch import Batch, Prepared, prepared, score
 from twin.diagnose.unknown import Heat, evidence, with_information
@@ -22,12 +23,22 @@ class Columns:
     batches: tuple[Batch, ...]
     grams: tuple[np.ndarray, ...]  # per batch (p, L, L): D^T D of each place
     heat: Heat  # with D^T D as its F
+    others: np.ndarray  # (q, n) of the nuisance columns that are the same for all data (`fitter`)
 
     @classmethod
-    def of(cls, raw: np.ndarray, batches: Sequence[Batch], heat: Heat) -> Columns:
-        """heat: with any F."""
+    def of(cls, raw: np.ndarray, batches: Sequence[Batch], heat: Heat, others: np.ndarray) -> Columns:
+        """heat: with any F; others (m, q) white."""
         grams = tuple(np.stack([_gram(raw, c) for c in b.columns]) for b in batches)
-        return cls(raw, tuple(batches), grams, with_information(heat, [_gram(raw, c) for c in heat.columns]))
+        with_F = with_information(heat, [_gram(raw, c) for c in heat.columns])
+        return cls(raw, tuple(batches), grams, with_F, _product(others, raw))
+
+
+def _product(left: np.ndarray, raw: np.ndarray) -> np.ndarray:
+    """left^T raw in double precision, some columns at a time."""
+    result = np.empty((left.shape[1], raw.shape[1]))
+    for first in range(0, raw.shape[1], CHUNK):
+        result[:, first : first + CHUNK] = left.T @ raw[:, first : first + CHUNK].astype(float)
+    return result
 
 
 def _gram(raw: np.ndarray, columns: np.ndarray) -> np.ndarray:
@@ -56,21 +67,16 @@ class Sight:
 
 def sight(columns: Columns, projector: Projector, white: np.ndarray) -> Sight:
     """The scores of white residuals (m,)."""
-    raw = columns.raw
-    n = raw.shape[1]
     N, lower = projector.N, np.tril(projector.factor[0])
-    B = np.empty((N.shape[1], n))
-    g = np.empty(n)
-    for first in range(0, n, CHUNK):
-        part = raw[:, first : first + CHUNK].astype(float)
-        B[:, first : first + CHUNK] = N.T @ part
-        g[first : first + CHUNK] = white @ part
-    half = np.linalg.solve(lower, B)  # F = D^T D - half^T half
-    g = g - half.T @ np.linalg.solve(lower, N.T @ white)
+    own = N.shape[1] - len(columns.others)  # the first ones belong to these data: parameters, accepted causes
+    product = _product(np.column_stack([N[:, :own], white]), columns.raw)
+    B, g = np.vstack([product[:-1], columns.others]), product[-1]
+    half = scipy.linalg.solve_triangular(lower, B, lower=True)  # F = D^T D - half^T half
+    g = g - half.T @ scipy.linalg.solve_triangular(lower, N.T @ white, lower=True)
     blocks = []
     for batch, gram in zip(columns.batches, columns.grams, strict=True):
-        own = half[:, batch.columns].transpose(1, 0, 2)  # (p, q, L)
-        blocks.append(gram - own.transpose(0, 2, 1) @ own)
+        of_place = half[:, batch.columns].transpose(1, 0, 2)  # (p, q, L)
+        blocks.append(gram - of_place.transpose(0, 2, 1) @ of_place)
     heat = with_information(
         columns.heat, [F - half[:, c].T @ half[:, c] for F, c in zip(columns.heat.F, columns.heat.columns, strict=True)]
     )

@@ -47,6 +47,16 @@ class Whitener:
             first += planned.size
         return np.concatenate(parts)
 
+    def colour(self, white: np.ndarray) -> np.ndarray:
+        """White values (m,) back in their units, of channels without memory; NaN where nothing was measured."""
+        parts, first = [], 0
+        for k, (sensors, tcp) in zip(self.study.fitted, self.channels, strict=True):
+            planned = self.study.runs[k]
+            T, w = planned.split(white[first : first + planned.size])
+            parts += [(T * sensors.sigma).ravel(), (w * tcp.sigma).ravel()]
+            first += planned.size
+        return np.where(missing(self.study), np.nan, np.concatenate(parts))
+
 
 @dataclass(frozen=True)
 class Projector:
@@ -56,9 +66,10 @@ class Projector:
     factor: tuple[np.ndarray, bool]  # Cholesky of 1 + N^T N
 
     @classmethod
-    def of(cls, N: np.ndarray) -> Projector:
-        """From the columns."""
-        return cls(N, scipy.linalg.cho_factor(np.eye(N.shape[1]) + N.T @ N, lower=True))
+    def of(cls, N: np.ndarray, gram: np.ndarray | None = None) -> Projector:
+        """From the columns; gram: N^T N, where it is known."""
+        known = N.T @ N if gram is None else gram
+        return cls(N, scipy.linalg.cho_factor(np.eye(N.shape[1]) + known, lower=True))
 
     def __call__(self, white: np.ndarray) -> np.ndarray:
         """Pi @ white (m, ...)."""

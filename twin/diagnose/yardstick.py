@@ -19,6 +19,7 @@ from twin.diagnose.bank import Nominal, nominal_run, respond
 from twin.diagnose.catalogue import Family
 from twin.diagnose.elements import Elements, elements_of, slim
 from twin.diagnose.fitter import Fitter
+from twin.diagnose.formal import known_forms
 from twin.diagnose.hypotheses import Context
 from twin.diagnose.nulls import Form, Instruments, null
 from twin.diagnose.readings import readings_of
@@ -30,7 +31,7 @@ from twin.diagnose.whiten import Whitener, offsets
 from twin.progress import Progress, silent
 
 FORM, NULLS = 60, 200
-MODES = 45
+MODES = 30
 OFFSET = 0.1  # K, prior of every sensor's constant error
 TCP_ZERO = 0.5e-6  # m, prior of every TCP component's constant error
 ALARM = 0.03
@@ -58,9 +59,9 @@ def _null_residual(shared: tuple[Fitter, list[np.ndarray], Instruments, Form], s
     """What a calibration leaves of a null (m,)."""
     fitter, J, instruments, form = shared
     fitted = fitter(null(fitter.study, J, seed, instruments, form))
-    n = len(fitted.x)
-    found = fitted.projector.most_likely(fitter.whiten(fitted.residual))
-    return fitted.residual - fitted.J @ found[:n]
+    white = fitter.whiten(fitted.residual)
+    explained = fitted.projector.N @ fitted.projector.most_likely(white)
+    return fitter.whiten.colour(white - explained)
 
 
 def _null_largest(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Columns], seed: int) -> dict[str, float]:
@@ -101,7 +102,8 @@ def make_yardstick(
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
     offset, zero = OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study)
-    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero)]))
+    known = known_forms(study, elements, nominal, raw, J, whiten, form)
+    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero), known]))
     with progress("measurements without a cause: form", counts[0]) as advance:
         shared = (fitter, J_of, instruments, form)
         left = np.stack(each(_null_residual, shared, list(range(counts[0])), lambda _: advance("")), axis=1)
@@ -110,10 +112,11 @@ def make_yardstick(
     variance = s**2 / max(counts[0], 1)
     kept = min(MODES, int(np.sum(variance > 3.0)))
     modes = U[:, :kept] * np.sqrt(np.maximum(variance[:kept] - 1.0, 0.0))
-    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero), modes]))
+    known = known_forms(study, elements, nominal, raw, J, whiten, form)
+    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero), known, modes]))
     context = Context(study, elements, index)
     batches = [b for f in families for b in f.batches(context) if b.columns.size]
-    columns = Columns.of(_whitened(whiten, raw), batches, heat_of(study, elements))
+    columns = Columns.of(_whitened(whiten, raw), batches, heat_of(study, elements), fitter.others)
     with progress("measurements without a cause: thresholds", counts[1]) as advance:
         seeds = list(range(10_000, 10_000 + counts[1]))
         largest = each(_null_largest, (fitter, J_of, instruments, form, columns), seeds, lambda _: advance(""))

@@ -1,0 +1,86 @@
+"""Errors of form that are known by kind: nuisance columns with priors, from the same sizes that synthetic data use.
+
+What the modes of `yardstick` would have to learn from hundreds of synthetic measurements is mostly known beforehand:
+where a source's heat enters, each face's coefficient, each film's reaction to speed, each sensor's place, each zone's air, and each channel's own
+reading of every source. Only the rest is left to be learned.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.diagnose.bank import Nominal
+from twin.diagnose.elements import EXPONENT, Elements
+from twin.diagnose.nulls import Form, typical
+from twin.diagnose.study import Study
+from twin.diagnose.whiten import Whitener
+
+READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
+LEAST = 0.7  # standard deviations over all its rows that a direction of a channel's readings must have
+
+
+def known_forms(
+    study: Study, elements: Elements, nominal: tuple[Nominal, ...], raw: np.ndarray, J: np.ndarray, whiten: Whitener,
+    form: Form,
+) -> np.ndarray:  # fmt: skip
+    """White columns (m, k) of unit prior variance; raw (m, n) responses in physical units, J (m, n_parameters)."""
+    load, bench = study.bench.base.load_model, study.bench
+    films = [f.name for f in load.films]
+    usual = np.mean([typical(study, k) for k in study.fitted], axis=0)
+    columns: list[np.ndarray] = []
+
+    def add(key: tuple[str, str, str], size: float) -> None:
+        if key in elements.index and size > 0.0:
+            columns.append(size * raw[:, elements.index[key]].astype(float))
+
+    for place in bench.places:
+        if place.film:
+            add(("film", place.name, "always"), form.local_film * float(usual[films.index(place.film)]))
+    for f, film in enumerate(load.films):
+        for signal in film.use.signals.values():
+            add(("group_film", film.name, f"{signal}^{EXPONENT:g}"), form.wind * float(usual[f]))
+    for kind, source, history in list(elements.index):
+        if kind == "moved":
+            add((kind, source, history), form.beside)
+    for environment in load.environments:
+        for c in elements.block_of.get(("air", environment.name), ()):
+            columns.append(form.air * raw[:, c].astype(float))
+    (body,) = bench.base.bodies
+    first = {k: sum(study.runs[i].size for i in study.fitted if i < k) for k in study.fitted}
+    for s in range(len(bench.base.sensors)):
+        moved = np.zeros(len(J))
+        for k in study.fitted:
+            planned = study.runs[k]
+            m = planned.measured
+            if s in m.column:
+                i = int(np.flatnonzero(m.column == s)[0])
+                own = m.mean_of @ (nominal[k].states @ (bench.ghosts[s] - body.C[s]))
+                (b, n), _ = planned.shapes
+                moved[first[k] + np.arange(b) * n + i] = form.aside * own
+        if np.any(moved):
+            columns.append(moved)
+    parts = [whiten(np.stack(columns, axis=1))] if columns else []
+    return np.hstack([*parts, *_readings(study, J, whiten, form)]) if parts else np.zeros((len(J), 0))
+
+
+def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
+    """Per channel the leading directions of what sources and contacts do to it, in all runs."""
+    own = [i for i, p in enumerate(study.bench.parameters) if p.kind in READ]
+    white = whiten(form.reading * J[:, own] / study.scale[own])
+    label = np.concatenate([_labels(study, k) for k in study.fitted])
+    result = []
+    for channel in np.unique(label):
+        rows = np.flatnonzero(label == channel)
+        U, s, _ = np.linalg.svd(white[rows], full_matrices=False)
+        kept = s > LEAST
+        block = np.zeros((len(white), int(kept.sum())))
+        block[rows] = U[:, kept] * s[kept]
+        result.append(block)
+    return result
+
+
+def _labels(study: Study, k: int) -> np.ndarray:
+    """(size,) which channel every number of a run is of: sensors by number, TCP components -1 to -3."""
+    planned = study.runs[k]
+    (b, _), (rows, _) = planned.shapes
+    return np.concatenate([np.tile(planned.measured.column, b), np.tile([-1, -2, -3], rows)])
