@@ -162,6 +162,13 @@ def diagnose(
         g for k, m in enumerate(opened, start=len(runs))
         for g in gains(shown, k, m, settings.seed, _floors(yard, m))
     )  # fmt: skip
+    worse = sum(g.ci95[1] < 0.0 for g in table)
+    if extension and worse > sum(g.ci95[0] > 0.0 for g in table):
+        notes.append(
+            f"not written into the description: on the sealed run the extension makes {worse} of {len(table)} channels "
+            "worse beyond chance, so the names explain the runs that were looked at and not the machine"
+        )
+        extension = ()
     first = found.steps[0]
     diagnosis = Diagnosis(
         machine=machine.machine.name,

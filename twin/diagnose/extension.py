@@ -38,7 +38,7 @@ def write_extension(
     """
     diagnosis = result.diagnosis
     if not result.causes:
-        return diagnosis, ["the description needs no extension"]
+        return diagnosis, [n for n in diagnosis.notes if n.startswith("not written")] or ["no extension is written"]
     study = result.search.yardstick.study
     said: list[str] = []
     text, done = artefact.description, []

@@ -1,8 +1,8 @@
 """Errors of form that are known by kind: nuisance columns with priors, from the same sizes that synthetic data use.
 
 What the modes of `yardstick` would have to learn from hundreds of synthetic measurements is mostly known beforehand:
-where a source's heat enters, each face's coefficient, each film's reaction to speed, each sensor's place, each zone's air, and each channel's own
-reading of every source. Only the rest is left to be learned.
+where a source's heat enters, each face's coefficient, each film's reaction to speed, each sensor's place, each zone's
+air, and each channel's own reading of every source. Only the rest is left to be learned.
 """
 
 from __future__ import annotations
