@@ -29,7 +29,7 @@ from twin.progress import bar
 
 OUT = Path("out/campaign")
 NOISE = 0.08  # K
-SETTINGS = Settings(temperature_sigma=NOISE, form=50, nulls=90)
+SETTINGS = Settings(temperature_sigma=NOISE)
 NULLS, EACH = 200, 10
 SIZES = (1.0, 0.5, 2.0)
 MORE = (("outside", 20), ("null_law", 10), ("pair", 10), ("two", 10), ("effect_and_sensor", 10))

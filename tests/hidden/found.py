@@ -1,0 +1,62 @@
+"""What `twin diagnose` says of the trials: the nominal machine and the runs, nothing else."""
+
+from __future__ import annotations
+
+import fcntl
+from dataclasses import dataclass
+from functools import cache
+
+from tests.hidden.load import MODEL
+from tests.hidden.trials import trial
+from twin.build.cache import folder
+from twin.calibrate.measured import measured
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.diagnose import Settings, prepare
+from twin.diagnose.diagnosis import Cause, Verdict
+from twin.diagnose.search import search
+from twin.diagnose.study import with_measured
+from twin.diagnose.verdict import unknown_of, verdict_of
+from twin.diagnose.whiten import measured_of
+from twin.diagnose.yardstick import Yardstick
+from twin.machine.load import load_machine
+
+SETTINGS = Settings(temperature_sigma=0.08, form=30, nulls=40)
+
+
+@dataclass(frozen=True)
+class Said:
+    """Of one trial."""
+
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    part: str  # that unknown heat enters, "" if none
+
+
+@cache
+def yardstick() -> Yardstick:
+    """Of the nominal machine on the loads of the trials; minutes on two cores, then in the cache folder."""
+    machine = load_machine(MODEL)
+    runs, _ = trial("null_0")
+    folder().mkdir(parents=True, exist_ok=True)
+    with (folder() / "yardstick.lock").open("w") as lock:  # one process makes it, the others wait
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return prepare(None, machine, runs[:2], runs[2:], SETTINGS)[2]
+
+
+def said(_: None, name: str) -> Said:
+    """The diagnosis of a trial."""
+    yard = yardstick()
+    runs, _expected = trial(name)
+    study = yard.study
+    usable, stuck = stuck_sensors(runs[:2], study.bench.base.sensors, [p.run.name for p in study.runs[:2]])
+    plans = [
+        measured(study.bench.base, run, p.run.drive, p.run.name)
+        for run, p in zip([*usable, runs[2]], study.runs, strict=True)
+    ]
+    found = search(yard, measured_of(with_measured(study, plans)))
+    verdict, causes = verdict_of(found, FAMILIES)
+    unknown = unknown_of(found)
+    if stuck:
+        verdict, causes = "sensor" if verdict == "nothing" else verdict, (*stuck, *causes)
+    return Said(verdict, causes, "" if unknown is None else unknown.part)
