@@ -275,7 +275,7 @@ def test_lumped_machines_have_nodes_for_surfaces():
         (cause("heat_source", "bed.x_max", 12.0, signal="shop_air"), "no law heats"),
         (cause("heat_source", "bed.x_max", -12.0, "W"), "outside 0"),
         (cause("film_gain", "films.flor", 2.0), "did you mean 'films.floor'"),
-        (cause("zone", "films.floor", 2.0, "K"), "environment.shop"),
+        (cause("zone", "films.flor", 2.0, "K"), "did you mean 'films.floor'"),
         (cause("forced_convection", "bed.x_max", 2.0, signal="x_current"), "speed in m/s"),
         (cause("sun", "bed.x_max", 2.0), "profile"),
         (cause("capacity", "bed.x_max", 5e3, "J/K", windows=DAY), "without windows"),
@@ -307,3 +307,15 @@ def test_windows_become_columns_of_their_runs():
     assert out.loads.columns["found_2"].tolist() == [1.0, 1.0, 1.0, 1.0]
     assert (out.loads.units["found_1"], out.loads.columns["air"].tolist()) == ("1", [20.0] * 4)
     assert "found_1" not in run.loads.columns
+
+
+def test_one_film_may_have_air_of_its_own():
+    before = load_machine(FILES["slide"])
+    air = before.environment[before.films["floor"].environment]
+    machine = extended("slide", cause("zone", "films.floor", 2.0, "K"))
+    own = machine.environment[machine.films["floor"].environment]
+    assert machine.films["floor"].environment == "found_1"
+    assert own.offset == pytest.approx(air.offset + 2.0)
+    assert own.signal == air.signal
+    others = [n for n in before.films if n != "floor"]
+    assert [machine.films[n].environment for n in others] == [before.films[n].environment for n in others]
