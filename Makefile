@@ -46,6 +46,10 @@ test: $(READY) ## the fast tests
 test-all: $(READY) ## every test, the slow ones too
 	$(BIN)/python -m pytest -m "slow or not slow" $(PYTEST_ARGS)
 
+.PHONY: hidden
+hidden: $(READY) ## the trials in which a hidden effect must be found (about 15 min)
+	$(BIN)/python -m pytest -m slow tests/hidden/test_found.py $(PYTEST_ARGS)
+
 .PHONY: bench
 bench: $(READY) ## what is claimed about speed, memory and accuracy, measured here
 	$(BIN)/python -m benchmarks
