@@ -11,7 +11,7 @@ from twin.diagnose.verdict import limits_of
 
 pytestmark = pytest.mark.slow  # the yardstick of the five-axis machine takes ten minutes on two cores: `make hidden`
 
-# What today's search does not say as it should. Not run, and told in docs/diagnosis.md: mend it, and take it out here.
+# Trials that are left out; none: `make hidden` shows what the search does not say as it should.
 MISSED: tuple[str, ...] = ()
 NAMES = [name for name in TRIALS if name != "coarse_model" and name not in MISSED]
 
