@@ -120,3 +120,28 @@ def _shares(shares: np.ndarray | None, which: np.ndarray, shape: tuple[int, ...]
 def factors(exponents: Array, u: Array) -> jax.Array:
     """exp(exponents @ u): the factors of sources, films, conductances, capacities or expansions."""
     return jnp.exp(jnp.asarray(exponents) @ u)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Factors:
+    """Factors, and shifts of environments [K], at one u."""
+
+    source: jax.Array
+    film: jax.Array
+    joint: jax.Array
+    contact: jax.Array
+    environment: jax.Array
+    capacity: jax.Array
+
+
+def factors_at(effects: Effects, u: jax.Array) -> Factors:
+    """What parameters u (n,) make of a model."""
+    return Factors(
+        factors(effects.source, u),
+        factors(effects.film, u),
+        factors(effects.joint, u),
+        factors(effects.contact, u),
+        jnp.asarray(effects.environment) @ u,
+        factors(effects.capacity, u),
+    )

@@ -23,7 +23,7 @@ import numpy as np
 from jax import lax
 from jax.scipy.linalg import cho_solve
 
-from twin.calibrate.effects import Effects, contact_names, factors
+from twin.calibrate.effects import Effects, Factors, contact_names, factors, factors_at
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 from twin.run.stepping import Inputs, inputs_of, loads_of
@@ -131,7 +131,7 @@ def _step(
     derivative: bool,
     system: System,
     effects: Effects,
-    scaled: _Scaled,
+    scaled: Factors,
     z: jax.Array,
     loads: Loads,
 ) -> jax.Array:
@@ -172,31 +172,7 @@ def _step(
     return lax.fori_loop(0, inputs.substeps, substep, z)
 
 
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class _Scaled:
-    """Factors and shifts at one u."""
-
-    source: jax.Array
-    film: jax.Array
-    joint: jax.Array
-    contact: jax.Array
-    environment: jax.Array
-    capacity: jax.Array
-
-
-def _scaled(effects: Effects, u: jax.Array) -> _Scaled:
-    return _Scaled(
-        factors(effects.source, u),
-        factors(effects.film, u),
-        factors(effects.joint, u),
-        factors(effects.contact, u),
-        jnp.asarray(effects.environment) @ u,
-        factors(effects.capacity, u),
-    )
-
-
-def _with(inputs: Inputs, layout: Layout, scaled: _Scaled) -> Inputs:
+def _with(inputs: Inputs, layout: Layout, scaled: Factors) -> Inputs:
     """The runtime's inputs of a step with powers, films and environments of u."""
     n = layout.n_films
     films, losses = np.array(layout.following_films, dtype=int), np.array(layout.following_losses, dtype=int)
@@ -226,7 +202,7 @@ def trajectory(
     derivative: whether derivatives by u are wanted; without them a step needs no inverse and no correction.
     """
     n = effects.source.shape[1]
-    scaled = _scaled(effects, jnp.asarray(u)[:n])
+    scaled = factors_at(effects, jnp.asarray(u)[:n])
     z0 = jnp.asarray(start) + jnp.asarray(u)[n:] @ jnp.asarray(effects.initial)
 
     def one(z: jax.Array, now: Loads) -> tuple[jax.Array, jax.Array]:

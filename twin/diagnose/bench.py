@@ -20,6 +20,7 @@ from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
 from twin.calibrate.march import Places as Contacts
 from twin.calibrate.march import places_of as contacts_of
+from twin.calibrate.problem import run_names
 from twin.calibrate.window import merged, window_basis
 from twin.diagnose.march import INNER, Loads, loads_for
 from twin.diagnose.places import GHOST, Place, places_of, pruned, with_ghosts, with_places
@@ -126,13 +127,6 @@ def _heights(machine: Machine, full: FullModel, model: MachineModel) -> list[np.
                     H[:, k] = term @ z
         result.append(H)
     return result
-
-
-def run_names(runs: Sequence[Run]) -> list[str]:
-    """Short names of runs, each once."""
-    from twin.calibrate.problem import run_names as names
-
-    return names(runs)
 
 
 def fine_drive(model: MachineModel, run: Run, dt: float = FINE) -> Drive:

@@ -12,8 +12,9 @@ import numpy as np
 from twin import __version__
 from twin.build.cache import cached, machine_hash
 from twin.calibrate.measured import Measured, measured
+from twin.calibrate.problem import run_names
 from twin.calibrate.training import states_at
-from twin.diagnose.bench import Bench, make_bench, run_names
+from twin.diagnose.bench import Bench, make_bench
 from twin.diagnose.catalogue import FAMILIES, VERSION, Family
 from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
@@ -21,7 +22,7 @@ from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
 from twin.diagnose.search import Search, search
 from twin.diagnose.study import Study, make_study
-from twin.diagnose.verdict import cause_of, limits_of, pulls_of, rival_of, unknown_of, verdict_of
+from twin.diagnose.verdict import limits_of, pulls_of, rival_of, unknown_of, verdict_of
 from twin.diagnose.whiten import measured_of
 from twin.diagnose.yardstick import FORM, NULLS, Yardstick, instruments_of, make_yardstick
 from twin.errors import ArtefactError, LogError
@@ -297,8 +298,3 @@ def _series(found: Search, plans: Sequence[Measured], fitted: int) -> tuple[Seri
             )
         )  # fmt: skip
     return tuple(result)
-
-
-def accepted_causes(found: Search) -> tuple[Cause, ...]:
-    """All accepted causes in words."""
-    return tuple(cause_of(a) for a in found.accepted)

@@ -23,7 +23,7 @@ import numpy as np
 from jax import lax
 from jax.scipy.linalg import cho_solve
 
-from twin.calibrate.effects import Effects, contact_names, factors
+from twin.calibrate.effects import Effects, Factors, contact_names, factors_at
 from twin.calibrate.march import Places, Rows
 from twin.rom.drive import Drive
 from twin.rom.following import FilmPlan, difference_place, film_state, read_table, temperature_place
@@ -111,27 +111,6 @@ def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> Loads:
         power_table=inner(drive.losses.value),
         contact_heat=inner(drive.contact_heat @ body.P.T),
     )
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Factors:
-    """What the parameters make of a model."""
-
-    source: jax.Array
-    film: jax.Array
-    joint: jax.Array
-    contact: jax.Array
-    environment: jax.Array
-    capacity: jax.Array
-
-
-def factors_at(effects: Effects, u: jax.Array) -> Factors:
-    """At u (n,), see `twin.calibrate.effects`."""
-    return Factors(
-        factors(effects.source, u), factors(effects.film, u), factors(effects.joint, u), factors(effects.contact, u),
-        jnp.asarray(effects.environment) @ u, factors(effects.capacity, u),
-    )  # fmt: skip
 
 
 def _gamma(places: Places, loads: Loads, contact: jax.Array, n_ports: int) -> jax.Array:
