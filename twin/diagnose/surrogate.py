@@ -2,7 +2,7 @@
 
 Calibration needs the Jacobian where it ends, not where it began: two parameters of large and nearly equal effect are a
 weak direction only at the point where they nearly cancel, and a Jacobian that is 10 % off there turns a hundred
-standard deviations of cancelled effect into ten of misfit (measured: it was most of what thresholds consisted of).
+standard deviations of cancelled effect into ten of misfit.
 
     y(t) = y0 + J t + 1/2 t^T H t,     t_j = e^u - 1 of what heats or grows, 1 - e^-u of what conducts away
 
