@@ -5,6 +5,7 @@ import hashlib
 import re
 import resource
 import signal
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -176,20 +177,26 @@ def test_a_matrix_that_does_not_fit_is_named(path):
     assert "bodies/body_2/P" in refuse(damaged(path, replace)).what
 
 
-@pytest.fixture
+@contextmanager
 def full_disk():
-    """Files cannot grow beyond 10 kB, as on a disk that is full."""
+    """Files cannot grow beyond 10 kB, as on a disk that is full.
+
+    Not a fixture: the limit holds for the process, and pytest reports a test before it tears its fixtures down, so a
+    session whose output goes to a file of more than 10 kB would die of it.
+    """
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    signal.signal(signal.SIGXFSZ, handler)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
 
 
-def test_a_full_disk_leaves_the_old_file_and_nothing_else(path, full_disk):
+def test_a_full_disk_leaves_the_old_file_and_nothing_else(path):
     before = path.read_bytes()
-    with pytest.raises(TwinError, match="cannot write"):
+    with pytest.raises(TwinError, match="cannot write"), full_disk():
         write(path)
     assert path.read_bytes() == before
     assert [p.name for p in path.parent.iterdir()] == ["a.h5"]
