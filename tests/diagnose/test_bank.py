@@ -42,8 +42,7 @@ def history(key, elements, study):
     ids=".".join,
 )
 def test_against_differences(key):
-    """On the machine whose laws read no temperature, where responses leave out nothing but the exact march's second
-    stage: they step by implicit Euler, and nodes of less than a minute feel that."""
+    """On the machine whose laws read no temperature, where responses leave out nothing."""
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
     kind, place, _ = key
     unit = Unit(kind, place, elements.index[key], history(key, elements, study))
@@ -57,10 +56,12 @@ def test_against_differences(key):
     wanted = np.concatenate(parts)
     size = np.abs(wanted).max()
     assert size > 0.0
-    assert np.abs(got - wanted).max() < 0.06 * size
+    # a contact's flow follows the state within a step, of which a response sees the mean
+    most = 0.1 if kind == "contact" else 0.005
+    assert np.abs(got - wanted).max() < most * size
     cosine = got @ wanted / np.sqrt((got @ got) * (wanted @ wanted))
-    assert cosine > 0.997
-    assert got @ wanted / (wanted @ wanted) == pytest.approx(1.0, abs=0.05)
+    assert cosine > 1.0 - most / 10
+    assert got @ wanted / (wanted @ wanted) == pytest.approx(1.0, abs=most)
 
 
 def test_reactions_of_laws_are_small():
@@ -101,7 +102,7 @@ def test_many_columns_are_stepped_in_portions(monkeypatch):
     some = elements.columns[:7]
     whole = respond(study, nominal, elements.vectors, some)
     monkeypatch.setattr(bank, "AT_ONCE", 3)
-    np.testing.assert_allclose(respond(study, nominal, elements.vectors, some), whole, atol=1e-7 * np.abs(whole).max())
+    np.testing.assert_allclose(respond(study, nominal, elements.vectors, some), whole, atol=1e-6 * np.abs(whole).max())
 
 
 def test_an_absent_history_leaves_zero():

@@ -2,21 +2,21 @@
 
 About the calibrated trajectory z(t) a cause of small amplitude enters as a forcing f(t) = v(t) s(t): v the place (the
 input vector of a surface, the heat that its film would carry, the flow of a joint), s its history. All are stepped
-together as columns of one linear march with the matrices of the nominal run, so that thousands of hypotheses cost a few
-matrix products per step. The laws' own reaction is left out here, and is in the exact refit of what was chosen.
+together as columns of one linear march with the matrices of the nominal run and the steps of `twin.diagnose.march`, so
+that thousands of hypotheses cost a few matrix products per step. The laws' own reaction is left out here, and is in the
+exact refit of what was chosen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 
 from twin.calibrate.effects import contact_names
-from twin.diagnose.march import INNER, Loads, _gamma
+from twin.diagnose.march import GAMMA, Loads, gammas
 from twin.diagnose.study import Study
 from twin.rom.following import FilmPlan, difference_place, film_state, read_table
 
@@ -31,8 +31,13 @@ class Nominal:
     total: np.ndarray  # (n m, n_films) W/(m^2 K), radiation included
     convection: np.ndarray  # (n m, n_films)
     outer: np.ndarray  # (n m, n_films) K above the reference temperature
-    inverse: np.ndarray  # (n, r, r) of S
-    rate: float  # 1/s
+    inverse: np.ndarray  # (n m, r, r) of S, float32
+    rate: float  # 1/s, of fine steps
+
+    @property
+    def middle(self) -> np.ndarray:
+        """(n m, r) states that the two stages of a step see in the mean."""
+        return 0.5 * (self.states[:-1] + self.states[1:])
 
 
 def nominal_run(study: Study, k: int) -> Nominal:
@@ -50,8 +55,8 @@ def nominal_run(study: Study, k: int) -> Nominal:
     following = np.array(layout.following_films, dtype=int)
     rate = float(np.asarray(loads.rate)[0])
     total, convection, outer = (np.zeros((n * m, n_films)) for _ in range(3))
-    inverse = np.zeros((n, len(A0), len(A0)))
-    ones = np.ones(len(contact_names(bench.base)))
+    inverse = np.zeros((n * m, *A0.shape), dtype=np.float32)
+    gamma = gammas(bench.contacts, loads, np.ones(len(contact_names(bench.base))), P.shape[1])
     for i in range(n):
         z = states[i * m]
         surface = np.asarray(system.reference_temperature) + (np.asarray(system.film_rows) @ z) / area
@@ -66,11 +71,10 @@ def nominal_run(study: Study, k: int) -> Nominal:
             total[i * m + j], convection[i * m + j] = state.total, h
             outer[i * m + j] = state.outer - float(system.reference_temperature)
         coefficients = np.concatenate([total[i * m : (i + 1) * m].mean(axis=0), np.asarray(loads.theta)[i, n_films:]])
-        one = replace(loads, diagonal=loads.diagonal[i], neighbour=loads.neighbour[i], weight=loads.weight[i])
-        S = rate * np.eye(len(A0)) + A0 + np.tensordot(coefficients - np.asarray(system.nominal), A, 1)
-        if P.shape[1]:
-            S = S + P @ np.asarray(_gamma(bench.contacts, one, jnp.asarray(ones), P.shape[1])) @ P.T
-        inverse[i] = scipy.linalg.cho_solve(scipy.linalg.cho_factor(S, lower=True), np.eye(len(S)))
+        S = rate / GAMMA * np.eye(len(A0)) + A0 + np.tensordot(coefficients - np.asarray(system.nominal), A, 1)
+        for j in range(i * m, (i + 1) * m):
+            factor = scipy.linalg.cho_factor(S + P @ gamma[j] @ P.T, lower=True)
+            inverse[j] = scipy.linalg.cho_solve(factor, np.eye(len(S)))
     return Nominal(states, total, convection, outer, inverse, rate)
 
 
@@ -109,29 +113,32 @@ def _march(
     planned = study.runs[k]
     (body,) = study.bench.base.bodies
     fine, r = len(nominal.states) - 1, body.n
-    C = body.C[planned.measured.column]
+    C = body.C[planned.measured.column].astype(np.float32)
     used = sorted({c.vector for c in columns})
     place = {v: j for j, v in enumerate(used)}
     which = np.array([place[c.vector] for c in columns])
-    S = np.stack([np.asarray(c.histories[k], dtype=float) for c in columns], axis=1)  # (fine, n)
+    S = np.stack([np.asarray(c.histories[k], dtype=np.float32) for c in columns], axis=1)  # (fine, n)
     constant = [vectors[v] if vectors[v].ndim == 1 else None for v in used]
-    X = np.zeros((r, len(columns)))
+    X = np.zeros((r, len(columns)), dtype=np.float32)
     T = np.zeros((fine + 1, len(C), len(columns)), dtype=np.float32)
     step, share = planned.rows.step, planned.rows.share
     needed = {int(s) for s in step} | {int(s) + 1 for s in step}
     kept: dict[int, np.ndarray] = {}
     if 0 in needed:
         kept[0] = X.copy()
-    V = np.empty((r, len(used)))
+    V = np.empty((r, len(used)), dtype=np.float32)
     for j, c in enumerate(constant):
         if c is not None:
             V[:, j] = c
     changing = [(j, vectors[v]) for j, v in enumerate(used) if constant[j] is None]
-    rate = nominal.rate
+    rate = np.float32(nominal.rate / GAMMA)
+    back = np.float32((1.0 - GAMMA) / GAMMA)
     for t in range(fine):
         for j, vector in changing:
             V[:, j] = vector[t]
-        X = nominal.inverse[t // INNER] @ (rate * X + V[:, which] * S[t])
+        known = V[:, which] * S[t]
+        middle = nominal.inverse[t] @ (rate * X + known)
+        X = nominal.inverse[t] @ (rate * (X + back * (middle - X)) + known)
         T[t + 1] = C @ X
         if t + 1 in needed:
             kept[t + 1] = X

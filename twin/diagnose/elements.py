@@ -21,12 +21,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import jax.numpy as jnp
 import numpy as np
 
 from twin.calibrate.effects import contact_names
 from twin.diagnose.bank import Column, Nominal
-from twin.diagnose.march import INNER
+from twin.diagnose.march import INNER, gammas
 from twin.diagnose.places import beside
 from twin.diagnose.study import Study
 from twin.rom.drive import Drive, evaluate
@@ -156,7 +155,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         block_of[kind, place] = np.arange(first, len(columns))
 
     always = histories.signals["always"]
-    z = [own.states[1:] for own in nominal]
+    z = [own.middle for own in nominal]
     films = [f.name for f in load.films]
     air = [run.drive.environment - bench.base.reference_temperature for run in runs]
     film_env = [f.environment for f in load.films]
@@ -228,20 +227,13 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
 
 def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:
     """-P Gamma_c P^T z (n_fine, r) of one contact at its nominal conductance."""
-    from twin.diagnose.march import _gamma
-
     bench = study.bench
     loads = study.runs[k].run.loads
     P = np.asarray(bench.system.P[0])
     mask = np.zeros(len(contact_names(bench.base)))
     mask[c] = 1.0
-    result = np.zeros_like(z)
-    for i in range(len(loads.rate)):
-        one = replace(loads, diagonal=loads.diagonal[i], neighbour=loads.neighbour[i], weight=loads.weight[i])
-        gamma = np.asarray(_gamma(bench.contacts, one, jnp.asarray(mask), P.shape[1]))
-        steps = slice(i * INNER, (i + 1) * INNER)
-        result[steps] = -((z[steps] @ P) @ gamma.T) @ P.T
-    return result
+    gamma = gammas(bench.contacts, loads, mask, P.shape[1])
+    return np.asarray(-np.einsum("tij,tj->ti", gamma, z @ P) @ P.T)
 
 
 def _powers(study: Study, k: int, nominal: Nominal) -> np.ndarray:
@@ -310,7 +302,7 @@ def _signals(
                 for i, f in enumerate(films):
                     grown = _convection(drive, i, own) - _convection(run.drive, f, own)
                     if np.any(grown):
-                        flow = -own.states[1:] @ A[f].T + own.outer[:, [f]] * M[:, f]
+                        flow = -own.middle @ A[f].T + own.outer[:, [f]] * M[:, f]
                         forcing = forcing + np.clip(grown, -50.0, 200.0)[:, None] * flow
                 moves |= bool(np.abs(forcing).max() > 0.0)
                 per_run.append(np.asarray(forcing))

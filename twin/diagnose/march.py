@@ -1,10 +1,11 @@
 """The window model stepped through a run with hypotheses switched on: states and exact derivatives.
 
-As `twin.calibrate.march`, with three differences. Loads keep their own fine steps (60 s) inside a coarse one (300 s)
-that shares its matrix: a switched load stays sharp at a fifth of the factorisations. A fine step is a two-stage SDIRK
-step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one matrix for both stages), as implicit Euler
-of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold what the description lacks, each times an
-amplitude a_k that is differentiated like a parameter:
+As `twin.calibrate.march`, with three differences. Loads and moving contacts keep their own fine steps (60 s) inside a
+coarse one (300 s) that shares the rest of the matrix: a switched load stays sharp at a fifth of the factorisations.
+Contacts join a fine step by its ports (Woodbury): held for 300 s they put a nut 0.13 K (rms) and the TCP 3 um off. A
+fine step is a two-stage SDIRK step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one matrix for
+both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold what the
+description lacks, each times an amplitude a_k that is differentiated like a parameter:
 
     (E + sum a_k E_k) x' = -(A(theta (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
                            + ... + sum a_k (gate_k rise_k M_k + forcing_k),      T_air + sum a_k environment_k
@@ -43,9 +44,9 @@ class Loads:
     rate: Array  # (n,) 1/s of the fine steps
     theta: Array  # (n, n_theta) W/(m^2 K): convection of films that read the log alone, then joints
     film_table: Array  # (n, k, 65) W/(m^2 K) over DIFFERENCES
-    diagonal: Array  # (n, c, n_ports) W/K, as `twin.calibrate.march.Loads`
-    neighbour: Array  # (n, c, n_ports)
-    weight: Array  # (n, n_pairs, n_segments)
+    diagonal: Array  # (n, m, c, n_ports) W/K, as `twin.calibrate.march.Loads`
+    neighbour: Array  # (n, m, c, n_ports)
+    weight: Array  # (n, m, n_pairs, n_segments)
     environment: Array  # (n, m, n_environments) degC
     power: Array  # (n, m, n_sources) W
     power_table: Array  # (n, m, l, 121) W over TEMPERATURES
@@ -98,14 +99,14 @@ def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> Loads:
         mask = np.array([p.contact == name for p in pairs])
         own.append(inputs_of(model.load_model, replace(drive, conductance=drive.conductance * mask), 1))
     inputs = inputs_of(model.load_model, drive, 1)
-    none = np.zeros((n, 0, len(model.load_model.ports)))
+    none = np.zeros((n, m, 0, len(model.load_model.ports)))
     return Loads(
         rate=np.full(n, 1.0 / (drive.time[1] - drive.time[0])),
         theta=mean(drive.theta),
         film_table=mean(drive.films.value),
-        diagonal=np.stack([mean(np.asarray(i.contact_diagonal)) for i in own], axis=1) if own else none,
-        neighbour=np.stack([mean(np.asarray(i.contact_neighbour)) for i in own], axis=1) if own else none,
-        weight=mean(np.asarray(inputs.contact_weight)),
+        diagonal=np.stack([inner(np.asarray(i.contact_diagonal)) for i in own], axis=2) if own else none,
+        neighbour=np.stack([inner(np.asarray(i.contact_neighbour)) for i in own], axis=2) if own else none,
+        weight=inner(np.asarray(inputs.contact_weight)),
         environment=inner(drive.environment),
         power=inner(drive.power),
         power_table=inner(drive.losses.value),
@@ -113,25 +114,42 @@ def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> Loads:
     )
 
 
-def _gamma(places: Places, loads: Loads, contact: jax.Array, n_ports: int) -> jax.Array:
-    """Gamma (n_ports, n_ports) W/K of one step with the contacts scaled by contact (c,)."""
-    diagonal = contact @ jnp.asarray(loads.diagonal)
-    beside = (contact @ jnp.asarray(loads.neighbour))[:-1]
-    gamma = jnp.diag(diagonal)
+def gamma_of(
+    places: Places, diagonal: Array, neighbour: Array, weight: Array, contact: Array, n_ports: int
+) -> jax.Array:
+    """Gamma (n_ports, n_ports) W/K of one fine step with the contacts scaled by contact (c,).
+
+    diagonal and neighbour (c, n_ports), weight (n_pairs, n_segments), as in `Loads`.
+    """
+    own, contact = jnp.asarray(contact) @ jnp.asarray(diagonal), jnp.asarray(contact)
+    beside = (contact @ jnp.asarray(neighbour))[:-1]
     i = np.arange(n_ports - 1)
-    gamma = gamma.at[i, i + 1].add(beside).at[i + 1, i].add(beside)
-    for k, c in enumerate(places.contact_of_pair):
-        pad, first, count = places.pad[k], places.first[k], places.count[k]
-        w = contact[c] * loads.weight[k, :count]
-        gamma = gamma.at[pad, first : first + count].add(-w).at[first : first + count, pad].add(-w)
-    return gamma
+    pairs = [(p, first + s, c, k, s)
+             for k, (c, p, first, n) in enumerate(
+                 zip(places.contact_of_pair, places.pad, places.first, places.count, strict=True))
+             for s in range(n)]  # fmt: skip
+    pad, segment, c, k, s = np.array(pairs, dtype=int).reshape(-1, 5).T
+    w = -contact[c] * jnp.asarray(weight)[k, s]
+    rows = np.concatenate([i, i + 1, pad, segment])
+    columns = np.concatenate([i + 1, i, segment, pad])
+    return jnp.diag(own).at[rows, columns].add(jnp.concatenate([beside, beside, w, w]))
+
+
+def gammas(places: Places, loads: Loads, contact: np.ndarray, n_ports: int) -> np.ndarray:
+    """Gamma (n m, n_ports, n_ports) W/K of all fine steps of a run."""
+    many = jax.jit(jax.vmap(partial(gamma_of, places), (0, 0, 0, None, None)), static_argnums=4)
+    flat = [np.asarray(v).reshape(-1, *v.shape[2:]) for v in (loads.diagonal, loads.neighbour, loads.weight)]
+    return np.asarray(many(*flat, contact, n_ports))
 
 
 def _step(
     layout: Layout, places: Places, derivative: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
     fixed: tuple[Array, Array, Array], z: jax.Array, now: tuple[Loads, Slots],
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
-    """The state after one coarse step, and those after its fine ones (m, r)."""
+    """The state after one coarse step, and those after its fine ones (m, r).
+
+    With M = A + P Gamma P^T, Y = A^-1 P: M^-1 = A^-1 - Y Gamma (1 + P^T Y Gamma)^-1 Y^T.
+    """
     loads, slots = now
     A_slots, M_slots, E_slots = (jnp.asarray(x) for x in fixed)
     n, T_ref, r = layout.n_films, system.reference_temperature, z.shape[0]
@@ -167,8 +185,7 @@ def _step(
     def E(x: jax.Array) -> jax.Array:
         return x + jnp.tensordot(f.capacity - 1.0, jnp.asarray(effects.E) @ x, 1) + jnp.tensordot(a, E_slots @ x, 1)
 
-    def S(x: jax.Array) -> jax.Array:
-        gamma = _gamma(places, loads, contact, P.shape[1])
+    def S(x: jax.Array, gamma: jax.Array) -> jax.Array:
         inside = jnp.asarray(system.A0[0]) @ x + coefficients @ (terms @ x) + gate @ (A_slots @ x)
         return rate * E(x) + inside + P @ (gamma @ (P.T @ x))
 
@@ -176,15 +193,9 @@ def _step(
     matrix = rate * jnp.eye(r) + jnp.asarray(system.A0[0]) + jnp.tensordot(held[0], terms, 1)
     matrix = matrix + rate * jnp.tensordot(held[1] - 1.0, jnp.asarray(effects.E), 1)
     matrix = matrix + jnp.tensordot(held[4], A_slots, 1) + rate * jnp.tensordot(held[3], E_slots, 1)
-    matrix = matrix + P @ _gamma(places, loads, held[2], P.shape[1]) @ P.T
-    factor = jnp.linalg.cholesky(matrix)
-    inverse = cho_solve((factor, True), jnp.eye(r)) if derivative else jnp.zeros((0, 0))
-
-    def solve(known: jax.Array) -> jax.Array:
-        if not derivative:
-            return jnp.asarray(cho_solve((factor, True), known))
-        solved = lax.stop_gradient(inverse @ lax.stop_gradient(known))
-        return solved + inverse @ (known - S(solved))
+    inverse = cho_solve((jnp.linalg.cholesky(matrix), True), jnp.eye(r))
+    Y = inverse @ P
+    seen = P.T @ Y
 
     tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
     winding = T_ref + system.source_rows @ z
@@ -196,6 +207,20 @@ def _step(
         ports = jnp.tensordot(f.source[np.array(places.sources, dtype=int)], jnp.asarray(loads.contact_heat)[i], 1)
         forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + system.B @ power + ports
         forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ M_slots + a @ jnp.asarray(slots.forcing)[i]
+        diagonal, neighbour, weight = (jnp.asarray(v)[i] for v in (loads.diagonal, loads.neighbour, loads.weight))
+        gamma = gamma_of(places, diagonal, neighbour, weight, contact, P.shape[1])
+        joined = lax.stop_gradient(gamma)
+        joined = joined @ jnp.linalg.inv(jnp.eye(len(seen)) + seen @ joined)
+
+        def inverted(known: jax.Array) -> jax.Array:
+            return inverse @ known - Y @ (joined @ (Y.T @ known))
+
+        def solve(known: jax.Array) -> jax.Array:
+            if not derivative:
+                return inverted(known)
+            solved = lax.stop_gradient(inverted(lax.stop_gradient(known)))
+            return solved + inverted(known - S(solved, gamma))
+
         middle = solve(rate * E(x) + forcing)
         after = solve(rate * E(x + (1.0 - GAMMA) / GAMMA * (middle - x)) + forcing)
         return after, after
