@@ -1,8 +1,7 @@
 """The window model stepped through a run with hypotheses switched on: states and exact derivatives.
 
 As `twin.calibrate.march`, with three differences. Loads and moving contacts keep their own fine steps (60 s) inside a
-coarse one (300 s) that shares the rest of the matrix: a switched load stays sharp at a fifth of the factorisations.
-Contacts join a fine step by its ports (Woodbury): held for 300 s they put a nut 0.13 K (rms) and the TCP 3 um off. A
+coarse one (300 s) of films and joints: contacts held for 300 s put a nut 0.13 K (rms) and the TCP 3 um off. A
 fine step is a two-stage SDIRK step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one matrix for
 both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold what the
 description lacks, each times an amplitude a_k that is differentiated like a parameter:
@@ -114,45 +113,66 @@ def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> Loads:
     )
 
 
-def gamma_of(
-    places: Places, diagonal: Array, neighbour: Array, weight: Array, contact: Array, n_ports: int
-) -> jax.Array:
-    """Gamma (n_ports, n_ports) W/K of one fine step with the contacts scaled by contact (c,).
-
-    diagonal and neighbour (c, n_ports), weight (n_pairs, n_segments), as in `Loads`.
-    """
-    own, contact = jnp.asarray(contact) @ jnp.asarray(diagonal), jnp.asarray(contact)
-    beside = (contact @ jnp.asarray(neighbour))[:-1]
-    i = np.arange(n_ports - 1)
+def flows(places: Places, diagonal: Array, neighbour: Array, weight: Array, contact: Array, y: jax.Array) -> jax.Array:
+    """Gamma y (n_ports, k) W at port temperatures y (n_ports, k), of one fine step with the contacts scaled by contact
+    (c,); diagonal and neighbour (c, n_ports), weight (n_pairs, n_segments), as in `Loads`."""
+    contact = jnp.asarray(contact)
+    beside = (contact @ jnp.asarray(neighbour))[:-1, None]
     pairs = [(p, first + s, c, k, s)
              for k, (c, p, first, n) in enumerate(
                  zip(places.contact_of_pair, places.pad, places.first, places.count, strict=True))
              for s in range(n)]  # fmt: skip
     pad, segment, c, k, s = np.array(pairs, dtype=int).reshape(-1, 5).T
-    w = -contact[c] * jnp.asarray(weight)[k, s]
-    rows = np.concatenate([i, i + 1, pad, segment])
-    columns = np.concatenate([i + 1, i, segment, pad])
-    return jnp.diag(own).at[rows, columns].add(jnp.concatenate([beside, beside, w, w]))
+    w = -(contact[c] * jnp.asarray(weight)[k, s])[:, None]
+    result = (contact @ jnp.asarray(diagonal))[:, None] * y
+    result = result.at[:-1].add(beside * y[1:]).at[1:].add(beside * y[:-1])
+    return result.at[np.concatenate([pad, segment])].add(jnp.concatenate([w * y[segment], w * y[pad]]))
 
 
 def gammas(places: Places, loads: Loads, contact: np.ndarray, n_ports: int) -> np.ndarray:
     """Gamma (n m, n_ports, n_ports) W/K of all fine steps of a run."""
-    many = jax.jit(jax.vmap(partial(gamma_of, places), (0, 0, 0, None, None)), static_argnums=4)
+    many = jax.jit(jax.vmap(partial(flows, places), (0, 0, 0, None, None)))
     flat = [np.asarray(v).reshape(-1, *v.shape[2:]) for v in (loads.diagonal, loads.neighbour, loads.weight)]
-    return np.asarray(many(*flat, contact, n_ports))
+    return np.asarray(many(*flat, contact, jnp.eye(n_ports)))
+
+
+def varied(c: jax.Array, terms: jax.Array, x: jax.Array) -> jax.Array:
+    """Nothing, with the derivative (dc . terms) x of a matrix c . terms that is itself held fixed.
+
+    A product of every term with every derivative of x, or a matrix per parameter, would cost ten times a step.
+    """
+    return (c - lax.stop_gradient(c)) @ (terms @ lax.stop_gradient(x))
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """E x of all steps of a trajectory, with its derivatives by the capacities' factors and amplitudes."""
+
+    value: jax.Array  # (r, r)
+    terms: jax.Array  # (q, r, r)
+    factors: jax.Array  # (q,)
+    derivative: bool
+
+    @classmethod
+    def of(cls, members: Array, factors: jax.Array, slots: Array, a: jax.Array, derivative: bool) -> Capacity:
+        """1 + factors . members + a . slots."""
+        terms = jnp.concatenate([jnp.asarray(members), jnp.asarray(slots)])
+        c = jnp.concatenate([factors, a])
+        return cls(jnp.eye(terms.shape[1]) + jnp.tensordot(lax.stop_gradient(c), terms, 1), terms, c, derivative)
+
+    def __call__(self, x: jax.Array) -> jax.Array:
+        fixed = self.value @ x
+        return fixed + varied(self.factors, self.terms, x) if self.derivative else fixed
 
 
 def _step(
     layout: Layout, places: Places, derivative: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
-    fixed: tuple[Array, Array, Array], z: jax.Array, now: tuple[Loads, Slots],
+    fixed: tuple[Array, Array, Capacity], z: jax.Array, now: tuple[Loads, Slots],
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
-    """The state after one coarse step, and those after its fine ones (m, r).
-
-    With M = A + P Gamma P^T, Y = A^-1 P: M^-1 = A^-1 - Y Gamma (1 + P^T Y Gamma)^-1 Y^T.
-    """
+    """The state after one coarse step, and those after its fine ones (m, r)."""
     loads, slots = now
-    A_slots, M_slots, E_slots = (jnp.asarray(x) for x in fixed)
-    n, T_ref, r = layout.n_films, system.reference_temperature, z.shape[0]
+    A_slots, M_slots, E = jnp.asarray(fixed[0]), jnp.asarray(fixed[1]), fixed[2]
+    n, T_ref = layout.n_films, system.reference_temperature
     following, losing = np.array(layout.following_films, dtype=int), np.array(layout.following_losses, dtype=int)
     environment = jnp.asarray(loads.environment) + f.environment + jnp.einsum("k,mke->me", a, slots.environment)
     film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
@@ -182,20 +202,13 @@ def _step(
     terms, P, rate = jnp.asarray(system.A[0]), jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / GAMMA
     gate = a * jnp.asarray(slots.gate)
 
-    def E(x: jax.Array) -> jax.Array:
-        return x + jnp.tensordot(f.capacity - 1.0, jnp.asarray(effects.E) @ x, 1) + jnp.tensordot(a, E_slots @ x, 1)
+    fixed_A = jnp.asarray(system.A0[0]) + jnp.tensordot(lax.stop_gradient(coefficients), terms, 1)
+    fixed_A = fixed_A + jnp.tensordot(lax.stop_gradient(gate), A_slots, 1)
+    matrix = rate * E.value + fixed_A
 
-    def S(x: jax.Array, gamma: jax.Array) -> jax.Array:
-        inside = jnp.asarray(system.A0[0]) @ x + coefficients @ (terms @ x) + gate @ (A_slots @ x)
-        return rate * E(x) + inside + P @ (gamma @ (P.T @ x))
-
-    held = jax.tree.map(lax.stop_gradient, (coefficients, f.capacity, contact, a, gate))
-    matrix = rate * jnp.eye(r) + jnp.asarray(system.A0[0]) + jnp.tensordot(held[0], terms, 1)
-    matrix = matrix + rate * jnp.tensordot(held[1] - 1.0, jnp.asarray(effects.E), 1)
-    matrix = matrix + jnp.tensordot(held[4], A_slots, 1) + rate * jnp.tensordot(held[3], E_slots, 1)
-    inverse = cho_solve((jnp.linalg.cholesky(matrix), True), jnp.eye(r))
-    Y = inverse @ P
-    seen = P.T @ Y
+    def A(x: jax.Array) -> jax.Array:
+        fixed = fixed_A @ x
+        return fixed + varied(coefficients, terms, x) + varied(gate, A_slots, x) if derivative else fixed
 
     tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
     winding = T_ref + system.source_rows @ z
@@ -208,18 +221,16 @@ def _step(
         forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + system.B @ power + ports
         forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ M_slots + a @ jnp.asarray(slots.forcing)[i]
         diagonal, neighbour, weight = (jnp.asarray(v)[i] for v in (loads.diagonal, loads.neighbour, loads.weight))
-        gamma = gamma_of(places, diagonal, neighbour, weight, contact, P.shape[1])
-        joined = lax.stop_gradient(gamma)
-        joined = joined @ jnp.linalg.inv(jnp.eye(len(seen)) + seen @ joined)
-
-        def inverted(known: jax.Array) -> jax.Array:
-            return inverse @ known - Y @ (joined @ (Y.T @ known))
+        own = partial(flows, places, diagonal, neighbour, weight)
+        gamma = own(lax.stop_gradient(contact), jnp.eye(P.shape[1]))
+        factor = jnp.linalg.cholesky(matrix + P @ gamma @ P.T)
 
         def solve(known: jax.Array) -> jax.Array:
+            solved = cho_solve((factor, True), lax.stop_gradient(known))
             if not derivative:
-                return inverted(known)
-            solved = lax.stop_gradient(inverted(lax.stop_gradient(known)))
-            return solved + inverted(known - S(solved, gamma))
+                return jnp.asarray(solved)
+            S = rate * E(solved) + A(solved) + P @ own(contact, P.T @ solved[:, None])[:, 0]
+            return jnp.asarray(solved + cho_solve((factor, True), known - S))
 
         middle = solve(rate * E(x) + forcing)
         after = solve(rate * E(x + (1.0 - GAMMA) / GAMMA * (middle - x)) + forcing)
@@ -239,7 +250,8 @@ def trajectory(
     u, a = v[:n], v[n:]
     f = factors_at(effects, u)
     z0 = jnp.asarray(start) + a @ jnp.asarray(slots.initial)
-    fixed = (slots.A, slots.M, slots.E)
+    E = Capacity.of(effects.E, f.capacity - 1.0, slots.E, a, derivative)
+    fixed = (slots.A, slots.M, E)
     steps = replace(slots, A=jnp.zeros(len(loads.rate)), M=jnp.zeros(len(loads.rate)), E=jnp.zeros(len(loads.rate)),
                     initial=jnp.zeros(len(loads.rate)))  # fmt: skip
     one = partial(_step, layout, places, derivative, system, effects, f, a, fixed)
