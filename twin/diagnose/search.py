@@ -1,4 +1,8 @@
-"""Forward selection: name the best cause, refit everything exactly, look again, until nothing passes its threshold."""
+"""Forward selection: name the best cause, refit everything exactly, look again, until nothing passes its threshold.
+
+Every refit may show that a cause was a stopgap for another: what no longer explains half its threshold, or has become
+too small to name or negative, is dropped and not looked at again.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,8 @@ import numpy as np
 import scipy.linalg
 
 from twin.diagnose.acted import Unit, slots_with, units_of
-from twin.diagnose.batch import GROWTH, Hypothesis, best, grown
+from twin.diagnose.batch import Hypothesis, best, grown
+from twin.diagnose.contest import judged
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.sight import Sight, sight
 from twin.diagnose.study import K, Study
@@ -20,7 +25,7 @@ WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good a
 MOST = 3  # causes
 REFITS = 5  # passes of an exact refit
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
-AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
+STANDS = 0.5  # share of its threshold that a cause must explain beside the others
 NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
 
 
@@ -55,7 +60,7 @@ class Search:
     x0: np.ndarray  # (n,) calibrated without a cause
     x: np.ndarray  # (n,) with the accepted ones
     accepted: tuple[Accepted, ...]
-    steps: tuple[Step, ...]  # one more than accepted
+    steps: tuple[Step, ...]  # one more than were accepted, the dropped ones among them
     residual: np.ndarray  # (m,) linearised, of the last fit, accepted amplitudes left in
     g: np.ndarray  # (n_columns,) after the accepted ones
     heat: Heat  # likewise
@@ -66,6 +71,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
     fitted = yard.fitter(y)
     x0, accepted, steps = fitted.x, list[Accepted](), list[Step]()
+    refused = set[tuple[str, str]]()
     while True:
         seen = sight(yard.columns, fitted.projector, yard.whiten(fitted.residual))
         ranked = _distinct(best(seen.ready, seen.g))
@@ -75,12 +81,16 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         used = sum((len(a.units) for a in accepted), 0)
         passing = [
             h for h in ranked
-            if h.statistic > yard.thresholds[h.family] and used + h.batch.q <= K and not _again(h, accepted)
+            if h.statistic > yard.thresholds[h.family] and used + h.batch.q <= K
+            and (h.family, h.name) not in refused and not _again(h, accepted)
         ]  # fmt: skip
         if not passing or len(accepted) >= most:
             break
-        passing = [_with_more_windows(seen, h) for h in passing[:AHEAD]]
-        chosen = max(passing, key=_worth)
+        passing = judged(yard, y, fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]])
+        chosen = passing[0]
+        if chosen.statistic <= yard.thresholds[chosen.family]:
+            refused.add((chosen.family, chosen.name))
+            continue
         rivals = _rivals(yard, fitted, chosen, [*passing, *ranked])
         start = np.array(chosen.amplitude)
         units = units_of(yard.study, yard.elements, yard.index, chosen)
@@ -88,6 +98,10 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
             Accepted(chosen, units, start, np.eye(len(start)), chosen.statistic, yard.thresholds[chosen.family], rivals)
         )
         fitted, accepted = refit(yard, y, fitted.x, accepted)
+        while weak := [a for a in accepted if not _stands(a)]:
+            refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
+            accepted = [a for a in accepted if a not in weak]
+            fitted, accepted = refit(yard, y, fitted.x, accepted) if accepted else (yard.fitter(y), accepted)
     n = len(x0)
     N = fitted.projector.N
     covariance = scipy.linalg.inv(np.eye(N.shape[1]) + N.T @ N)[:n, :n]
@@ -99,16 +113,23 @@ def _with_more_windows(seen: Sight, h: Hypothesis) -> Hypothesis:
     return grown(h, seen.g, seen.blocks[k][h.place])
 
 
-def _worth(h: Hypothesis) -> float:
-    """A statistic less the price of its freedom: how many like it were tried, amplitudes, further windows."""
-    tried = len(h.batch.places) * len(h.batch.histories)
-    more = max(len(h.when.windows) - 1, 0) if h.family not in ("sun", "joint") else 0
-    return h.statistic - 2.0 * float(np.log(tried)) - AMPLITUDE * (h.batch.q - 1) - GROWTH / 2 * more
-
-
 def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
     return any(h.family == a.hypothesis.family and h.name == a.hypothesis.name and h.when.name == a.hypothesis.when.name
                for a in accepted)  # fmt: skip
+
+
+def _stands(a: Accepted) -> bool:
+    """Whether a cause still explains something beside the others."""
+    batch = a.hypothesis.batch
+    if batch.fixed:
+        return True
+    first = float(a.amplitude[0])
+    explained = float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude)
+    return (
+        explained > STANDS * a.threshold
+        and abs(first) >= 0.5 * batch.smallest
+        and (batch.sign == 0 or batch.sign * first > 0.0)
+    )
 
 
 def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]) -> tuple[Fitted, list[Accepted]]:
