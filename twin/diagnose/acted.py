@@ -67,9 +67,16 @@ def _shapes(study: Study, elements: Elements, h: Hypothesis, row: np.ndarray) ->
         n = run.drive.n_steps
         if when.windows:
             shape = np.zeros(n)
-            for b, (i, start, end) in enumerate(blocks):
-                if i == k:
-                    shape[start:end] = row[-len(blocks) + b]
+            if h.family == "sun":  # levels by the hour, an amplitude per run
+                for b, (i, start, end) in enumerate(blocks):
+                    if i == k:
+                        shape[start:end] = row[-len(blocks) + b]
+            else:
+                t = np.asarray(run.drive.time)
+                for w in when.windows:
+                    if w.run == run.name:
+                        within = np.clip(np.minimum(t[1:], w.end) - np.maximum(t[:-1], w.start), 0.0, None)
+                        shape += w.level * within / (t[1] - t[0])
             if k not in study.fitted and _lasts(study, when.windows):
                 shape[:] = 1.0
         elif when.signal:

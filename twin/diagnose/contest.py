@@ -13,14 +13,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnose.acted import slots_with, units_of
+from twin.diagnose.acted import READINGS, units_of
 from twin.diagnose.batch import GROWTH, Hypothesis
+from twin.diagnose.edges import PRIOR, STEP, edges_of, moved, per_second, with_pulses
 from twin.diagnose.fitter import Fitted
+from twin.diagnose.study import K
 from twin.diagnose.yardstick import Yardstick
 
 RELATIVE = ("group", "joint", "contact")  # kinds whose amplitude is a relative change of a conductance
 BENT = (*RELATIVE, "film", "group_film", "capacity", "coolant")
-PASSES = 3
+PASSES, WINDOW_PASSES = 3, 5
 ENTRANTS = 5  # bent candidates that are refitted
 SHARE = 0.35  # of the best worth that a candidate needs for a refit
 LOW, HIGH = -0.95, 20.0  # of relative changes
@@ -35,7 +37,7 @@ def worth(h: Hypothesis) -> float:
 
 
 def judged(yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Candidates with the bent ones among the most worthy refitted, most worthy first."""
+    """Candidates, those of the most worthy refitted that are bent or have edges in time; most worthy first."""
     if not candidates:
         return []
     ordered = sorted(candidates, key=worth, reverse=True)
@@ -44,7 +46,8 @@ def judged(yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[
     result = []
     for h in ordered:
         key = (h.family, h.batch.kind)
-        if h.batch.kind in BENT and key not in kinds and len(kinds) < ENTRANTS and worth(h) > least:
+        asked = h.batch.kind in BENT or (edges_of(yard.study, h) and h.batch.kind not in READINGS)
+        if asked and key not in kinds and len(kinds) < ENTRANTS and worth(h) > least:
             kinds.add(key)
             h = exact(yard, y, fitted, h)
         result.append(h)
@@ -52,33 +55,56 @@ def judged(yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[
 
 
 def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
-    """A hypothesis with the amplitudes and the statistic of the exact model; parameters react to first order.
+    """A hypothesis with the amplitudes, the edges in time and the statistic of the exact model; parameters react to
+    first order.
 
     y (m,): NaN where nothing was measured.
     """
     study = yard.study
-    units = units_of(study, yard.elements, yard.index, h)
-    slots = [slots_with(study, yard.elements, units, k) for k in study.fitted]
-    relative = h.batch.kind in RELATIVE
+    relative, q = h.batch.kind in RELATIVE, h.batch.q
     a = np.array(h.amplitude)
     if relative:
         a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, LOW, HIGH)  # as if temperatures were linear in t
-    target = y + fitted.J @ fitted.x
     none = yard.whiten(fitted.residual)
     before = float(none @ fitted.projector(none))
-    best = h
-    for i in range(PASSES):
-        parts = [study.by_amplitudes(k, fitted.x, slot, list(a)) for k, slot in zip(study.fitted, slots, strict=True)]
-        left = yard.whiten(target - np.concatenate([f for f, _ in parts]))
+    without = y - fitted.residual + fitted.J @ fitted.x  # outputs without the cause; NaN where nothing was measured
+    target = y + fitted.J @ fitted.x
+    inner = edges_of(study, h)
+    found, best = h, replace(h, statistic=0.0)
+    for i in range(PASSES if not inner else WINDOW_PASSES):
+        edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner and q < K else []
+        units = units_of(study, yard.elements, yard.index, found)
+        n = q + len(edges)
+        outputs, derivatives = [], []
+        first = 0
+        for k in study.fitted:
+            own = slice(first, first + study.runs[k].size)
+            first = own.stop
+            if any(u.shapes[k].any() for u in units):
+                slots = with_pulses(study, yard.elements, found, units, a, edges, k)
+                f, D = study.by_amplitudes(k, fitted.x, slots, [*a, *np.zeros(len(edges))])
+                outputs.append(f)
+                derivatives.append(D[:, :n])
+            else:
+                outputs.append(without[own])
+                derivatives.append(np.zeros((own.stop - own.start, n)))
+        left = yard.whiten(target - np.concatenate(outputs))
         removed = before - float(left @ fitted.projector(left))
-        if i == 0 or removed > best.statistic:
-            best = replace(h, statistic=max(removed, 0.0), amplitude=tuple(map(float, a)))
-        else:
+        worse = removed < best.statistic
+        if not worse:
+            best = replace(found, statistic=max(removed, 0.0), amplitude=tuple(map(float, a)))
+        if worse and not edges:
             break
-        D = yard.whiten(np.vstack([d for _, d in parts])[:, : len(a)])
+        D = np.vstack(derivatives)
+        D[:, q:] *= [per_second(e) for e in edges]
+        D = yard.whiten(D)
         PD = fitted.projector(D)
-        step = np.linalg.pinv(D.T @ PD, rcond=1e-9, hermitian=True) @ (PD.T @ left)
-        a = _moved(a, step, relative, h.batch.sign)
+        F = D.T @ PD + np.diag([0.0] * q + [PRIOR**-2.0] * len(edges))
+        step = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ left)
+        a = _moved(a, step[:q], relative, h.batch.sign)
+        if edges:
+            shifts = np.clip(step[q:], -STEP, STEP)
+            found = moved(study, found, list(zip(edges, shifts, strict=True)))
     return best
 
 

@@ -48,6 +48,7 @@ class Histories:
     speeds: dict[str, tuple[np.ndarray, ...]]  # "x_speed^0.6": of convection
     blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first fine step, end)
     unit: dict[str, tuple[str, float, float]]  # history -> signal, exponent, value [SI] at which s = 1
+    same: dict[str, str]  # signal -> the one of its shape that stands for it
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,8 @@ def histories_of(study: Study) -> Histories:
             table[name] = values
             unit[name] = (signal, exponent, scale)
 
-    seen: list[np.ndarray] = []
+    seen: dict[str, np.ndarray] = {}
+    same: dict[str, str] = {}
     for signal in units:
         if signal in positions or any(signal not in run.signals for run in runs):
             continue
@@ -102,9 +104,10 @@ def histories_of(study: Study) -> Histories:
         if top <= 1e-9 * max(bounds[signal], 1e-30):
             continue
         shape = whole / top
-        if any(np.abs(shape - other).max() < 1e-3 for other in seen):
+        same[signal] = next((name for name, other in seen.items() if np.abs(shape - other).max() < 1e-3), signal)
+        if same[signal] != signal:
             continue  # motor speed and axis speed are one history
-        seen.append(shape)
+        seen[signal] = shape
         if units[signal] == "A":
             add(signals, f"{signal}^2", signal, 2.0, top)
         elif units[signal] in ("m/s", "1/s"):
@@ -121,7 +124,7 @@ def histories_of(study: Study) -> Histories:
         if run.drive.n_steps - edges[-1] < per / 2 and len(edges) > 1:
             edges.pop()
         blocks += [(i, a, b) for a, b in zip(edges, [*edges[1:], run.drive.n_steps], strict=True)]
-    return Histories(signals, speeds, tuple(blocks), unit)
+    return Histories(signals, speeds, tuple(blocks), unit, same)
 
 
 def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:

@@ -15,6 +15,8 @@ from twin.diagnose.nulls import Form, typical
 from twin.diagnose.study import Study
 from twin.diagnose.whiten import Whitener
 
+WOBBLE = 1.5  # h, correlation of a film's slow variation
+CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
 READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
 LEAST = 0.7  # standard deviations over all its rows that a direction of a channel's readings must have
 
@@ -38,10 +40,15 @@ def known_forms(
             add(("film", place.name, "always"), form.local_film * float(usual[films.index(place.film)]))
     for f, film in enumerate(load.films):
         for signal in film.use.signals.values():
-            add(("group_film", film.name, f"{signal}^{EXPONENT:g}"), form.wind * float(usual[f]))
+            heard = elements.histories.same.get(signal, signal)
+            add(("group_film", film.name, f"{heard}^{EXPONENT:g}"), form.wind * float(usual[f]))
     for kind, source, history in list(elements.index):
         if kind == "moved":
             add((kind, source, history), form.beside)
+        elif kind == "start":
+            own = next(p.run for p in study.runs if source.startswith(f"{p.run.name}."))
+            whole = source == f"{own.name}.machine" and not own.stated_start
+            add((kind, source, history), form.start if whole else form.start_apart)
     for environment in load.environments:
         for c in elements.block_of.get(("air", environment.name), ()):
             columns.append(form.air * raw[:, c].astype(float))
@@ -60,7 +67,33 @@ def known_forms(
         if np.any(moved):
             columns.append(moved)
     parts = [whiten(np.stack(columns, axis=1))] if columns else []
+    parts += _wobbles(elements, raw, whiten, form)
     return np.hstack([*parts, *_readings(study, J, whiten, form)]) if parts else np.zeros((len(J), 0))
+
+
+def _wobbles(elements: Elements, raw: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
+    """Per film the leading directions of its slow variation within runs."""
+    blocks = elements.histories.blocks
+    run = np.array([i for i, _, _ in blocks])
+    when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)
+    hour = float(np.median([b - a for _, a, b in blocks]))
+    R = np.exp(-0.5 * ((when[:, None] - when) / (WOBBLE * hour)) ** 2) * (run[:, None] == run)
+    root = np.linalg.cholesky(R + 1e-6 * np.eye(len(R)))
+    result = []
+    for (kind, _), own in elements.block_of.items():
+        if kind == "group":
+            U, s, _ = np.linalg.svd(whiten(form.shape * raw[:, own].astype(float) @ root), full_matrices=False)
+            kept = s > LEAST
+            result.append(U[:, kept] * s[kept])
+    return result
+
+
+def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.ndarray:
+    """(m, k) columns of unit prior variance: every channel's own error of a white response (m,)."""
+    label = np.concatenate([_labels(study, k) for k in study.fitted])
+    columns = [np.where(label == channel, share * white, 0.0) for channel in np.unique(label)]
+    kept = [c for c in columns if np.linalg.norm(c) > LEAST]
+    return np.stack(kept, axis=1) if kept else np.zeros((len(white), 0))
 
 
 def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:

@@ -31,7 +31,8 @@ class Form:
     reading: float = 0.02  # of what every source and every contact does to every channel
     air: float = 0.12  # K, fluctuation of a zone's air
     air_time: float = 1500.0  # s, its memory
-    start: float = 0.10  # K, of the bodies' initial temperatures
+    start: float = 0.10  # K, of the machine's initial temperature
+    start_apart: float = 0.03  # K, of single parts on top
     offset: float = 0.05  # K, of sensors
     tcp_zero: float = 0.3e-6  # m
 
@@ -89,7 +90,7 @@ def null(
                 forcing += _power(study, k, j)[:, :, None] * vector
         fluctuation = _ornstein(rng, n * INNER, len(load.environments), form.air_time / 60.0) * form.air
         initial = form.start * rng.standard_normal() * body.one if not run.stated_start else np.zeros(body.n)
-        initial = initial + 0.3 * form.start * _body_starts(study, rng)
+        initial = initial + form.start_apart * _body_starts(study, rng)
         filled = Slots(
             A=_first(slots.A, A), M=_first(slots.M, M), E=slots.E, gate=_gate(slots.gate),
             rise=_column(slots.rise, rise), forcing=_fill(slots.forcing, forcing), film=_row(slots.film, wobble),

@@ -16,6 +16,7 @@ from twin.diagnose.acted import Unit, slots_with, units_of
 from twin.diagnose.batch import Hypothesis, best, grown
 from twin.diagnose.contest import judged
 from twin.diagnose.fitter import Fitted, bounds
+from twin.diagnose.formal import of_channels
 from twin.diagnose.sight import Sight, sight
 from twin.diagnose.study import K, Study
 from twin.diagnose.unknown import Heat, evidence
@@ -165,7 +166,8 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         white = yard.whiten(residual)
         for i, _ in gains:
             white = white + D[:, i] * amplitude[i]
-        projector = fitter.projector(J)
+        errors = _own_errors(study, D, accepted, amplitude)
+        projector = fitter.projector(J, errors)
         PD = projector(D)
         F = D.T @ PD
         found = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ white)
@@ -181,8 +183,19 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         own = slice(first, first + len(a.amplitude))
         result.append(replace(a, amplitude=amplitude[own], covariance=inverse[own, own]))
         first = own.stop
-    free = fitter.projector(J, WIDE * D * np.sqrt(np.diag(inverse)))
+    free = fitter.projector(J, np.hstack([WIDE * D * np.sqrt(np.diag(inverse)), errors]))
     return Fitted(x, J, residual, free), result
+
+
+def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], amplitude: np.ndarray) -> np.ndarray:
+    """(m, k) white: what channels may show of causes in the machine beside what the model says."""
+    parts, first = [np.zeros((len(D), 0))], 0
+    for a in accepted:
+        own = slice(first, first + len(a.amplitude))
+        first = own.stop
+        if a.units:
+            parts.append(of_channels(study, D[:, own] @ amplitude[own]))
+    return np.hstack(parts)
 
 
 def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
