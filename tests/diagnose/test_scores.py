@@ -11,7 +11,7 @@ from twin.diagnose.batch import Batch, History, best, grown, prepared, score
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.unknown import MEMORY, SIGMAS, evidence, heat_of, history, with_information
 from twin.diagnose.whiten import Projector, Whitener, measured_of, missing, offsets
-from twin.diagnose.yardstick import ALARM, thresholds_of
+from twin.diagnose.yardstick import ALARM, FLOOR, thresholds_of
 
 M, L = 60, 4
 
@@ -107,7 +107,7 @@ def test_further_windows_join_where_the_data_ask_for_them(made):
 def test_thresholds_let_the_stated_share_of_nulls_pass():
     """Families of different sizes and tails; on nulls of the same law that were not used."""
     rng = np.random.default_rng(2)
-    scale, at = np.array([3.0, 5.0, 2.0, 8.0]), np.array([8.0, 15.0, 6.0, 30.0])
+    scale, at = np.array([3.0, 5.0, 2.0, 8.0]), np.array([28.0, 35.0, 26.0, 50.0])
 
     def drawn(n):
         return {f"f{k}": at[k] + scale[k] * rng.gumbel(size=n) for k in range(4)}
@@ -125,8 +125,8 @@ def test_thresholds_let_the_stated_share_of_nulls_pass():
 
 def test_families_without_nulls_above_zero_have_a_floor():
     found = thresholds_of({"a": np.zeros(50), "b": 5.0 + np.random.default_rng(3).gumbel(size=50)})
-    assert found["a"] == 9.0
-    assert found["b"] >= 9.0
+    assert found["a"] == FLOOR
+    assert found["b"] >= FLOOR
     assert thresholds_of({"a": np.zeros(5)}) == {"a": 0.0}
 
 

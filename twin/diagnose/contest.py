@@ -9,22 +9,23 @@ they really remove. Conductances move in t = a / (1 + a), in which temperatures 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.diagnose.acted import READINGS, units_of
 from twin.diagnose.batch import GROWTH, Hypothesis
-from twin.diagnose.edges import PRIOR, STEP, edges_of, moved, per_second, with_pulses
-from twin.diagnose.fitter import Fitted
+from twin.diagnose.edges import PRIOR, STEP, Edge, edges_of, moved, per_second, with_pulses
+from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.study import K
 from twin.diagnose.yardstick import Yardstick
 
 RELATIVE = ("group", "joint", "contact")  # kinds whose amplitude is a relative change of a conductance
 BENT = (*RELATIVE, "film", "group_film", "capacity", "coolant")
-PASSES, WINDOW_PASSES = 3, 5
-ENTRANTS = 5  # bent candidates that are refitted
-SHARE = 0.35  # of the best worth that a candidate needs for a refit
+PASSES, WINDOW_PASSES = 3, 7
+ENTRANTS = 5  # candidates that are refitted
+WET = 80.0  # W/(m^2 K), from which the film of a coolant is refitted at most
+NEAR = 1.0  # prior standard deviations of parameters at the start of a refit
 LOW, HIGH = -0.95, 20.0  # of relative changes
 AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
 
@@ -36,27 +37,36 @@ def worth(h: Hypothesis) -> float:
     return h.statistic - 2.0 * float(np.log(tried)) - AMPLITUDE * (h.batch.q - 1) - GROWTH * more
 
 
-def judged(yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Candidates, those of the most worthy refitted that are bent or have edges in time; most worthy first."""
-    if not candidates:
-        return []
-    ordered = sorted(candidates, key=worth, reverse=True)
-    least = SHARE * worth(ordered[0])
-    kinds: set[tuple[str, str]] = set()
-    result = []
-    for h in ordered:
-        key = (h.family, h.batch.kind)
-        asked = h.batch.kind in BENT or (edges_of(yard.study, h) and h.batch.kind not in READINGS)
-        if asked and key not in kinds and len(kinds) < ENTRANTS and worth(h) > least:
-            kinds.add(key)
+def judged(
+    yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Candidates, most worthy first: those whose statistics are exact, and the others.
+
+    Those that are bent or have edges are refitted, until one leads all.
+    """
+    waiting = sorted(candidates, key=worth, reverse=True)
+    done: list[Hypothesis] = []
+    count = 0
+    while waiting:
+        h = waiting.pop(0)
+        if done and worth(h) < max(worth(d) for d in done):
+            break
+        if _bent(yard, h):
+            if count >= ENTRANTS:
+                continue
+            count += 1
             h = exact(yard, y, fitted, h)
-        result.append(h)
-    return sorted(result, key=worth, reverse=True)
+        done.append(h)
+    straight = [h for h in waiting if not _bent(yard, h)]
+    return sorted([*done, *straight], key=worth, reverse=True), [h for h in waiting if _bent(yard, h)]
+
+
+def _bent(yard: Yardstick, h: Hypothesis) -> bool:
+    return h.batch.kind in BENT or (h.batch.kind not in READINGS and bool(edges_of(yard.study, h)))
 
 
 def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
-    """A hypothesis with the amplitudes, the edges in time and the statistic of the exact model; parameters react to
-    first order.
+    """A hypothesis with amplitudes, edges in time and statistic of the exact model, the parameters fitted with it.
 
     y (m,): NaN where nothing was measured.
     """
@@ -67,45 +77,71 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
         a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, LOW, HIGH)  # as if temperatures were linear in t
     none = yard.whiten(fitted.residual)
     before = float(none @ fitted.projector(none))
-    without = y - fitted.residual + fitted.J @ fitted.x  # outputs without the cause; NaN where nothing was measured
-    target = y + fitted.J @ fitted.x
     inner = edges_of(study, h)
-    found, best = h, replace(h, statistic=0.0)
+    low, high = bounds(study)
+    if h.batch.kind == "coolant":
+        a = a * min(1.0, WET / max(abs(a[0]), 1e-9))
+    # a strong cause has bent the calibration: begin near the description
+    now = _Point(a, np.clip(fitted.x, -NEAR, NEAR), h)
+    best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
     for i in range(PASSES if not inner else WINDOW_PASSES):
-        edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner and q < K else []
-        units = units_of(study, yard.elements, yard.index, found)
-        n = q + len(edges)
-        outputs, derivatives = [], []
-        first = 0
-        for k in study.fitted:
-            own = slice(first, first + study.runs[k].size)
-            first = own.stop
-            if any(u.shapes[k].any() for u in units):
-                slots = with_pulses(study, yard.elements, found, units, a, edges, k)
-                f, D = study.by_amplitudes(k, fitted.x, slots, [*a, *np.zeros(len(edges))])
-                outputs.append(f)
-                derivatives.append(D[:, :n])
-            else:
-                outputs.append(without[own])
-                derivatives.append(np.zeros((own.stop - own.start, n)))
-        left = yard.whiten(target - np.concatenate(outputs))
-        removed = before - float(left @ fitted.projector(left))
-        worse = removed < best.statistic
-        if not worse:
-            best = replace(found, statistic=max(removed, 0.0), amplitude=tuple(map(float, a)))
-        if worse and not edges:
-            break
-        D = np.vstack(derivatives)
-        D[:, q:] *= [per_second(e) for e in edges]
-        D = yard.whiten(D)
-        PD = fitted.projector(D)
-        F = D.T @ PD + np.diag([0.0] * q + [PRIOR**-2.0] * len(edges))
-        step = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ left)
-        a = _moved(a, step[:q], relative, h.batch.sign)
-        if edges:
-            shifts = np.clip(step[q:], -STEP, STEP)
-            found = moved(study, found, list(zip(edges, shifts, strict=True)))
-    return best
+        edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
+        outputs, derivatives = _outputs(yard, now, edges)
+        _, J = yard.fitter.surrogate.at(now.x)
+        projector = yard.fitter.projector(J)
+        left = yard.whiten(y - outputs + J @ now.x)
+        removed = before - float(left @ projector(left))
+        if removed <= statistic:  # too far: back, and less
+            share *= 0.4
+            if share < 0.1:
+                break
+        else:
+            best, statistic, share = now, removed, 1.0
+            D = derivatives
+            D[:, q:] *= [per_second(e) for e in edges]
+            D = yard.whiten(D)
+            PD = projector(D)
+            F = D.T @ PD + np.diag([0.0] * q + [PRIOR**-2.0] * len(edges))
+            found = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ left)
+            after = _moved(now.a, found[:q], relative, h.batch.sign)
+            shifts = np.clip(found[q:], -STEP, STEP)
+            nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
+            drift = np.clip(np.clip(nuisance, low, high) - now.x, -NEAR, NEAR)
+            step = _Step(after - now.a, drift, tuple(zip(edges, shifts, strict=True)))
+        shifted = moved(study, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
+        now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
+    return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
+
+
+@dataclass(frozen=True)
+class _Point:
+    a: np.ndarray  # (q,)
+    x: np.ndarray  # (n,)
+    h: Hypothesis  # with its windows
+
+
+@dataclass(frozen=True)
+class _Step:
+    a: np.ndarray
+    x: np.ndarray
+    edges: tuple[tuple[Edge, float], ...]  # s
+
+
+def _outputs(yard: Yardstick, p: _Point, edges: Sequence[Edge]) -> tuple[np.ndarray, np.ndarray]:
+    """Outputs (m,) of all fitted runs and their derivatives (m, q + edges) by amplitudes and pulses at edges."""
+    study, n = yard.study, len(p.a) + len(edges)
+    units = units_of(study, yard.elements, yard.index, p.h)
+    outputs, derivatives = [], []
+    for k in study.fitted:
+        if any(u.shapes[k].any() for u in units):
+            slots = with_pulses(study, yard.elements, p.h, units, p.a, edges, k)
+            f, D = study.by_amplitudes(k, p.x, slots, [*p.a, *np.zeros(len(edges))])
+            derivatives.append(D[:, :n])
+        else:
+            f = study.outputs(k, p.x)
+            derivatives.append(np.zeros((len(f), n)))
+        outputs.append(f)
+    return np.concatenate(outputs), np.vstack(derivatives)
 
 
 def _moved(a: np.ndarray, step: np.ndarray, relative: bool, sign: int) -> np.ndarray:
@@ -113,7 +149,7 @@ def _moved(a: np.ndarray, step: np.ndarray, relative: bool, sign: int) -> np.nda
         t = a / (1.0 + a) + step / (1.0 + a) ** 2
         bent = np.where(t < HIGH / (1.0 + HIGH), t / np.maximum(1.0 - t, 1e-9), HIGH)
         return np.asarray(np.clip(bent, np.maximum(LOW, (1.0 + a) / 5.0 - 1.0), HIGH))
-    result = a + step
+    result = np.clip(a + step, a - 2.0 * np.abs(a), a + 2.0 * np.abs(a))
     if sign:
         result[0] = sign * max(sign * result[0], 0.2 * sign * a[0])  # never through zero
     return np.asarray(result)

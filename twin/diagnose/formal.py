@@ -46,9 +46,12 @@ def known_forms(
         if kind == "moved":
             add((kind, source, history), form.beside)
         elif kind == "start":
-            own = next(p.run for p in study.runs if source.startswith(f"{p.run.name}."))
-            whole = source == f"{own.name}.machine" and not own.stated_start
+            run = next(p.run for p in study.runs if source.startswith(f"{p.run.name}."))
+            whole = source == f"{run.name}.machine" and not run.stated_start
             add((kind, source, history), form.start if whole else form.start_apart)
+    for (kind, _), own in elements.block_of.items():
+        if kind in ("joint", "contact"):
+            columns.append(form.contact * raw[:, own].astype(float).sum(axis=1))
     for environment in load.environments:
         for c in elements.block_of.get(("air", environment.name), ()):
             columns.append(form.air * raw[:, c].astype(float))

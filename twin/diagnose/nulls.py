@@ -18,6 +18,8 @@ from twin.diagnose.places import beside
 from twin.diagnose.study import Study
 from twin.run.system import Array
 
+EXPONENTS = (0.5, 0.8)  # of speeds in films: from laminar to turbulent
+
 
 @dataclass(frozen=True)
 class Form:
@@ -26,6 +28,7 @@ class Form:
     local_film: float = 0.12  # of each face's coefficient against its group's
     shape: float = 0.05  # of a film group's coefficient, slowly varying within a run
     wind: float = 0.25  # of a film group's coefficient at the top speed of its law against that at rest
+    contact: float = 0.5  # of the logarithm of a contact's conductance beyond its tolerance: the mesh at its patch
     beside: float = 0.02  # share of a source's heat that enters another face of its part
     aside: float = 0.4  # of 8 mm, by which sensors are off
     reading: float = 0.02  # of what every source and every contact does to every channel
@@ -58,10 +61,13 @@ def null(
     (body,) = bench.base.bodies
     load = bench.base.load_model
     local = np.clip(form.local_film * rng.standard_normal(len(bench.places)), -0.8, 0.8)
+    contact = np.expm1(form.contact * np.clip(rng.standard_normal(study.slots(0).contact.shape[2]), -2.0, 2.0))
+    joint = np.expm1(form.contact * np.clip(rng.standard_normal(len(load.joints)), -2.0, 2.0))
     split = [_beside(study, j, rng, form) for j in range(len(load.sources))]
     zone_phase = rng.uniform(0.0, 2 * np.pi, len(load.films))
     shape = form.shape * rng.standard_normal(len(load.films))
     wind = form.wind * rng.standard_normal(len(load.films))
+    exponent = rng.uniform(*EXPONENTS, len(load.films))
     readings = _readings(study, J, rng, form)
     aside = form.aside * rng.standard_normal(len(bench.base.sensors))
     offset = form.offset * rng.standard_normal(len(bench.base.sensors))
@@ -83,7 +89,7 @@ def null(
         rise[:] = surround
         hours = (np.arange(n) * INNER * (run.drive.time[1] - run.drive.time[0]) / 3600.0)[:, None]
         period = rng.uniform(3.0, 9.0, len(load.films))
-        wobble = shape * np.sin(2 * np.pi * hours / period + zone_phase) + wind * _winds(study, k, n)
+        wobble = shape * np.sin(2 * np.pi * hours / period + zone_phase) + wind * _winds(study, k, n, exponent)
         forcing = np.zeros((n, INNER, body.n))
         for j, vector in enumerate(split):
             if vector is not None:
@@ -94,7 +100,7 @@ def null(
         filled = Slots(
             A=_first(slots.A, A), M=_first(slots.M, M), E=slots.E, gate=_gate(slots.gate),
             rise=_column(slots.rise, rise), forcing=_fill(slots.forcing, forcing), film=_row(slots.film, wobble),
-            joint=slots.joint, contact=slots.contact,
+            joint=_row(slots.joint, joint), contact=_row(slots.contact, contact),
             environment=_fill(slots.environment, fluctuation.reshape(n, INNER, -1)),
             initial=_first(slots.initial, initial),
         )  # fmt: skip
@@ -155,8 +161,9 @@ def _ornstein(rng: np.random.Generator, n: int, columns: int, memory: float) -> 
     return result
 
 
-def _winds(study: Study, k: int, n: int) -> np.ndarray:
-    """(n, n_films) 0 .. 1: how fast the air of each film moves, as its law hears; 0 for films that hear no speed."""
+def _winds(study: Study, k: int, n: int, exponent: np.ndarray) -> np.ndarray:
+    """(n, n_films) 0 .. 1: how fast the air of each film moves, as its law hears, to the exponent (n_films,); 0 for
+    films that hear no speed."""
     load, run = study.bench.base.load_model, study.runs[k].run
     units = {s.name: s.unit for s in load.signals}
     result = np.zeros((n, len(load.films)))
@@ -164,7 +171,8 @@ def _winds(study: Study, k: int, n: int) -> np.ndarray:
         for signal in film.use.signals.values():
             values = run.signals.get(signal)
             if units.get(signal) in ("m/s", "1/s") and values is not None and np.any(values):
-                result[:, f] = (np.abs(values) / np.abs(values).max()).reshape(n, INNER).mean(axis=1)
+                fast = (np.abs(values) / np.abs(values).max()) ** exponent[f]
+                result[:, f] = fast.reshape(n, INNER).mean(axis=1)
     return result
 
 

@@ -26,6 +26,7 @@ WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good a
 MOST = 3  # causes
 REFITS = 5  # passes of an exact refit
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
+NAMED = 0.7  # share of its own threshold that a name needs where another one passes
 STANDS = 0.5  # share of its threshold that a cause must explain beside the others
 NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
 
@@ -80,19 +81,21 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         top = ranked[:10]
         steps.append(Step(tuple(top), _cosines(yard, fitted, top), seen.largest(), parts))
         used = sum((len(a.units) for a in accepted), 0)
+        alarm = any(h.statistic > yard.thresholds[h.family] and (h.family, h.name) not in refused for h in ranked)
         passing = [
             h for h in ranked
-            if h.statistic > yard.thresholds[h.family] and used + h.batch.q <= K
+            if alarm and h.statistic > NAMED * yard.thresholds[h.family] and used + h.batch.q <= K
             and (h.family, h.name) not in refused and not _again(h, accepted)
         ]  # fmt: skip
         if not passing or len(accepted) >= most:
             break
-        passing = judged(yard, y, fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]])
-        chosen = passing[0]
-        if chosen.statistic <= yard.thresholds[chosen.family]:
-            refused.add((chosen.family, chosen.name))
+        proved, others = judged(yard, y, fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]])
+        standing = [h for h in proved if h.statistic > NAMED * yard.thresholds[h.family]]
+        if not any(h.statistic > yard.thresholds[h.family] for h in standing):
+            refused.update((h.family, h.name) for h in proved)
             continue
-        rivals = _rivals(yard, fitted, chosen, [*passing, *ranked])
+        chosen = standing[0]
+        rivals = _rivals(yard, fitted, chosen, [*standing, *others, *ranked])
         start = np.array(chosen.amplitude)
         units = units_of(yard.study, yard.elements, yard.index, chosen)
         accepted.append(
@@ -172,7 +175,7 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         F = D.T @ PD
         found = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ white)
         nuisance = np.clip(projector.most_likely(white - D @ found)[: len(x)], low, high)
-        step = np.abs(found - amplitude) * np.sqrt(np.diag(F))
+        step = np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))
         moved = max(float(np.abs(nuisance - x).max(initial=0.0)), float(step.max(initial=0.0)))
         x, amplitude = nuisance, _limited(found, accepted)
         if moved < 0.1:

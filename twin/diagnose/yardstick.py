@@ -35,6 +35,7 @@ MODES = 30
 OFFSET = 0.1  # K, prior of every sensor's constant error
 TCP_ZERO = 0.5e-6  # m, prior of every TCP component's constant error
 ALARM = 0.03
+FLOOR = 20.0  # of thresholds: some families never pass in synthetic measurements, and would at the first surprise
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[st
     """
     tails = {name: _gumbel(values) for name, values in nulls.items() if len(values) and values.max() > 0.0}
     if not tails:
-        return dict.fromkeys(nulls, 0.0)
+        return dict.fromkeys(nulls, FLOOR)
     table = np.stack([nulls[name] for name in tails], axis=1)
 
     def limits(p: float) -> np.ndarray:
@@ -159,7 +160,7 @@ def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[st
         share = float(np.mean(np.any(table > limits(p), axis=1)))
         low, high = (p, high) if share <= alarm else (low, p)
     found = dict(zip(tails, limits(low), strict=True))
-    return {name: float(max(found.get(name, 9.0), 9.0)) for name in nulls}
+    return {name: float(max(found.get(name, FLOOR), FLOOR)) for name in nulls}
 
 
 def _gumbel(values: np.ndarray) -> tuple[float, float]:
