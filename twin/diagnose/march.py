@@ -131,8 +131,11 @@ def flows(places: Places, diagonal: Array, neighbour: Array, weight: Array, cont
 
 def gammas(places: Places, loads: Loads, contact: np.ndarray, n_ports: int) -> np.ndarray:
     """Gamma (n m, n_ports, n_ports) W/K of all fine steps of a run."""
+    steps = int(np.prod(np.asarray(loads.diagonal).shape[:2]))
+    if not n_ports:
+        return np.zeros((steps, 0, 0))
     many = jax.jit(jax.vmap(partial(flows, places), (0, 0, 0, None, None)))
-    flat = [np.asarray(v).reshape(-1, *v.shape[2:]) for v in (loads.diagonal, loads.neighbour, loads.weight)]
+    flat = [np.asarray(v).reshape(steps, *v.shape[2:]) for v in (loads.diagonal, loads.neighbour, loads.weight)]
     return np.asarray(many(*flat, contact, jnp.eye(n_ports)))
 
 
