@@ -127,7 +127,7 @@ def test_families_without_nulls_above_zero_have_a_floor():
     found = thresholds_of({"a": np.zeros(50), "b": 5.0 + np.random.default_rng(3).gumbel(size=50)})
     assert found["a"] == FLOOR
     assert found["b"] >= FLOOR
-    assert thresholds_of({"a": np.zeros(5)}) == {"a": 0.0}
+    assert thresholds_of({"a": np.zeros(5)}) == {"a": FLOOR}
 
 
 def test_whitening_goes_run_by_run_and_weights_tcp_rows():

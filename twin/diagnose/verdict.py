@@ -108,7 +108,8 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     before = max(found.steps[0].parts.values(), default=0.0)
     causes = tuple(cause_of(a) for a in found.accepted)
     if left > thresholds["unknown"] and (not causes or left > REMAINDER * before):
-        return "unknown", tuple(c for c in causes if groups.get(c.family) in ("sensor", "signal"))
+        # a declaration is not corrected while something else is at work; a sensor is not part of the machine
+        return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
     if not causes:
         return "nothing", ()
     lead, chosen = causes[0], found.accepted[0]
