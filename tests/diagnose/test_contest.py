@@ -1,0 +1,45 @@
+"""Prices of freedom, and steps of amplitudes that stay where they mean something."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from twin.diagnose.batch import GROWTH, Batch, History, Hypothesis
+from twin.diagnose.contest import AMPLITUDE, HIGH, LOW, _moved, worth
+from twin.diagnose.diagnosis import Window
+
+
+def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
+    when = History(
+        "", np.ones((q, 4)), windows=tuple(Window("a", 3600.0 * i, 3600.0 * i + 60.0) for i in range(windows))
+    )
+    names = tuple(f"p{i}" for i in range(places))
+    batch = Batch("heat_source", "heat", "W", names, np.zeros((places, 4), dtype=int), (when,))
+    return Hypothesis(batch, 0, when, 100.0, (1.0,) * q, 1.0)
+
+
+def test_freedom_has_its_price():
+    assert worth(hypothesis()) == 100.0
+    assert worth(hypothesis(places=10)) == pytest.approx(100.0 - 2.0 * np.log(10.0))
+    assert worth(hypothesis(windows=1)) == 100.0
+    assert worth(hypothesis(windows=3)) == 100.0 - 2.0 * GROWTH
+    assert worth(hypothesis(q=2)) == 100.0 - AMPLITUDE
+
+
+@pytest.mark.parametrize("step", [-1e6, -1.0, -0.01, 0.0, 0.01, 1.0, 1e6])
+@pytest.mark.parametrize("a", [-0.9, -0.2, 0.0, 3.0])
+def test_conductances_stay_positive(a, step):
+    (after,) = _moved(np.array([a]), np.array([step]), True, 0)
+    assert LOW <= after <= HIGH
+    assert np.sign(after - a) in (0.0, np.sign(step))
+
+
+def test_a_small_step_of_a_conductance_is_taken_as_it_is():
+    (after,) = _moved(np.array([-0.5]), np.array([1e-4]), True, 0)
+    assert after == pytest.approx(-0.5 + 1e-4, abs=1e-6)
+
+
+def test_a_signed_amplitude_never_goes_through_zero():
+    (after,) = _moved(np.array([4.0]), np.array([-100.0]), False, 1)
+    assert after == pytest.approx(0.8)
