@@ -9,7 +9,7 @@ from tests.hidden.trials import TRIALS, trial
 from twin.build.workers import each
 from twin.diagnose.verdict import limits_of
 
-pytestmark = pytest.mark.slow  # the yardstick of the five-axis machine takes ten minutes on two cores: `make hidden`
+pytestmark = pytest.mark.slow  # the five-axis yardstick alone takes longer than all fast tests: `make hidden`
 
 # Trials that are left out; none: `make hidden` shows what the search does not say as it should.
 MISSED: tuple[str, ...] = ()

@@ -20,6 +20,10 @@ READINGS = frozenset({  # kinds that act on what is read, see `readings`
 })  # fmt: skip
 
 
+CONDUCTS = ("group", "joint", "contact")  # kinds whose amplitude is a relative change of a conductance
+RELATIVE = (*CONDUCTS, "expansion")  # kinds whose amplitude is a relative change
+
+
 @dataclass(frozen=True)
 class Unit:
     """One amplitude of a cause: what it is, and when it acts."""

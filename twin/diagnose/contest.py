@@ -13,19 +13,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnose.acted import READINGS, units_of
+from twin.diagnose.acted import CONDUCTS, READINGS, units_of
 from twin.diagnose.batch import GROWTH, Hypothesis
 from twin.diagnose.edges import PRIOR, STEP, Edge, edges_of, moved, per_second, with_pulses
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.study import K
 from twin.diagnose.yardstick import Yardstick
 
-RELATIVE = ("group", "joint", "contact")  # kinds whose amplitude is a relative change of a conductance
-BENT = (*RELATIVE, "film", "group_film", "capacity", "coolant")
+BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant")
 PASSES, WINDOW_PASSES = 3, 7
 ENTRANTS = 5  # candidates that are refitted
 WET = 80.0  # W/(m^2 K), from which the film of a coolant is refitted at most
-NEAR = 1.0  # prior standard deviations of parameters at the start of a refit
+NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
 LOW, HIGH = -0.95, 20.0  # of relative changes
 AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
 
@@ -71,7 +70,7 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
     y (m,): NaN where nothing was measured.
     """
     study = yard.study
-    relative, q = h.batch.kind in RELATIVE, h.batch.q
+    relative, q = h.batch.kind in CONDUCTS, h.batch.q
     a = np.array(h.amplitude)
     if relative:
         a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, LOW, HIGH)  # as if temperatures were linear in t

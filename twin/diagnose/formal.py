@@ -15,7 +15,7 @@ from twin.diagnose.nulls import Form, typical
 from twin.diagnose.study import Study
 from twin.diagnose.whiten import Whitener
 
-WOBBLE = 1.5  # h, correlation of a film's slow variation
+WOBBLE = 1.5  # blocks of about an hour, correlation of a film's slow variation
 CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
 READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
 LEAST = 0.7  # standard deviations over all its rows that a direction of a channel's readings must have
@@ -79,8 +79,8 @@ def _wobbles(elements: Elements, raw: np.ndarray, whiten: Whitener, form: Form) 
     blocks = elements.histories.blocks
     run = np.array([i for i, _, _ in blocks])
     when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)
-    hour = float(np.median([b - a for _, a, b in blocks]))
-    R = np.exp(-0.5 * ((when[:, None] - when) / (WOBBLE * hour)) ** 2) * (run[:, None] == run)
+    length = float(np.median([b - a for _, a, b in blocks]))
+    R = np.exp(-0.5 * ((when[:, None] - when) / (WOBBLE * length)) ** 2) * (run[:, None] == run)
     root = np.linalg.cholesky(R + 1e-6 * np.eye(len(R)))
     result = []
     for (kind, _), own in elements.block_of.items():

@@ -1,7 +1,7 @@
 """The window model stepped through a run with hypotheses switched on: states and exact derivatives.
 
 As `twin.calibrate.march`, with three differences. Loads and moving contacts keep their own fine steps (60 s) inside a
-coarse one (300 s) of films and joints: contacts held for 300 s put a nut 0.13 K (rms) and the TCP 3 um off. A
+coarse one (300 s) of films and joints: contacts held for 300 s put nuts and the TCP off by more than the noise. A
 fine step is a two-stage SDIRK step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one matrix for
 both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold what the
 description lacks, each times an amplitude a_k that is differentiated like a parameter:

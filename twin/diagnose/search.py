@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from twin.diagnose.acted import Unit, slots_with, units_of
+from twin.diagnose.acted import RELATIVE, Unit, slots_with, units_of
 from twin.diagnose.batch import Hypothesis, best, grown
 from twin.diagnose.contest import judged
 from twin.diagnose.fitter import Fitted, bounds
@@ -225,7 +225,7 @@ def _limited(found: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
     """Amplitudes that no exchange becomes negative by: relative changes stay above -0.97."""
     result, first = found.copy(), 0
     for a in accepted:
-        if a.hypothesis.batch.kind in ("group", "joint", "contact", "expansion"):
+        if a.hypothesis.batch.kind in RELATIVE:
             result[first] = max(result[first], -0.97)
         first += len(a.amplitude)
     return result

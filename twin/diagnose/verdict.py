@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from twin.diagnose.acted import RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
@@ -31,7 +32,7 @@ def cause_of(a: Accepted) -> Cause:
     value, sigma = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
     low, high = value - 1.96 * sigma, value + 1.96 * sigma
     settings: dict[str, float | str] = {}
-    if kind in ("group", "joint", "contact", "expansion"):  # relative changes
+    if kind in RELATIVE:
         value, low, high = 1.0 + value, max(1.0 + low, 0.0), 1.0 + high
     elif kind == "gain":
         value, low, high = float(np.exp(value)), float(np.exp(low)), float(np.exp(high))
