@@ -16,11 +16,12 @@ from benchmarks.campaign_table import write_tables
 from benchmarks.five_axis import FOLDER, machine
 from benchmarks.hidden_draw import Trial, draw
 from twin.build.workers import each
-from twin.calibrate.measured import measured
+from twin.calibrate.measured import Measured, measured
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.gain import predicted
 from twin.diagnose.search import Search, search
+from twin.diagnose.settled import settled
 from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import limits_of, unknown_of, verdict_of
 from twin.diagnose.whiten import measured_of
@@ -61,16 +62,17 @@ def yardstick() -> Yardstick:
     return prepare(nothing, machine(), trial.runs[:2], trial.runs[2:], SETTINGS)[2]
 
 
-def judged(yard: Yardstick, trial: Trial) -> dict[str, Any]:
-    """One trial: what was hidden, what was said, and what it was worth on the sealed run."""
+def judged(yard: Yardstick, trial: Trial, clean: float) -> dict[str, Any]:
+    """One trial: what was hidden, what was said, and what it was worth on the sealed run.
+
+    clean: held-out variance of the same machine without what is hidden, see `variance_without`.
+    """
     began = time.perf_counter()
-    study = yard.study
-    plans = [
-        measured(study.bench.base, run, p.run.drive, p.run.name) for run, p in zip(trial.runs, study.runs, strict=True)
-    ]
-    found = search(yard, measured_of(with_measured(study, plans)))
+    plans = plans_of(yard, trial)
+    found = search(yard, measured_of(with_measured(yard.study, plans)))
     verdict, causes = verdict_of(found, FAMILIES)
     unknown = unknown_of(found) if verdict == "unknown" else None
+    seconds = time.perf_counter() - began
     return {
         "family": trial.family,
         "factor": trial.factor,
@@ -86,22 +88,40 @@ def judged(yard: Yardstick, trial: Trial) -> dict[str, Any]:
         "unknown": None if unknown is None else [unknown.part, unknown.surface, unknown.statistic],
         "evidence": max(found.steps[0].parts.values()),
         "observed": found.steps[0].observed,
-        "variance": variance(found, plans[2].temperature, plans[2].tcp),
-        "seconds": time.perf_counter() - began,
+        "variance": [*variance(found, plans[2].temperature, plans[2].tcp), clean],
+        "seconds": seconds,
     }  # fmt: skip
+
+
+def plans_of(yard: Yardstick, trial: Trial) -> list[Measured]:
+    """What was measured in the three runs of a trial."""
+    study = yard.study
+    return [
+        measured(study.bench.base, run, p.run.drive, p.run.name) for run, p in zip(trial.runs, study.runs, strict=True)
+    ]
 
 
 def variance(found: Search, temperature: np.ndarray, tcp: np.ndarray) -> tuple[float, float]:
     """Mean square of the sealed run's residuals in units of the channels' noise: recalibrated, extended."""
-    study = found.yardstick.study
-    models = predicted(found, len(study.fitted))
-    sensors, probe = found.yardstick.whiten.channels[0]
-    result = []
-    for flat in (models.recalibrated, models.extended):
-        T, w = study.runs[len(study.fitted)].split(flat)
-        parts = [((temperature - T) / sensors.sigma).ravel(), ((tcp - w) / probe.sigma).ravel()]
-        result.append(float(np.nanmean(np.concatenate(parts) ** 2)))
+    models = predicted(found, len(found.yardstick.study.fitted))
+    result = [_variance(found.yardstick, flat, temperature, tcp) for flat in (models.recalibrated, models.extended)]
     return result[0], result[1]
+
+
+def variance_without(yard: Yardstick, trial: Trial) -> float:
+    """Likewise of a trial that hides nothing, recalibrated: what no extension can be better than."""
+    study = yard.study
+    plans = plans_of(yard, trial)
+    x, _ = settled(yard, measured_of(with_measured(study, plans)), ())
+    last = len(study.fitted)
+    return _variance(yard, study.outputs(last, x), plans[last].temperature, plans[last].tcp)
+
+
+def _variance(yard: Yardstick, flat: np.ndarray, temperature: np.ndarray, tcp: np.ndarray) -> float:
+    sensors, probe = yard.whiten.channels[0]
+    T, w = yard.study.runs[len(yard.study.fitted)].split(flat)
+    parts = [((temperature - T) / sensors.sigma).ravel(), ((tcp - w) / probe.sigma).ravel()]
+    return float(np.nanmean(np.concatenate(parts) ** 2))
 
 
 def _one(deadline: float, item: Item) -> None:
@@ -110,7 +130,9 @@ def _one(deadline: float, item: Item) -> None:
         return
     family, factor, seed = item
     try:
-        result = judged(yardstick(), draw(family, factor, seed))
+        yard, trial = yardstick(), draw(family, factor, seed)
+        bare = draw(family, factor, seed, hidden=False) if trial.truth else trial
+        result = judged(yard, trial, variance_without(yard, bare))
     except Exception as e:  # a trial that fails is a result, too
         result = {"family": family, "factor": factor, "seed": seed, "error": f"{type(e).__name__}: {e}"}
     OUT.mkdir(parents=True, exist_ok=True)

@@ -112,10 +112,10 @@ def values_of(family: str, seed: int) -> dict[str, float]:
     return result
 
 
-def draw(family: str, factor: float, seed: int, machine: Fast | None = None) -> Trial:
-    """The trial of a family at a factor of its nominal size."""
+def draw(family: str, factor: float, seed: int, machine: Fast | None = None, hidden: bool = True) -> Trial:
+    """The trial of a family at a factor of its nominal size; not hidden: the same machine, air and noise without it."""
     known = fast() if machine is None else machine
-    part = part_of(family, factor, seed)
+    part = part_of(family, factor, seed) if hidden else Part(())
     values = values_of(family, seed)
     for path, more in part.factors.items():
         values[path] *= more

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from scipy.stats import binom
 
 from benchmarks.campaign_match import covered, effect, place_of, said, same_part, same_place, size_of
 from benchmarks.campaign_table import (
     confusion,
-    floor_of,
     goals,
     lower,
     page,
@@ -40,7 +38,10 @@ def cause(family, place, amplitude, unit, half=0.0, history="always", rivals=())
             "rivals": list(rivals)}  # fmt: skip
 
 
-def trial(family, truth=(), causes=(), verdict="named", factor=1.0, variance=(1.0, 1.0), unknown=None, seconds=4.0):
+FLAT = (1.0, 1.0, 1.0)  # recalibrated, extended, without what is hidden
+
+
+def trial(family, truth=(), causes=(), verdict="named", factor=1.0, variance=FLAT, unknown=None, seconds=4.0):
     return {"family": family, "factor": factor, "seed": 0, "truth": list(truth), "verdict": verdict,
             "causes": list(causes), "unknown": unknown, "evidence": 0.0, "observed": {}, "variance": list(variance),
             "seconds": seconds}  # fmt: skip
@@ -50,11 +51,12 @@ HEAT = hidden("heat_source", "bed.left", 12.0, "W")
 RESULTS = [
     *[trial("null", verdict="nothing") for _ in range(9)],
     trial("null", causes=[cause("film_gain", "films.bed", 1.3, "1")]),
-    trial("null_law", verdict="nothing", variance=(1.2, 1.2)),
+    trial("null_law", verdict="nothing", variance=(1.2, 1.2, 1.2)),
     # right, half of the reducible variance recovered; interval holds the size
-    trial("heat_source", [HEAT], [cause("heat_source", "bed.left", 11.0, "W", 2.0)], variance=(3.0, 2.0)),
+    trial("heat_source", [HEAT], [cause("heat_source", "bed.left", 11.0, "W", 2.0)], variance=(3.0, 2.0, 1.0)),
     # right, all recovered; interval too narrow
-    trial("heat_source", [HEAT], [cause("heat_source", "bed.left", 9.0, "W", 1.0)], variance=(2.0, 1.0), seconds=8.0),
+    trial("heat_source", [HEAT], [cause("heat_source", "bed.left", 9.0, "W", 1.0)],
+          variance=(2.0, 1.0, 1.0), seconds=8.0),
     # another face of the part
     trial("heat_source", [HEAT], [cause("heat_source", "bed.right", 12.0, "W", 1.0)], factor=2.0),
     # ambiguous, with the truth among the rivals
@@ -125,11 +127,12 @@ def test_bounds_are_those_of_clopper_and_pearson(k, n):
     assert (lower(0, n), upper(n, n)) == (0.0, 1.0)
 
 
-def test_the_floor_is_the_nulls():
-    assert floor_of(RESULTS) == 1.0
-    assert np.isnan(floor_of([]))
-    assert recovered(trial("sun", variance=(3.0, 1.5)), 1.0) == pytest.approx(0.75)
-    assert recovered(trial("sun", variance=(1.04, 0.9)), 1.0) is None
+def test_recovered_is_what_the_machine_without_the_effect_would_leave():
+    assert recovered(trial("sun", variance=(3.0, 1.5, 1.0))) == pytest.approx(0.75)
+    assert recovered(trial("sun", variance=(1.04, 0.9, 1.0))) is None  # hardly any
+    assert recovered(trial("sensor", variance=(3.0, 1.5, 1.0))) is None  # not the machine
+    unseen = hidden("zone", "environment.room", 2.5, "K", "in windows")
+    assert recovered(trial("zone", [unseen], variance=(3.0, 1.5, 1.0))) is None  # nobody can foresee it
 
 
 @pytest.mark.parametrize(

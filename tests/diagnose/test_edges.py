@@ -10,8 +10,9 @@ import pytest
 from tests.diagnose import small_case
 from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Batch, History, Hypothesis
+from twin.diagnose.bells import by_blocks, name
 from twin.diagnose.diagnosis import Window
-from twin.diagnose.edges import PULSE, SHORTEST, Edge, edges_of, moved, per_second, with_pulses
+from twin.diagnose.edges import PULSE, SHORTEST, Edge, edges_of, moved, with_pulses
 
 HOUR = 3600.0
 
@@ -34,20 +35,20 @@ def test_edges_are_the_ends_within_a_run():
     first, second = names()[:2]
     end = float(study.runs[0].run.drive.time[-1])
     assert edges_of(study, heat(Window(first, 0.0, end))) == []
-    assert edges_of(study, heat(Window(first, HOUR, end))) == [Edge(0, False)]
+    assert edges_of(study, heat(Window(first, HOUR, end))) == [Edge("start", 0)]
     both = heat(Window(first, HOUR, 2 * HOUR), Window(second, 0.0, HOUR))
-    assert edges_of(study, both) == [Edge(0, False), Edge(0, True), Edge(1, True)]
-    assert edges_of(study, replace(both, batch=replace(both.batch, family="sun"))) == []
+    assert edges_of(study, both) == [Edge("start", 0), Edge("end", 0), Edge("end", 1)]
+    assert edges_of(study, replace(both, batch=replace(both.batch, family="not_thermal"))) == []
 
 
-@pytest.mark.parametrize("edge", [Edge(0, False), Edge(0, True)])
+@pytest.mark.parametrize("edge", [Edge("start", 0), Edge("end", 0)])
 def test_the_derivative_by_an_edge_is_that_of_outputs(edge):
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
     h = heat(Window(names()[0], HOUR, 2 * HOUR))
     x, a = np.zeros(len(study.bench.parameters)), np.array([100.0])
 
     def at(shift):
-        units = units_of(study, elements, elements.index, moved(study, h, [(edge, shift)]))
+        units = units_of(study, elements, elements.index, moved(study, elements, h, [(edge, shift)]))
         return study.outputs(0, x, with_pulses(study, elements, h, units, a, [], 0), a)
 
     units = units_of(study, elements, elements.index, h)
@@ -55,17 +56,52 @@ def test_the_derivative_by_an_edge_is_that_of_outputs(edge):
     wanted = (at(PULSE / 2) - at(-PULSE / 2)) / PULSE
     size = np.abs(wanted).max()
     assert size > 1e-5  # K per s
-    assert np.abs(D[:, 1] * per_second(edge) - wanted).max() < 1e-6 * size
+    assert np.abs(D[:, 1] * edge.per_second - wanted).max() < 1e-6 * size
+
+
+def sunny(centre: float, length: float) -> Hypothesis:
+    """A bell at the housing in every run."""
+    study, elements = small_case.study(linear=True), small_case.elements(linear=True)
+    columns = elements.block_of["heat", "housing"]
+    weights, windows = by_blocks(study, elements.histories.blocks, centre, length)
+    when = History(name(centre, length), weights, windows=windows, bell=(centre, length))
+    batch = Batch("sun", "heat", "W", ("housing",), columns[None], (when,), 1)
+    return Hypothesis(batch, 0, when, 0.0, (100.0, 60.0), 1.0)
+
+
+@pytest.mark.parametrize("what", ["centre", "length"])
+def test_the_derivative_by_a_bell_is_that_of_outputs(what):
+    study, elements = small_case.study(linear=True), small_case.elements(linear=True)
+    h, edge = sunny(1.5 * HOUR, 2.5 * HOUR), Edge(what)
+    assert edges_of(study, h) == [Edge("centre"), Edge("length")]
+    x, a = np.zeros(len(study.bench.parameters)), np.array([100.0, 60.0])
+
+    def at(shift):
+        units = units_of(study, elements, elements.index, moved(study, elements, h, [(edge, shift)]))
+        return study.outputs(1, x, with_pulses(study, elements, h, units, a, [], 1), a)
+
+    units = units_of(study, elements, elements.index, h)
+    _, D = study.by_amplitudes(1, x, with_pulses(study, elements, h, units, a, [edge], 1), [*a, 0.0])
+    wanted = (at(PULSE / 2) - at(-PULSE / 2)) / PULSE
+    assert np.abs(wanted).max() > 1e-5  # K per s
+    assert np.abs(D[:, 2] * edge.per_second - wanted).max() < 1e-6 * np.abs(wanted).max()
 
 
 def test_moved_windows_stay_in_their_run_and_are_named_anew():
     study = small_case.study()
     first, second = names()[:2]
     end = float(study.runs[0].run.drive.time[-1])
-    h = moved(study, heat(Window(first, HOUR, 2 * HOUR)), [(Edge(0, False), -9e9), (Edge(0, True), 900.0)])
+    h = moved(
+        study,
+        small_case.elements(),
+        heat(Window(first, HOUR, 2 * HOUR)),
+        [(Edge("start", 0), -9e9), (Edge("end", 0), 900.0)],
+    )
     assert h.when.windows == (Window(first, 0.0, 2.25 * HOUR),)
     assert h.when.name == f"from 0.0 h to 2.2 h of {first}"
-    short = moved(study, heat(Window(first, HOUR, 2 * HOUR)), [(Edge(0, True), -9e9)])
+    short = moved(study, small_case.elements(), heat(Window(first, HOUR, 2 * HOUR)), [(Edge("end", 0), -9e9)])
     assert short.when.windows[0].end == HOUR + SHORTEST
     last = heat(Window(first, HOUR, end), Window(second, 0.0, float(study.runs[1].run.drive.time[-1])))
-    assert moved(study, last, [(Edge(0, False), 360.0)]).when.name == f"from 1.1 h of {first} on"
+    assert (
+        moved(study, small_case.elements(), last, [(Edge("start", 0), 360.0)]).when.name == f"from 1.1 h of {first} on"
+    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.calibrate.effects import contact_names
+from twin.diagnose import bells
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.elements import Elements
@@ -39,7 +40,7 @@ def units_of(
 ) -> tuple[Unit, ...]:
     """The amplitudes of a hypothesis in every run of the study, the sealed one included; none for readings.
 
-    Histories of logged signals go on in the sealed run; windows are there only where the hypothesis lasts.
+    Histories of logged signals and the sun go on in the sealed run; windows are there only where the hypothesis lasts.
     """
     kind = h.batch.kind
     if kind in READINGS:
@@ -70,18 +71,17 @@ def _shapes(study: Study, elements: Elements, h: Hypothesis, row: np.ndarray) ->
         run = planned.run
         n = run.drive.n_steps
         if when.windows:
-            shape = np.zeros(n)
-            if h.family == "sun":  # levels by the hour, an amplitude per run
-                for b, (i, start, end) in enumerate(blocks):
-                    if i == k:
-                        shape[start:end] = row[-len(blocks) + b]
+            shape, t = np.zeros(n), np.asarray(run.drive.time)
+            if h.family == "sun":  # an amplitude per run, the mean of them in others
+                day = bells.level((t[:-1] + t[1:]) / 2 - t[0], *when.bell)
+                own = {study.fitted[i] for b, (i, _, _) in enumerate(blocks) if row[b]}
+                shape = day if k in own else day / len(study.fitted) if k not in study.fitted else shape
             else:
-                t = np.asarray(run.drive.time)
                 for w in when.windows:
                     if w.run == run.name:
                         within = np.clip(np.minimum(t[1:], w.end) - np.maximum(t[:-1], w.start), 0.0, None)
                         shape += w.level * within / (t[1] - t[0])
-            if k not in study.fitted and _lasts(study, when.windows):
+            if h.family != "sun" and k not in study.fitted and _lasts(study, when.windows):
                 shape[:] = 1.0
         elif when.signal:
             values = run.signals.get(when.signal)

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.acted import CONDUCTS, READINGS, units_of
-from twin.diagnose.batch import GROWTH, Hypothesis
-from twin.diagnose.edges import PRIOR, STEP, Edge, edges_of, moved, per_second, with_pulses
+from twin.diagnose.batch import Hypothesis
+from twin.diagnose.edges import STEP, Edge, edges_of, moved, with_pulses
 from twin.diagnose.fitter import Fitted, bounds
+from twin.diagnose.growth import GROWTH
 from twin.diagnose.study import K
 from twin.diagnose.yardstick import Yardstick
 
@@ -67,7 +68,7 @@ def _bent(yard: Yardstick, h: Hypothesis) -> bool:
 def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
     """A hypothesis with amplitudes, edges in time and statistic of the exact model, the parameters fitted with it.
 
-    y (m,): NaN where nothing was measured.
+    y (m,): NaN where nothing was measured. What accepted causes do is added to what it does.
     """
     study = yard.study
     relative, q = h.batch.kind in CONDUCTS, h.batch.q
@@ -87,8 +88,8 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(yard, now, edges)
         _, J = yard.fitter.surrogate.at(now.x)
-        projector = yard.fitter.projector(J)
-        left = yard.whiten(y - outputs + J @ now.x)
+        projector = yard.fitter.projector(J, fitted.more)
+        left = yard.whiten(y - fitted.beside - outputs + J @ now.x)
         removed = before - float(left @ projector(left))
         if removed <= statistic:  # too far: back, and less
             share *= 0.4
@@ -97,17 +98,19 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
         else:
             best, statistic, share = now, removed, 1.0
             D = derivatives
-            D[:, q:] *= [per_second(e) for e in edges]
+            D[:, q:] *= [e.per_second for e in edges]
             D = yard.whiten(D)
             PD = projector(D)
-            F = D.T @ PD + np.diag([0.0] * q + [PRIOR**-2.0] * len(edges))
+            F = D.T @ PD + np.diag([0.0] * q + [e.prior**-2.0 for e in edges])
             found = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ left)
             after = _moved(now.a, found[:q], relative, h.batch.sign)
             shifts = np.clip(found[q:], -STEP, STEP)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
             drift = np.clip(np.clip(nuisance, low, high) - now.x, -NEAR, NEAR)
             step = _Step(after - now.a, drift, tuple(zip(edges, shifts, strict=True)))
-        shifted = moved(study, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
+        shifted = (
+            moved(study, yard.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
+        )
         now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
     return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
 

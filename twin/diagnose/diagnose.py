@@ -115,8 +115,8 @@ def _closed(m: Measured) -> Measured:
 
 
 AFTER = (  # modules that only use a yardstick
-    "acted", "channels", "contest", "damage", "diagnose", "diagnosis", "edges", "edit", "extension", "gain", "hide",
-    "report", "search", "site", "verdict",
+    "accepted", "acted", "channels", "contest", "damage", "diagnose", "diagnosis", "edges", "edit", "extension", "gain",
+    "growth", "hide", "report", "search", "settled", "site", "verdict",
 )  # fmt: skip
 
 

@@ -1,16 +1,19 @@
-"""When a windowed cause begins and ends, to the minute: blocks of an hour are for the search alone.
+"""When a cause begins and ends, to the minute, and the course of the sun: blocks of an hour are for the search alone.
 
 A cause of two hundred standard deviations whose window is off by a quarter of an hour leaves more misfit than most
-other causes make. The derivative by an edge is the response to a pulse there.
+other causes make. The derivative by an edge is the response to a pulse there; by the centre or length of a bell, to the
+difference of two bells.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
+from twin.diagnose import bells
 from twin.diagnose.acted import Unit, slots_with
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.diagnosis import Window
@@ -20,43 +23,65 @@ from twin.diagnose.study import Study
 
 PULSE = 600.0  # s
 SHORTEST = 600.0  # s, of a window
+BRIEF = 7200.0  # s, the shortest bell
 PRIOR = 1800.0  # s: standard deviation of an edge about the hour that the search found
 STEP = 1800.0  # s, the longest step of an edge
+EXPONENT = 0.12  # standard deviation of a signal's exponent about the one of the catalogue
+LONGER = 1800.0  # s, likewise of the length of a bell that was fitted
 
 
 @dataclass(frozen=True)
 class Edge:
-    """One end of a window."""
+    """One end of a window, or what a bell is made of."""
 
-    window: int
-    end: bool
+    what: Literal["start", "end", "centre", "length"]
+    window: int = 0
+
+    @property
+    def per_second(self) -> float:
+        """The response to a shift by 1 s, in units of that to its pulse."""
+        return (-1.0 if self.what == "start" else 1.0) / PULSE
+
+    @property
+    def prior(self) -> float:
+        """Standard deviation [s] about what the search found."""
+        return 2.0 * PRIOR if self.what == "length" else PRIOR
 
 
 def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
-    """The edges of a hypothesis that lie within a run; none where windows are bells, or instants of a reading."""
-    if h.family in ("sun", "not_thermal"):
+    """The edges of a hypothesis that lie within a run, those of a bell; none of instants of a reading."""
+    if h.family == "not_thermal":
         return []
+    if h.family == "sun":
+        return [Edge("centre"), Edge("length")]
     spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
     result = []
     for i, w in enumerate(h.when.windows):
         if w.start > 0.0:
-            result.append(Edge(i, False))
+            result.append(Edge("start", i))
         if w.end < spans[w.run] - 1.0:
-            result.append(Edge(i, True))
+            result.append(Edge("end", i))
     return result
 
 
-def moved(study: Study, h: Hypothesis, shifts: Sequence[tuple[Edge, float]]) -> Hypothesis:
+def moved(study: Study, elements: Elements, h: Hypothesis, shifts: Sequence[tuple[Edge, float]]) -> Hypothesis:
     """The hypothesis with edges shifted [s]."""
-    windows = list(h.when.windows)
+    if h.family == "sun":
+        by = {edge.what: shift for edge, shift in shifts}
+        centre = h.when.bell[0] + by.get("centre", 0.0)
+        length = max(h.when.bell[1] + by.get("length", 0.0), BRIEF)
+        weights, windows = bells.by_blocks(study, elements.histories.blocks, centre, length)
+        named = bells.name(centre, length)
+        return replace(h, when=replace(h.when, name=named, weights=weights, windows=windows, bell=(centre, length)))
+    ends = list(h.when.windows)
     spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
-    for edge, by in shifts:
-        w = windows[edge.window]
-        if edge.end:
-            windows[edge.window] = replace(w, end=float(np.clip(w.end + by, w.start + SHORTEST, spans[w.run])))
+    for edge, shift in shifts:
+        w = ends[edge.window]
+        if edge.what == "end":
+            ends[edge.window] = replace(w, end=float(np.clip(w.end + shift, w.start + SHORTEST, spans[w.run])))
         else:
-            windows[edge.window] = replace(w, start=float(np.clip(w.start + by, 0.0, w.end - SHORTEST)))
-    return replace(h, when=replace(h.when, name=_named(windows, spans), windows=tuple(windows)))
+            ends[edge.window] = replace(w, start=float(np.clip(w.start + shift, 0.0, w.end - SHORTEST)))
+    return replace(h, when=replace(h.when, name=_named(ends, spans), windows=tuple(ends)))
 
 
 def _named(windows: Sequence[Window], spans: dict[str, float]) -> str:
@@ -72,34 +97,68 @@ def with_pulses(
 ) -> Slots:
     """Slots of run k: the amplitudes, then per edge a pulse there that is 1 K, 1 W, ... times the amplitudes a."""
     slots = slots_with(study, elements, units, k)
-    run = study.runs[k].run
-    t = np.asarray(run.drive.time)
     for e, edge in enumerate(edges, start=len(units)):
-        w = h.when.windows[edge.window]
-        if w.run != run.name:
+        pulse = _pulse(study, h, edge, k)
+        if pulse is None:
             continue
-        at = w.end if edge.end else w.start
-        shape = np.clip(np.minimum(t[1:], at + PULSE / 2) - np.maximum(t[:-1], at - PULSE / 2), 0.0, None)
-        shape = shape / (t[1] - t[0])
-        pulses = [replace(u, shapes=tuple(v * shape if i == k else s for i, s in enumerate(u.shapes)))
-                  for u, v in zip(units, a, strict=True)]  # fmt: skip
-        own = slots_with(study, elements, pulses, k)
+        pulses = []
+        for u, v in zip(units, a, strict=True):  # a bell has an amplitude for each run, which acts in that run alone
+            own = pulse if u.shapes[k].any() else np.zeros(len(pulse))
+            pulses.append(replace(u, shapes=tuple(v * own if i == k else s for i, s in enumerate(u.shapes))))
+        made = slots_with(study, elements, pulses, k)
         for q in range(len(units)):
-            slots.A[e] += own.A[q]
-            slots.M[e] += own.M[q]
-            slots.gate[:, e] += own.gate[:, q]
-            slots.rise[:, :, e] += own.rise[:, :, q]
-            slots.forcing[:, :, e] += own.forcing[:, :, q]
-            slots.film[:, e] += own.film[:, q]
-            slots.joint[:, e] += own.joint[:, q]
-            slots.contact[:, e] += own.contact[:, q]
-            slots.environment[:, :, e] += own.environment[:, :, q]
+            slots.A[e] += made.A[q]
+            slots.M[e] += made.M[q]
+            slots.gate[:, e] += made.gate[:, q]
+            slots.rise[:, :, e] += made.rise[:, :, q]
+            slots.forcing[:, :, e] += made.forcing[:, :, q]
+            slots.film[:, e] += made.film[:, q]
+            slots.joint[:, e] += made.joint[:, q]
+            slots.contact[:, e] += made.contact[:, q]
+            slots.environment[:, :, e] += made.environment[:, :, q]
     return slots
 
 
-def per_second(edge: Edge) -> float:
-    """The response to a shift of an edge by 1 s, in units of that to its pulse."""
-    return (1.0 if edge.end else -1.0) / PULSE
+def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarray) -> list[Unit]:
+    """Units whose responses at amplitude one are what the shape of a cause leaves open, one standard deviation each.
+
+    The exponent of a logged signal, the length of a bell. Empty for windows, whose edges are fitted.
+    """
+    if h.family == "sun":
+        centre, length = h.when.bell
+        changes = []
+        for planned in study.runs:
+            t = np.asarray(planned.run.drive.time)
+            middle = (t[:-1] + t[1:]) / 2
+            changes.append(bells.level(middle, centre, length + LONGER) - bells.level(middle, centre, length))
+        return [
+            replace(u, shapes=tuple(v * c * s.any() for c, s in zip(changes, u.shapes, strict=True)))
+            for u, v in zip(units, a, strict=True)
+        ]
+    if not h.when.signal or h.when.exponent == 0.0:
+        return []
+    by = EXPONENT / h.when.exponent  # d(s^e) / de = s^e ln s = (s^e ln s^e) / e
+    return [
+        replace(u, shapes=tuple(v * by * s * np.log(np.maximum(s, 1e-12)) for s in u.shapes))
+        for u, v in zip(units, a, strict=True)
+    ]
+
+
+def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray | None:
+    """(n_fine,) the change of a shape in run k while an edge moves by PULSE; None in other runs."""
+    run = study.runs[k].run
+    t = np.asarray(run.drive.time)
+    if h.family == "sun":
+        (centre, length), middle, by = h.when.bell, (t[:-1] + t[1:]) / 2, PULSE / 2
+        if edge.what == "centre":
+            return bells.level(middle, centre + by, length) - bells.level(middle, centre - by, length)
+        return bells.level(middle, centre, length + by) - bells.level(middle, centre, length - by)
+    w = h.when.windows[edge.window]
+    if w.run != run.name:
+        return None
+    at = w.end if edge.what == "end" else w.start
+    shape = np.clip(np.minimum(t[1:], at + PULSE / 2) - np.maximum(t[:-1], at - PULSE / 2), 0.0, None)
+    return np.asarray(shape / (t[1] - t[0]))
 
 
 def _span(study: Study, k: int) -> float:

@@ -213,8 +213,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         v = vector([B] * len(runs))
         for name, history in _law_histories(study, j, histories).items():
             column(("source", source.name, name), v, history)
-        own_place = int(np.argmax([abs(B @ b) / np.linalg.norm(b) for b in bench.B]))
-        for p in beside(bench.places, own_place):
+        for p in beside(bench.places, own_place(study, j)):
             v = vector([bench.B[p] - B] * len(runs))
             column(("moved", f"{source.name}>{bench.places[p].name}", "always"), v, [q[:, j] for q in powers])
     for name, factor, of in _signals(study, nominal, powers):
@@ -226,6 +225,19 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
             only_here = [pulse if j == i else None for j in range(len(runs))]
             column(("start", f"{runs[i].name}.{m}", "always"), vector([field] * len(runs)), only_here)
     return Elements(histories, tuple(tuple(v) for v in vectors), tuple(columns), index, block_of)
+
+
+def own_place(study: Study, source: int) -> int:
+    """The place that a source of a surface heats."""
+    (body,) = study.bench.base.bodies
+    B = body.B[:, body.sources.index(source)]
+    return int(np.argmax([abs(B @ b) / np.linalg.norm(b) for b in study.bench.B]))
+
+
+def heated_places(study: Study) -> list[int]:
+    """The places of all sources but those of contacts."""
+    sources = study.bench.base.load_model.sources
+    return sorted({own_place(study, j) for j, source in enumerate(sources) if not source.contact})
 
 
 def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:

@@ -23,6 +23,8 @@ class Fitted:
     J: np.ndarray  # (m, n) there
     residual: np.ndarray  # (m,) y - f(x) + J x; NaN where nothing was measured
     projector: Projector
+    beside: np.ndarray | float = 0.0  # (m,) what accepted causes add to the outputs
+    more: np.ndarray | None = None  # (m, k) their white columns in the projector
 
 
 @dataclass(frozen=True)

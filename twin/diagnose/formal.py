@@ -10,22 +10,24 @@ from __future__ import annotations
 import numpy as np
 
 from twin.diagnose.bank import Nominal
-from twin.diagnose.elements import EXPONENT, Elements
-from twin.diagnose.nulls import Form, typical
+from twin.diagnose.elements import EXPONENT, Elements, heated_places
+from twin.diagnose.nulls import Form, lump_of, typical
 from twin.diagnose.study import Study
 from twin.diagnose.whiten import Whitener
 
-WOBBLE = 1.5  # blocks of about an hour, correlation of a film's slow variation
 CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
 READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
 LEAST = 0.7  # standard deviations over all its rows that a direction of a channel's readings must have
 
 
 def known_forms(
-    study: Study, elements: Elements, nominal: tuple[Nominal, ...], raw: np.ndarray, J: np.ndarray, whiten: Whitener,
-    form: Form,
+    study: Study, elements: Elements, nominal: tuple[Nominal, ...], raw: np.ndarray, J: np.ndarray, wind: np.ndarray,
+    whiten: Whitener, form: Form,
 ) -> np.ndarray:  # fmt: skip
-    """White columns (m, k) of unit prior variance; raw (m, n) responses in physical units, J (m, n_parameters)."""
+    """White columns (m, k) of unit prior variance; raw (m, n) responses in physical units, J (m, n_parameters).
+
+    wind (m, w): columns of `windy`.
+    """
     load, bench = study.bench.base.load_model, study.bench
     films = [f.name for f in load.films]
     usual = np.mean([typical(study, k) for k in study.fitted], axis=0)
@@ -42,6 +44,8 @@ def known_forms(
         for signal in film.use.signals.values():
             heard = elements.histories.same.get(signal, signal)
             add(("group_film", film.name, f"{heard}^{EXPONENT:g}"), form.wind * float(usual[f]))
+    for p in heated_places(study):
+        add(("capacity", bench.places[p].name, "always"), lump_of(study, p, form))
     for kind, source, history in list(elements.index):
         if kind == "moved":
             add((kind, source, history), form.beside)
@@ -69,18 +73,19 @@ def known_forms(
                 moved[first[k] + np.arange(b) * n + i] = form.aside * own
         if np.any(moved):
             columns.append(moved)
-    parts = [whiten(np.stack(columns, axis=1))] if columns else []
-    parts += _wobbles(elements, raw, whiten, form)
+    parts = [whiten(np.hstack([np.stack(columns, axis=1), wind]))] if columns else []
+    parts += _wobbles(study, elements, raw, whiten, form)
     return np.hstack([*parts, *_readings(study, J, whiten, form)]) if parts else np.zeros((len(J), 0))
 
 
-def _wobbles(elements: Elements, raw: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
+def _wobbles(study: Study, elements: Elements, raw: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
     """Per film the leading directions of its slow variation within runs."""
     blocks = elements.histories.blocks
     run = np.array([i for i, _, _ in blocks])
     when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)
-    length = float(np.median([b - a for _, a, b in blocks]))
-    R = np.exp(-0.5 * ((when[:, None] - when) / (WOBBLE * length)) ** 2) * (run[:, None] == run)
+    time = study.runs[study.fitted[0]].run.drive.time
+    memory = form.shape_time / (time[1] - time[0])
+    R = np.exp(-0.5 * ((when[:, None] - when) / memory) ** 2) * (run[:, None] == run)
     root = np.linalg.cholesky(R + 1e-6 * np.eye(len(R)))
     result = []
     for (kind, _), own in elements.block_of.items():

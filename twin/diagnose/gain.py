@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.calibrate.measured import Measured
-from twin.diagnose.acted import slots_with
+from twin.diagnose.accepted import stepped, with_shifts
 from twin.diagnose.diagnosis import Gain
 from twin.diagnose.readings import readings_of
-from twin.diagnose.search import Search, gains_of, shifted
+from twin.diagnose.search import Search
 from twin.diagnose.study import Study
 
 MACHINE_READINGS = ("scale", "expansion")  # kinds that act on what is read, and belong to the machine
@@ -35,12 +35,7 @@ def predicted(found: Search, k: int) -> Predicted:
     recalibrated = study.outputs(k, found.x0)
     if not found.accepted:
         return Predicted(delivered, recalibrated, recalibrated)
-    units = [u for a in found.accepted for u in a.units]
-    amplitudes = [v for a in found.accepted if a.units for v in a.amplitude]
-    slots = slots_with(study, yard.elements, units, k) if units else None
-    every = np.concatenate([a.amplitude for a in found.accepted])
-    there = shifted(study, found.x, gains_of(study, found.accepted), every)
-    extended = study.outputs(k, there, slots, amplitudes)
+    extended = stepped(yard, found.accepted, k, with_shifts(study, found.accepted, found.x))
     return Predicted(delivered, recalibrated, extended + _read(found, k))
 
 

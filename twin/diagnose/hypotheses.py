@@ -7,13 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.diagnose import bells
 from twin.diagnose.batch import Batch, History
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.elements import Elements
 from twin.diagnose.places import Place
 from twin.diagnose.study import Study
 
-BELLS = (4.0, 6.0, 8.0, 10.0)  # h
+HOUR = 3600.0  # s
+BELLS = (4 * HOUR, 6 * HOUR, 8 * HOUR, 10 * HOUR)
 
 
 @dataclass(frozen=True)
@@ -203,27 +205,18 @@ def zone(context: Context) -> list[Batch]:
 def sun(context: Context) -> list[Batch]:
     """Bells on every outer surface, at the same hours of every run, an amplitude per run."""
     study, blocks = context.study, context.elements.histories.blocks
-    n_runs = len(study.fitted)
-    hours = []
+    longest = 0.0
     for i, start, end in blocks:
-        dt = study.runs[study.fitted[i]].run.drive.time[1] / 1.0 - study.runs[study.fitted[i]].run.drive.time[0]
-        hours.append((start + end) / 2 * dt / 3600.0)
-    longest = max(hours) if hours else 0.0
+        time = study.runs[study.fitted[i]].run.drive.time
+        longest = max(longest, (start + end) / 2 * (time[1] - time[0]))
     histories = []
     for length in BELLS:
-        for centre in np.arange(length / 2, longest + 1.0, 1.0):
-            weights = np.zeros((n_runs, len(blocks)))
-            windows = []
-            for b, (i, start, end) in enumerate(blocks):
-                level = float(np.cos(np.pi * np.clip((hours[b] - centre) / length, -0.5, 0.5)))
-                weights[i, b] = level
-                run = study.runs[study.fitted[i]].run
-                dt = run.drive.time[1] - run.drive.time[0]
-                if level > 0.01:
-                    windows.append(Window(run.name, start * dt, end * dt, level))
+        for centre in np.arange(length / 2, longest + HOUR, HOUR):
+            weights, windows = bells.by_blocks(study, blocks, centre, length)
             if (np.abs(weights).sum(axis=1) > 0).all():
-                name = f"{max(centre - length / 2, 0):.0f} to {centre + length / 2:.0f} h of every run"
-                histories.append(History(name, weights, windows=tuple(windows)))
+                histories.append(
+                    History(bells.name(centre, length), weights, windows=windows, bell=(float(centre), length))
+                )
     rows = [(p.name, list(context.elements.block_of["heat", p.name])) for p in context.outer]
     return [_batch(context, "sun", "heat", "W", rows, histories, 1, 2.0)] if histories and rows else []
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.diagnose.elements import heated_places, own_place
 from twin.diagnose.march import INNER, Slots
 from twin.diagnose.places import beside
 from twin.diagnose.study import Study
@@ -27,9 +28,11 @@ class Form:
 
     local_film: float = 0.12  # of each face's coefficient against its group's
     shape: float = 0.05  # of a film group's coefficient, slowly varying within a run
+    shape_time: float = 5400.0  # s, over which it does
     wind: float = 0.25  # of a film group's coefficient at the top speed of its law against that at rest
     contact: float = 0.5  # of the logarithm of a contact's conductance beyond its tolerance: the mesh at its patch
     beside: float = 0.02  # share of a source's heat that enters another face of its part
+    lump: float = 3000.0  # J/K, at the patch of a source: how far its heat reaches at once
     aside: float = 0.4  # of 8 mm, by which sensors are off
     reading: float = 0.02  # of what every source and every contact does to every channel
     air: float = 0.12  # K, fluctuation of a zone's air
@@ -64,8 +67,10 @@ def null(
     contact = np.expm1(form.contact * np.clip(rng.standard_normal(study.slots(0).contact.shape[2]), -2.0, 2.0))
     joint = np.expm1(form.contact * np.clip(rng.standard_normal(len(load.joints)), -2.0, 2.0))
     split = [_beside(study, j, rng, form) for j in range(len(load.sources))]
-    zone_phase = rng.uniform(0.0, 2 * np.pi, len(load.films))
-    shape = form.shape * rng.standard_normal(len(load.films))
+    E = np.zeros_like(body.A0)
+    for place in heated_places(study):
+        lump = lump_of(study, place, form) * float(np.clip(rng.standard_normal(), -1.8, 1.8))
+        E += lump * np.outer(bench.B[place], bench.B[place])
     wind = form.wind * rng.standard_normal(len(load.films))
     exponent = rng.uniform(*EXPONENTS, len(load.films))
     readings = _readings(study, J, rng, form)
@@ -87,9 +92,8 @@ def null(
             M += strength * bench.M[p]
         surround = air[:, :, load.surroundings] - bench.base.reference_temperature
         rise[:] = surround
-        hours = (np.arange(n) * INNER * (run.drive.time[1] - run.drive.time[0]) / 3600.0)[:, None]
-        period = rng.uniform(3.0, 9.0, len(load.films))
-        wobble = shape * np.sin(2 * np.pi * hours / period + zone_phase) + wind * _winds(study, k, n, exponent)
+        slow = _smooth(rng, n, len(load.films), form.shape_time / (INNER * (run.drive.time[1] - run.drive.time[0])))
+        wobble = form.shape * slow + wind * winds(study, k, exponent)
         forcing = np.zeros((n, INNER, body.n))
         for j, vector in enumerate(split):
             if vector is not None:
@@ -98,7 +102,7 @@ def null(
         initial = form.start * rng.standard_normal() * body.one if not run.stated_start else np.zeros(body.n)
         initial = initial + form.start_apart * _body_starts(study, rng)
         filled = Slots(
-            A=_first(slots.A, A), M=_first(slots.M, M), E=slots.E, gate=_gate(slots.gate),
+            A=_first(slots.A, A), M=_first(slots.M, M), E=_first(slots.E, E), gate=_gate(slots.gate),
             rise=_column(slots.rise, rise), forcing=_fill(slots.forcing, forcing), film=_row(slots.film, wobble),
             joint=_row(slots.joint, joint), contact=_row(slots.contact, contact),
             environment=_fill(slots.environment, fluctuation.reshape(n, INNER, -1)),
@@ -161,11 +165,19 @@ def _ornstein(rng: np.random.Generator, n: int, columns: int, memory: float) -> 
     return result
 
 
-def _winds(study: Study, k: int, n: int, exponent: np.ndarray) -> np.ndarray:
+def _smooth(rng: np.random.Generator, n: int, columns: int, memory: float) -> np.ndarray:
+    """Unit Gaussian noise (n, columns), correlated as exp(-d^2 / (2 memory^2)) over d steps."""
+    steps = np.arange(n)
+    R = np.exp(-0.5 * ((steps[:, None] - steps) / memory) ** 2)
+    return np.asarray(np.linalg.cholesky(R + 1e-6 * np.eye(n)) @ rng.standard_normal((n, columns)))
+
+
+def winds(study: Study, k: int, exponent: np.ndarray) -> np.ndarray:
     """(n, n_films) 0 .. 1: how fast the air of each film moves, as its law hears, to the exponent (n_films,); 0 for
     films that hear no speed."""
     load, run = study.bench.base.load_model, study.runs[k].run
     units = {s.name: s.unit for s in load.signals}
+    n = run.drive.n_steps // INNER
     result = np.zeros((n, len(load.films)))
     for f, film in enumerate(load.films):
         for signal in film.use.signals.values():
@@ -198,14 +210,20 @@ def _power(study: Study, k: int, source: int) -> np.ndarray:
     return power.reshape(-1, INNER)
 
 
+def lump_of(study: Study, place: int, form: Form) -> float:
+    """J/K by which the patch of a source may differ: half of what follows it at once, where that is less."""
+    (body,) = study.bench.base.bodies
+    b = study.bench.B[place]
+    return float(min(form.lump, 0.5 / (b @ np.linalg.solve(body.E, b))))
+
+
 def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> np.ndarray | None:
     """What of 1 W of a source enters elsewhere: (r,); None for contacts and machines without places beside it."""
     bench = study.bench
     (body,) = bench.base.bodies
     if bench.base.load_model.sources[source].contact:
         return None
-    B = body.B[:, body.sources.index(source)]
-    own = int(np.argmax([abs(B @ b) / np.linalg.norm(b) for b in bench.B]))
+    B, own = body.B[:, body.sources.index(source)], own_place(study, source)
     near = [p for p in beside(bench.places, own) if not bench.places[p].name.startswith("contacts.")]
     share = abs(form.beside * rng.standard_normal())
     if not near:

@@ -10,13 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
 
-from twin.diagnose.acted import RELATIVE, Unit, slots_with, units_of
-from twin.diagnose.batch import Hypothesis, best, grown
+from twin.diagnose.accepted import Accepted, gains_of, readings_columns, shifted
+from twin.diagnose.acted import RELATIVE, slots_with, units_of
+from twin.diagnose.batch import Hypothesis, best
 from twin.diagnose.contest import judged
+from twin.diagnose.edges import shape_errors
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.formal import of_channels
+from twin.diagnose.growth import grown
+from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight, sight
 from twin.diagnose.study import K, Study
 from twin.diagnose.unknown import Heat, evidence
@@ -24,24 +27,13 @@ from twin.diagnose.yardstick import Yardstick
 
 WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
 MOST = 3  # causes
+TRIES = 3  # rounds of candidates that the exact model refuses
+COVERS = 0.9  # of the evidence for heat of any history that a name must explain
 REFITS = 5  # passes of an exact refit
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
 NAMED = 0.7  # share of its own threshold that a name needs where another one passes
 STANDS = 0.5  # share of its threshold that a cause must explain beside the others
 NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
-
-
-@dataclass(frozen=True)
-class Accepted:
-    """A cause with its amplitudes after the last refit."""
-
-    hypothesis: Hypothesis
-    units: tuple[Unit, ...]
-    amplitude: np.ndarray  # (q,)
-    covariance: np.ndarray  # (q, q)
-    statistic: float
-    threshold: float
-    rivals: tuple[tuple[Hypothesis, float], ...]  # within NEAR, with the cosine to this one
 
 
 @dataclass(frozen=True)
@@ -59,8 +51,8 @@ class Search:
     """The whole search."""
 
     yardstick: Yardstick
-    x0: np.ndarray  # (n,) calibrated without a cause
-    x: np.ndarray  # (n,) with the accepted ones
+    x0: np.ndarray  # (n,) settled without a cause
+    x: np.ndarray  # (n,) and with the accepted ones
     accepted: tuple[Accepted, ...]
     steps: tuple[Step, ...]  # one more than were accepted, the dropped ones among them
     residual: np.ndarray  # (m,) linearised, of the last fit, accepted amplitudes left in
@@ -72,8 +64,8 @@ class Search:
 def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
     fitted = yard.fitter(y)
-    x0, accepted, steps = fitted.x, list[Accepted](), list[Step]()
-    refused = set[tuple[str, str]]()
+    accepted, steps = list[Accepted](), list[Step]()
+    refused, fruitless = set[tuple[str, str]](), 0
     while True:
         seen = sight(yard.columns, fitted.projector, yard.whiten(fitted.residual))
         ranked = _distinct(best(seen.ready, seen.g))
@@ -87,13 +79,20 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
             if alarm and h.statistic > NAMED * yard.thresholds[h.family] and used + h.batch.q <= K
             and (h.family, h.name) not in refused and not _again(h, accepted)
         ]  # fmt: skip
-        if not passing or len(accepted) >= most:
+        if not passing or len(accepted) >= most or fruitless >= TRIES:
             break
         proved, others = judged(yard, y, fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]])
         standing = [h for h in proved if h.statistic > NAMED * yard.thresholds[h.family]]
         if not any(h.statistic > yard.thresholds[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
+            fruitless += 1
             continue
+        # heat of any history pays for its freedom: a name that explains less than that has imitated it
+        free = max(parts.values(), default=0.0)
+        if free > yard.thresholds["unknown"]:
+            standing = [h for h in standing if h.statistic > COVERS * free]
+            if not standing:
+                break
         chosen = standing[0]
         rivals = _rivals(yard, fitted, chosen, [*standing, *others, *ranked])
         start = np.array(chosen.amplitude)
@@ -106,10 +105,9 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
             accepted = [a for a in accepted if a not in weak]
             fitted, accepted = refit(yard, y, fitted.x, accepted) if accepted else (yard.fitter(y), accepted)
-    n = len(x0)
-    N = fitted.projector.N
-    covariance = scipy.linalg.inv(np.eye(N.shape[1]) + N.T @ N)[:n, :n]
-    return Search(yard, x0, fitted.x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance)
+    x0, covariance = settled(yard, y, ())
+    x, covariance = settled(yard, y, accepted) if accepted else (x0, covariance)
+    return Search(yard, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance)
 
 
 def _with_more_windows(seen: Sight, h: Hypothesis) -> Hypothesis:
@@ -141,12 +139,14 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
     study, fitter = yard.study, yard.fitter
     low, high = bounds(study)
     units = [u for a in accepted for u in a.units]
-    slots = [slots_with(study, yard.elements, units, k) for k in study.fitted] if units else []
+    open_shapes = [u for a in accepted if a.units for u in shape_errors(study, a.hypothesis, a.units, a.amplitude)]
+    open_shapes = open_shapes[: K - len(units)]
+    slots = [slots_with(study, yard.elements, [*units, *open_shapes], k) for k in study.fitted] if units else []
     # amplitudes in the order of the accepted: those of slots are stepped, those of readings are linear
     stepped = np.concatenate([np.full(len(a.amplitude), bool(a.units)) for a in accepted])
     amplitude = np.concatenate([a.amplitude for a in accepted])
     D = np.zeros((len(y), len(amplitude)))
-    linear = [_readings(yard, a.hypothesis) for a in accepted if not a.units]
+    linear = [readings_columns(yard, a.hypothesis) for a in accepted if not a.units]
     if linear:
         D[:, ~stepped] = np.hstack(linear)
     gains = gains_of(study, accepted)
@@ -156,20 +156,20 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         for i, j in gains:  # a parameter beyond its prior: its own column, per unit of the amplitude
             D[:, i] = yard.whiten(J[:, [j]])[:, 0] / study.scale[j]
         if units:
-            parts = [
-                study.by_amplitudes(k, there, slot, amplitude[stepped])
-                for k, slot in zip(study.fitted, slots, strict=True)
-            ]
+            now = [*amplitude[stepped], *np.zeros(len(open_shapes))]
+            parts = [study.by_amplitudes(k, there, slot, now) for k, slot in zip(study.fitted, slots, strict=True)]
             f = np.concatenate([p for p, _ in parts])
-            exact = np.vstack([d for _, d in parts])[:, : int(stepped.sum())]
+            every = np.vstack([d for _, d in parts])
+            exact, shapes = every[:, : len(units)], every[:, len(units) : len(units) + len(open_shapes)]
             D[:, stepped] = yard.whiten(exact)
         else:
-            f, exact = np.concatenate([study.outputs(k, there) for k in study.fitted]), np.zeros((len(y), 0))
+            f = np.concatenate([study.outputs(k, there) for k in study.fitted])
+            exact = shapes = np.zeros((len(y), 0))
         residual = y - f + J @ x + exact @ amplitude[stepped]
         white = yard.whiten(residual)
         for i, _ in gains:
             white = white + D[:, i] * amplitude[i]
-        errors = _own_errors(study, D, accepted, amplitude)
+        errors = np.hstack([_own_errors(study, D, accepted, amplitude), yard.whiten(shapes)])
         projector = fitter.projector(J, errors)
         PD = projector(D)
         F = D.T @ PD
@@ -186,8 +186,9 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         own = slice(first, first + len(a.amplitude))
         result.append(replace(a, amplitude=amplitude[own], covariance=inverse[own, own]))
         first = own.stop
-    free = fitter.projector(J, np.hstack([WIDE * D * np.sqrt(np.diag(inverse)), errors]))
-    return Fitted(x, J, residual, free), result
+    more = np.hstack([WIDE * D * np.sqrt(np.diag(inverse)), errors])
+    bare = np.concatenate([study.outputs(k, there) for k in study.fitted]) if units else f
+    return Fitted(x, J, residual, fitter.projector(J, more), f - bare, more), result
 
 
 def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], amplitude: np.ndarray) -> np.ndarray:
@@ -201,26 +202,6 @@ def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], ampli
     return np.hstack(parts)
 
 
-def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
-    """(amplitude, parameter) of causes that are a declared parameter beyond its tolerance."""
-    paths = [p.path for p in study.bench.parameters]
-    result, first = [], 0
-    for a in accepted:
-        if a.hypothesis.batch.kind == "gain":
-            name = a.hypothesis.name
-            result.append((first, paths.index(name if name in paths else f"{name}.gain")))
-        first += len(a.amplitude)
-    return result
-
-
-def shifted(study: Study, x: np.ndarray, gains: Sequence[tuple[int, int]], amplitude: np.ndarray) -> np.ndarray:
-    """(n,) the parameters with the shifts of causes that are parameters, in prior standard deviations."""
-    there = x.copy()
-    for i, j in gains:
-        there[j] += amplitude[i] / study.scale[j]
-    return there
-
-
 def _limited(found: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
     """Amplitudes that no exchange becomes negative by: relative changes stay above -0.97."""
     result, first = found.copy(), 0
@@ -229,11 +210,6 @@ def _limited(found: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
             result[first] = max(result[first], -0.97)
         first += len(a.amplitude)
     return result
-
-
-def _readings(yard: Yardstick, h: Hypothesis) -> np.ndarray:
-    columns, weights = h.combination()
-    return np.asarray(yard.columns.raw[:, columns].astype(float) @ weights.T)
 
 
 def _distinct(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -250,7 +226,7 @@ def _distinct(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 def _direction(yard: Yardstick, h: Hypothesis) -> np.ndarray:
     """(m,) white response at the fitted amplitudes."""
-    return np.asarray(_readings(yard, h) @ np.array(h.amplitude))
+    return np.asarray(readings_columns(yard, h) @ np.array(h.amplitude))
 
 
 def _cosines(yard: Yardstick, fitted: Fitted, hypotheses: Sequence[Hypothesis]) -> np.ndarray:

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from twin.diagnose.accepted import Accepted
 from twin.diagnose.acted import RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.fitter import bounds
-from twin.diagnose.search import Accepted, Search
+from twin.diagnose.search import Search
 from twin.diagnose.sight import sight
 from twin.diagnose.unknown import history
 from twin.diagnose.yardstick import Yardstick

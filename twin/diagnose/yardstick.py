@@ -28,6 +28,7 @@ from twin.diagnose.study import Study
 from twin.diagnose.surrogate import make_surrogate
 from twin.diagnose.unknown import heat_of
 from twin.diagnose.whiten import Whitener, offsets
+from twin.diagnose.windy import wind_columns
 from twin.progress import Progress, silent
 
 FORM, NULLS = 60, 200
@@ -100,10 +101,11 @@ def make_yardstick(
         advance("responses")
     first = len(elements.columns)
     index = {**elements.index, **{key: first + c for key, c in of_reading.items()}}
+    wind = wind_columns(study, form, progress)
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
     offset, zero = OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study)
-    known = known_forms(study, elements, nominal, raw, J, whiten, form)
+    known = known_forms(study, elements, nominal, raw, J, wind, whiten, form)
     fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero), known]))
     with progress("measurements without a cause: form", counts[0]) as advance:
         shared = (fitter, J_of, instruments, form)
@@ -113,7 +115,7 @@ def make_yardstick(
     variance = s**2 / max(counts[0], 1)
     kept = min(MODES, int(np.sum(variance > 3.0)))
     modes = U[:, :kept] * np.sqrt(np.maximum(variance[:kept] - 1.0, 0.0))
-    known = known_forms(study, elements, nominal, raw, J, whiten, form)
+    known = known_forms(study, elements, nominal, raw, J, wind, whiten, form)
     fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero), known, modes]))
     context = Context(study, elements, index)
     batches = [b for f in families for b in f.batches(context) if b.columns.size]

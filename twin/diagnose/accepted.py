@@ -1,0 +1,69 @@
+"""Causes that a search has accepted, and what the model with them says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.diagnose.acted import Unit, slots_with
+from twin.diagnose.batch import Hypothesis
+from twin.diagnose.study import Study
+from twin.diagnose.yardstick import Yardstick
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A cause with its amplitudes after the last refit."""
+
+    hypothesis: Hypothesis
+    units: tuple[Unit, ...]  # none where it acts on what is read
+    amplitude: np.ndarray  # (q,)
+    covariance: np.ndarray  # (q, q)
+    statistic: float
+    threshold: float
+    rivals: tuple[tuple[Hypothesis, float], ...]  # nearly as likely, with the cosine to this one
+
+
+def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
+    """(amplitude, parameter) of causes that are a declared parameter beyond its tolerance."""
+    paths = [p.path for p in study.bench.parameters]
+    result, first = [], 0
+    for a in accepted:
+        if a.hypothesis.batch.kind == "gain":
+            name = a.hypothesis.name
+            result.append((first, paths.index(name if name in paths else f"{name}.gain")))
+        first += len(a.amplitude)
+    return result
+
+
+def shifted(study: Study, x: np.ndarray, gains: Sequence[tuple[int, int]], amplitude: np.ndarray) -> np.ndarray:
+    """(n,) the parameters with the shifts of causes that are parameters, in prior standard deviations."""
+    there = x.copy()
+    for i, j in gains:
+        there[j] += amplitude[i] / study.scale[j]
+    return there
+
+
+def with_shifts(study: Study, accepted: Sequence[Accepted], x: np.ndarray) -> np.ndarray:
+    """(n,) likewise, at the amplitudes of the accepted."""
+    if not accepted:
+        return x
+    return shifted(study, x, gains_of(study, accepted), np.concatenate([a.amplitude for a in accepted]))
+
+
+def readings_columns(yard: Yardstick, h: Hypothesis) -> np.ndarray:
+    """(m, q) white first-order responses of a hypothesis: exact for what acts on what is read."""
+    columns, weights = h.combination()
+    return np.asarray(yard.columns.raw[:, columns].astype(float) @ weights.T)
+
+
+def stepped(yard: Yardstick, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
+    """(size,) outputs of run k with the causes that act in the machine; x (n,) already shifted."""
+    study = yard.study
+    units = [u for a in accepted for u in a.units]
+    if not units:
+        return study.outputs(k, x)
+    amplitudes = [v for a in accepted if a.units for v in a.amplitude]
+    return study.outputs(k, x, slots_with(study, yard.elements, units, k), amplitudes)

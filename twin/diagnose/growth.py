@@ -1,0 +1,49 @@
+"""Further windows for a cause that comes and goes: where the data ask for them, one after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.diagnose.batch import RIDGE, History, Hypothesis
+
+GROWTH = 12.0  # likelihood-ratio units that another window must bring
+SHARE = 0.05  # and the least share of what the others explain: a strong cause has misfits that windows imitate
+WINDOWS = 8
+
+
+def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
+    """A hypothesis that acts in one window, with further windows of the same size where the data ask for them.
+
+    block (L, L): D^T Pi D among the columns of its place. Greedy: the window that brings most, then again.
+    """
+    if len(h.when.windows) == 0 or h.batch.fixed or h.family in ("not_thermal", "sun", "joint"):
+        return h
+    own = g[h.batch.columns[h.place]]
+    others = [w for w in h.batch.histories if w.windows]
+    W = np.stack([w.weights for w in others])  # (h, q, L)
+    current = h
+    for _ in range(WINDOWS - 1):
+        now = current.when.weights
+        free = np.flatnonzero((np.abs(W) * np.abs(now)).sum(axis=(1, 2)) == 0.0)
+        if not len(free):
+            break
+        union = W[free] + now
+        num = np.einsum("hql,l->hq", union, own)
+        F = np.einsum("hql,lm,hrm->hqr", union, block, union, optimize=True)
+        scale = np.trace(F, axis1=1, axis2=2)[:, None, None] * RIDGE + 1e-12
+        inverse = np.linalg.inv(F + scale * np.eye(h.batch.q))
+        a = np.einsum("hqr,hr->hq", inverse, num)
+        statistic = np.einsum("hq,hq->h", num, a)
+        statistic = np.where(np.abs(a[:, 0]) < h.batch.smallest, 0.0, statistic)
+        if h.batch.sign:
+            statistic = np.where(h.batch.sign * a[:, 0] < 0.0, 0.0, statistic)
+        k = int(np.argmax(statistic))
+        if statistic[k] < current.statistic + max(GROWTH, SHARE * current.statistic):
+            break
+        more = others[int(free[k])]
+        windows = tuple(sorted((*current.when.windows, *more.windows), key=lambda w: (w.run, w.start)))
+        name = " and ".join(f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" for w in windows)
+        when = History(f"from {name}", union[k], windows=windows)
+        information = float(1.0 / max(inverse[k, 0, 0], 1e-30))
+        current = Hypothesis(h.batch, h.place, when, float(statistic[k]), tuple(map(float, a[k])), information)
+    return current
