@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.diagnose.batch import GROWTH, Batch, History, Hypothesis
+from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.contest import AMPLITUDE, HIGH, LOW, _moved, worth
 from twin.diagnose.diagnosis import Window
+from twin.diagnose.growth import GROWTH
 
 
 def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:

@@ -37,7 +37,9 @@ def test_edges_are_the_ends_within_a_run():
     assert edges_of(study, heat(Window(first, 0.0, end))) == []
     assert edges_of(study, heat(Window(first, HOUR, end))) == [Edge("start", 0)]
     both = heat(Window(first, HOUR, 2 * HOUR), Window(second, 0.0, HOUR))
-    assert edges_of(study, both) == [Edge("start", 0), Edge("end", 0), Edge("end", 1)]
+    assert edges_of(study, both) == [Edge("start", 0), Edge("end", 0), Edge("start", 1), Edge("end", 1)]
+    lasting = heat(Window(first, HOUR, end), Window(second, 0.0, float(study.runs[1].run.drive.time[-1])))
+    assert edges_of(study, lasting) == [Edge("start", 0)]
     assert edges_of(study, replace(both, batch=replace(both.batch, family="not_thermal"))) == []
 
 

@@ -7,8 +7,9 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.calibrate.noise import Channels
-from twin.diagnose.batch import Batch, History, best, grown, prepared, score
+from twin.diagnose.batch import Batch, History, best, prepared, score
 from twin.diagnose.diagnosis import Window
+from twin.diagnose.growth import grown
 from twin.diagnose.unknown import MEMORY, SIGMAS, evidence, heat_of, history, with_information
 from twin.diagnose.whiten import Projector, Whitener, measured_of, missing, offsets
 from twin.diagnose.yardstick import ALARM, FLOOR, thresholds_of

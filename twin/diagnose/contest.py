@@ -22,9 +22,10 @@ from twin.diagnose.study import K
 from twin.diagnose.yardstick import Yardstick
 
 BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant")
-PASSES, WINDOW_PASSES = 3, 7
+PASSES, WINDOW_PASSES = 3, 8
 ENTRANTS = 5  # candidates that are refitted
-WET = 80.0  # W/(m^2 K), from which the film of a coolant is refitted at most
+BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
+WET = 30.0  # W/(m^2 K), from which the film of a coolant is refitted at most
 NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
 LOW, HIGH = -0.95, 20.0  # of relative changes
 AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
@@ -42,14 +43,14 @@ def judged(
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Candidates, most worthy first: those whose statistics are exact, and the others.
 
-    Those that are bent or have edges are refitted, until one leads all.
+    Those that are bent or have edges are refitted, until one leads all others by a share of BEHIND.
     """
     waiting = sorted(candidates, key=worth, reverse=True)
     done: list[Hypothesis] = []
     count = 0
     while waiting:
         h = waiting.pop(0)
-        if done and worth(h) < max(worth(d) for d in done):
+        if done and worth(h) < (1.0 - BEHIND) * max(worth(d) for d in done):
             break
         if _bent(yard, h):
             if count >= ENTRANTS:
@@ -79,8 +80,8 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
     before = float(none @ fitted.projector(none))
     inner = edges_of(study, h)
     low, high = bounds(study)
-    if h.batch.kind == "coolant":
-        a = a * min(1.0, WET / max(abs(a[0]), 1e-9))
+    if h.batch.kind == "coolant":  # a strong film saturates; the heat that it takes does not
+        a[0] = min(a[0], WET)
     # a strong cause has bent the calibration: begin near the description
     now = _Point(a, np.clip(fitted.x, -NEAR, NEAR), h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0

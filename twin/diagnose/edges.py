@@ -49,17 +49,24 @@ class Edge:
 
 
 def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
-    """The edges of a hypothesis that lie within a run, those of a bell; none of instants of a reading."""
+    """The edges of a hypothesis that may move, those of a bell; none of instants of a reading.
+
+    What was there before a run and stays, or lasts beyond its end, has no edge there.
+    """
     if h.family == "not_thermal":
         return []
     if h.family == "sun":
         return [Edge("centre"), Edge("length")]
     spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
+    windows = h.when.windows
+    whole = [w.end >= spans[w.run] - 1.0 for w in windows]
     result = []
-    for i, w in enumerate(h.when.windows):
-        if w.start > 0.0:
+    for i, w in enumerate(windows):
+        lasts = whole[i] and (w.start == 0.0 or i + 1 == len(windows) or windows[i + 1].start == 0.0)
+        begun = w.start == 0.0 and (whole[i] or (i > 0 and whole[i - 1]))
+        if not begun:  # what begins with a run may begin some minutes later
             result.append(Edge("start", i))
-        if w.end < spans[w.run] - 1.0:
+        if not lasts:
             result.append(Edge("end", i))
     return result
 

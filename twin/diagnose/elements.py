@@ -193,7 +193,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         own_films = [f for f in range(len(films)) if film_env[f] == e]
         v = vector([own.total[:, own_films] @ M[:, own_films].T for own in nominal])
         blocks("air", environment.name, v)
-        lifted = bench.H[:, own_films] - environment.height * M[:, own_films]
+        lifted = bench.H[:, own_films] - pivot(study, e) * M[:, own_films]
         if np.abs(bench.H[:, own_films]).max(initial=0.0) > 0.0:
             v = vector([own.convection[:, own_films] @ lifted.T for own in nominal])
             column(("gradient", environment.name, "always"), v, always)
@@ -225,6 +225,20 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
             only_here = [pulse if j == i else None for j in range(len(runs))]
             column(("start", f"{runs[i].name}.{m}", "always"), vector([field] * len(runs)), only_here)
     return Elements(histories, tuple(tuple(v) for v in vectors), tuple(columns), index, block_of)
+
+
+def pivot(study: Study, e: int) -> float:
+    """Height [m] at which the air of an environment is as measured: told, or the middle of its films.
+
+    A gradient about another height is an offset as well, which calibration resists.
+    """
+    bench, load = study.bench, study.bench.base.load_model
+    if load.environments[e].height != 0.0 or load.environments[e].gradient != 0.0:
+        return float(load.environments[e].height)
+    (body,) = bench.base.bodies
+    own = [f for f, film in enumerate(load.films) if film.environment == e]
+    area = float((body.one @ np.asarray(bench.system.M)[:, own]).sum())
+    return float((body.one @ bench.H[:, own]).sum() / area) if area > 0.0 else 0.0
 
 
 def own_place(study: Study, source: int) -> int:

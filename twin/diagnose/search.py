@@ -27,6 +27,7 @@ from twin.diagnose.yardstick import Yardstick
 
 WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
 MOST = 3  # causes
+LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 TRIES = 3  # rounds of candidates that the exact model refuses
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
 REFITS = 5  # passes of an exact refit
@@ -73,17 +74,18 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         top = ranked[:10]
         steps.append(Step(tuple(top), _cosines(yard, fitted, top), seen.largest(), parts))
         used = sum((len(a.units) for a in accepted), 0)
-        alarm = any(h.statistic > yard.thresholds[h.family] and (h.family, h.name) not in refused for h in ranked)
+        limits = {name: (LATER if accepted else 1.0) * value for name, value in yard.thresholds.items()}
+        alarm = any(h.statistic > limits[h.family] and (h.family, h.name) not in refused for h in ranked)
         passing = [
             h for h in ranked
-            if alarm and h.statistic > NAMED * yard.thresholds[h.family] and used + h.batch.q <= K
+            if alarm and h.statistic > NAMED * limits[h.family] and used + h.batch.q <= K
             and (h.family, h.name) not in refused and not _again(h, accepted)
         ]  # fmt: skip
         if not passing or len(accepted) >= most or fruitless >= TRIES:
             break
         proved, others = judged(yard, y, fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]])
-        standing = [h for h in proved if h.statistic > NAMED * yard.thresholds[h.family]]
-        if not any(h.statistic > yard.thresholds[h.family] for h in standing):
+        standing = [h for h in proved if h.statistic > NAMED * limits[h.family]]
+        if not any(h.statistic > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
             continue

@@ -12,9 +12,11 @@ from twin.diagnose.acted import RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
+from twin.diagnose.elements import pivot
 from twin.diagnose.fitter import bounds
 from twin.diagnose.search import Search
 from twin.diagnose.sight import sight
+from twin.diagnose.study import Study
 from twin.diagnose.unknown import history
 from twin.diagnose.yardstick import Yardstick
 
@@ -26,7 +28,7 @@ KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "a
 PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
 
 
-def cause_of(a: Accepted) -> Cause:
+def cause_of(a: Accepted, study: Study) -> Cause:
     """A cause as reports and edits take it: factors as factors, differences as differences."""
     h = a.hypothesis
     kind, unit = h.batch.kind, h.batch.unit
@@ -48,6 +50,9 @@ def cause_of(a: Accepted) -> Cause:
     elif h.family == "scale_expansion":
         place, part = place.split("<")
         settings["part"] = part
+    elif kind == "gradient":
+        names = [e.name for e in study.bench.base.load_model.environments]
+        settings["height"] = pivot(study, names.index(place.removeprefix("environment.")))
     elif h.family == "coolant" and len(a.amplitude) > 1 and value > 0:
         settings["temperature_difference"] = float(a.amplitude[1]) / value
     elif h.family == "sun" and len(a.amplitude) > 1:
@@ -108,7 +113,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     thresholds = found.yardstick.thresholds
     left = max(found.steps[-1].parts.values(), default=0.0)
     before = max(found.steps[0].parts.values(), default=0.0)
-    causes = tuple(cause_of(a) for a in found.accepted)
+    causes = tuple(cause_of(a, found.yardstick.study) for a in found.accepted)
     if left > thresholds["unknown"] and (not causes or left > REMAINDER * before):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
