@@ -10,7 +10,7 @@ import pytest
 from tests.diagnose import small_case
 from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.bells import by_blocks, name
+from twin.diagnose.bells import Bell, by_blocks, name
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.edges import PULSE, SHORTEST, Edge, edges_of, moved, with_pulses
 
@@ -61,21 +61,21 @@ def test_the_derivative_by_an_edge_is_that_of_outputs(edge):
     assert np.abs(D[:, 1] * edge.per_second - wanted).max() < 1e-6 * size
 
 
-def sunny(centre: float, length: float) -> Hypothesis:
-    """A bell at the housing in every run."""
+def sunny(*centres: float) -> Hypothesis:
+    """A bell of 2.5 h at the housing in both runs."""
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
-    columns = elements.block_of["heat", "housing"]
-    weights, windows = by_blocks(study, elements.histories.blocks, centre, length)
-    when = History(name(centre, length), weights, windows=windows, bell=(centre, length))
+    columns, bell = elements.block_of["heat", "housing"], Bell(centres, 2.5 * HOUR)
+    weights, windows = by_blocks(study.fitted_runs, elements.histories.blocks, bell)
+    when = History(name(bell, study.fitted_runs), weights, windows=windows, bell=bell)
     batch = Batch("sun", "heat", "W", ("housing",), columns[None], (when,), 1)
     return Hypothesis(batch, 0, when, 0.0, (100.0, 60.0), 1.0)
 
 
-@pytest.mark.parametrize("what", ["centre", "length"])
-def test_the_derivative_by_a_bell_is_that_of_outputs(what):
+@pytest.mark.parametrize("edge", [Edge("centre", 1), Edge("length")])
+def test_the_derivative_by_a_bell_is_that_of_outputs(edge):
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
-    h, edge = sunny(1.5 * HOUR, 2.5 * HOUR), Edge(what)
-    assert edges_of(study, h) == [Edge("centre"), Edge("length")]
+    h = sunny(2.0 * HOUR, 1.5 * HOUR)
+    assert edges_of(study, h) == [Edge("centre", 0), Edge("centre", 1), Edge("length")]
     x, a = np.zeros(len(study.bench.parameters)), np.array([100.0, 60.0])
 
     def at(shift):

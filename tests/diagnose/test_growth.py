@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from twin.diagnose.batch import Batch, History, Hypothesis
+from twin.diagnose.bells import Bell, by_blocks, name
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.growth import GROWTH, SHARE, grown
 
@@ -39,3 +40,27 @@ def test_the_price_rises_with_what_is_explained_already():
     brings = (g[0] + g[3]) ** 2 / 2.0 - g[0] ** 2
     assert GROWTH < brings < SHARE * g[0] ** 2
     assert len(grown(hypothesis(g), g, np.eye(BLOCKS)).when.windows) == 1
+
+
+def test_a_bell_finds_its_hour_in_every_run():
+    """Runs that start at other hours of the day: noon is in the third hour of one and in the sixth of the other."""
+    runs = [("a", 60.0), ("b", 60.0)]
+    blocks = [(r, 60 * b, 60 * (b + 1)) for r in range(2) for b in range(8)]
+    histories = []
+    for hour in range(2, 7):
+        bell = Bell((3600.0 * hour,) * 2, 4 * 3600.0)
+        weights, windows = by_blocks(runs, blocks, bell)
+        histories.append(History(name(bell, runs), weights, windows=windows, bell=bell))
+    batch = Batch("sun", "heat", "W", ("p",), np.arange(16)[None], tuple(histories), 1)
+    truth, _ = by_blocks(runs, blocks, Bell((3 * 3600.0, 6 * 3600.0), 4 * 3600.0))
+    g = np.array([50.0, 30.0]) @ truth
+    start = max(
+        (Hypothesis(batch, 0, h, float((h.weights @ g) @ np.linalg.solve(h.weights @ h.weights.T, h.weights @ g)),
+                    (1.0, 1.0), 1.0) for h in histories),
+        key=lambda h: h.statistic,
+    )  # fmt: skip
+    found = grown(start, g, np.eye(16))
+    assert found.when.bell is not None
+    assert found.when.bell.centres == (3 * 3600.0, 6 * 3600.0)
+    assert found.amplitude == pytest.approx((50.0, 30.0), rel=1e-6)
+    assert found.statistic > 1.2 * start.statistic

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fcntl
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from tests.hidden.load import MODEL
@@ -22,6 +22,7 @@ from twin.diagnose.yardstick import Yardstick
 from twin.machine.load import load_machine
 
 SETTINGS = Settings(temperature_sigma=0.08)  # as the campaign: they share a yardstick
+QUICK = replace(SETTINGS, form=16, nulls=40)  # thresholds from few synthetic measurements: most are the floor anyway
 
 
 @dataclass(frozen=True)
@@ -34,19 +35,19 @@ class Said:
 
 
 @cache
-def yardstick() -> Yardstick:
+def yardstick(settings: Settings = SETTINGS) -> Yardstick:
     """Of the nominal machine on the loads of the trials; minutes on two cores, then in the cache folder."""
     machine = load_machine(MODEL)
     runs, _ = trial("null_0")
     folder().mkdir(parents=True, exist_ok=True)
     with (folder() / "yardstick.lock").open("w") as lock:  # one process makes it, the others wait
         fcntl.flock(lock, fcntl.LOCK_EX)
-        return prepare(None, machine, runs[:2], runs[2:], SETTINGS)[2]
+        return prepare(None, machine, runs[:2], runs[2:], settings)[2]
 
 
-def said(_: None, name: str) -> Said:
+def said(settings: Settings, name: str) -> Said:
     """The diagnosis of a trial."""
-    yard = yardstick()
+    yard = yardstick(settings)
     runs, _expected = trial(name)
     study = yard.study
     usable, stuck = stuck_sensors(runs[:2], study.bench.base.sensors, [p.run.name for p in study.runs[:2]])

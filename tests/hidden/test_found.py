@@ -4,22 +4,30 @@ from __future__ import annotations
 
 import pytest
 
-from tests.hidden.found import Said, said, yardstick
+from tests.hidden.found import QUICK, SETTINGS, Said, said, yardstick
 from tests.hidden.trials import TRIALS, trial
 from twin.build.workers import each
 from twin.diagnose.verdict import limits_of
 
-pytestmark = pytest.mark.slow  # the five-axis yardstick alone takes longer than all fast tests: `make hidden`
-
-# Trials that are left out; none: `make hidden` shows what the search does not say as it should.
+# Not said as it should be, or not within minutes; `make hidden` shows them.
 MISSED: tuple[str, ...] = ()
-NAMES = [name for name in TRIALS if name != "coarse_model" and name not in MISSED]
+NAMES = [name for name in TRIALS if name != "coarse_model"]
+PARAMETERS = [pytest.param(name, marks=[pytest.mark.slow] if name in MISSED else []) for name in NAMES]
 
 
 @pytest.fixture(scope="session")
-def everything() -> dict[str, Said]:
-    yardstick()
-    return dict(zip(NAMES, each(said, None, NAMES, long=0.0), strict=True))
+def settings(request):
+    """Fewer synthetic measurements where only the fast tests are asked for."""
+    return QUICK if request.config.getoption("markexpr") == "not slow" else SETTINGS
+
+
+@pytest.fixture(scope="session")
+def everything(request, settings) -> dict[str, Said]:
+    """All trials that were asked for, two at a time."""
+    asked = {item.callspec.params["name"] for item in request.session.items if "everything" in item.fixturenames}
+    names = [name for name in NAMES if name in asked]
+    yardstick(settings)
+    return dict(zip(names, each(said, settings, names, long=0.0), strict=True))
 
 
 def _same(place: str, wanted: str) -> bool:
@@ -28,7 +36,7 @@ def _same(place: str, wanted: str) -> bool:
     return place == wanted or place.split(".")[0] == own not in ("films", "contacts", "sources", "tcp", "sensors")
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", PARAMETERS)
 def test_what_was_hidden_is_said(everything, name):
     _, expected = trial(name)
     answer = everything[name]
@@ -44,9 +52,9 @@ def test_what_was_hidden_is_said(everything, name):
         ), named
 
 
-def test_what_is_too_small_is_below_its_limit():
+def test_what_is_too_small_is_below_its_limit(settings):
     """0.7 W is not named, and the report says that 0.7 W would not have been."""
     _, expected = trial("below_limit")
-    limits = [limit for limit in limits_of(yardstick()) if limit.family == expected.family]
+    limits = [limit for limit in limits_of(yardstick(settings)) if limit.family == expected.family]
     assert limits
     assert all(limit.smallest > expected.size for limit in limits)

@@ -72,16 +72,18 @@ def _shapes(study: Study, elements: Elements, h: Hypothesis, row: np.ndarray) ->
         n = run.drive.n_steps
         if when.windows:
             shape, t = np.zeros(n), np.asarray(run.drive.time)
-            if h.family == "sun":  # an amplitude per run, the mean of them in others
-                day = bells.level((t[:-1] + t[1:]) / 2 - t[0], *when.bell)
-                own = {study.fitted[i] for b, (i, _, _) in enumerate(blocks) if row[b]}
-                shape = day if k in own else day / len(study.fitted) if k not in study.fitted else shape
+            if when.bell is not None:  # an amplitude per run, the mean of them in others
+                middle, (own,) = (t[:-1] + t[1:]) / 2 - t[0], {i for b, (i, _, _) in enumerate(blocks) if row[b]}
+                if k == study.fitted[own]:
+                    shape = when.bell.level(middle, own)
+                elif k not in study.fitted:
+                    shape = bells.level(middle, when.bell.middle, when.bell.length) / len(study.fitted)
             else:
                 for w in when.windows:
                     if w.run == run.name:
                         within = np.clip(np.minimum(t[1:], w.end) - np.maximum(t[:-1], w.start), 0.0, None)
                         shape += w.level * within / (t[1] - t[0])
-            if h.family != "sun" and k not in study.fitted and _lasts(study, when.windows):
+            if when.bell is None and k not in study.fitted and _lasts(study, when.windows):
                 shape[:] = 1.0
         elif when.signal:
             values = run.signals.get(when.signal)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.diagnose.bells import Bell
 from twin.diagnose.diagnosis import Window
 
 RIDGE = 1e-9
@@ -30,7 +31,7 @@ class History:
     exponent: float = 1.0
     reference: float = 1.0  # value of the signal [SI] at which the amplitude holds
     windows: tuple[Window, ...] = ()
-    bell: tuple[float, float] = (0.0, 0.0)  # s: centre and length of the sun's course, see `bells`
+    bell: Bell | None = None  # of the sun
 
 
 @dataclass(frozen=True)

@@ -76,6 +76,8 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
     a = np.array(h.amplitude)
     if relative:
         a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, LOW, HIGH)  # as if temperatures were linear in t
+    if h.when.bell is not None:
+        h = moved(study, yard.elements, h, ())  # hours found by `growth` get their windows
     none = yard.whiten(fitted.residual)
     before = float(none @ fitted.projector(none))
     inner = edges_of(study, h)

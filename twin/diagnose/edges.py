@@ -55,8 +55,8 @@ def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
     """
     if h.family == "not_thermal":
         return []
-    if h.family == "sun":
-        return [Edge("centre"), Edge("length")]
+    if h.when.bell is not None:
+        return [*(Edge("centre", i) for i in range(len(h.when.bell.centres))), Edge("length")]
     spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
     windows = h.when.windows
     whole = [w.end >= spans[w.run] - 1.0 for w in windows]
@@ -73,13 +73,13 @@ def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
 
 def moved(study: Study, elements: Elements, h: Hypothesis, shifts: Sequence[tuple[Edge, float]]) -> Hypothesis:
     """The hypothesis with edges shifted [s]."""
-    if h.family == "sun":
-        by = {edge.what: shift for edge, shift in shifts}
-        centre = h.when.bell[0] + by.get("centre", 0.0)
-        length = max(h.when.bell[1] + by.get("length", 0.0), BRIEF)
-        weights, windows = bells.by_blocks(study, elements.histories.blocks, centre, length)
-        named = bells.name(centre, length)
-        return replace(h, when=replace(h.when, name=named, weights=weights, windows=windows, bell=(centre, length)))
+    if (bell := h.when.bell) is not None:
+        by = dict(shifts)
+        centres = tuple(c + by.get(Edge("centre", i), 0.0) for i, c in enumerate(bell.centres))
+        bell = bells.Bell(centres, max(bell.length + by.get(Edge("length"), 0.0), BRIEF))
+        weights, windows = bells.by_blocks(study.fitted_runs, elements.histories.blocks, bell)
+        named = bells.name(bell, study.fitted_runs)
+        return replace(h, when=replace(h.when, name=named, weights=weights, windows=windows, bell=bell))
     ends = list(h.when.windows)
     spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
     for edge, shift in shifts:
@@ -131,13 +131,12 @@ def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarr
 
     The exponent of a logged signal, the length of a bell. Empty for windows, whose edges are fitted.
     """
-    if h.family == "sun":
-        centre, length = h.when.bell
+    if (bell := h.when.bell) is not None:
         changes = []
-        for planned in study.runs:
-            t = np.asarray(planned.run.drive.time)
-            middle = (t[:-1] + t[1:]) / 2
-            changes.append(bells.level(middle, centre, length + LONGER) - bells.level(middle, centre, length))
+        for k in range(len(study.runs)):
+            t = np.asarray(study.runs[k].run.drive.time)
+            middle, centre = (t[:-1] + t[1:]) / 2, bell.centres[study.fitted.index(k)] if k in study.fitted else 0.0
+            changes.append(bells.level(middle, centre, bell.length + LONGER) - bells.level(middle, centre, bell.length))
         return [
             replace(u, shapes=tuple(v * c * s.any() for c, s in zip(changes, u.shapes, strict=True)))
             for u, v in zip(units, a, strict=True)
@@ -155,11 +154,15 @@ def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray | None
     """(n_fine,) the change of a shape in run k while an edge moves by PULSE; None in other runs."""
     run = study.runs[k].run
     t = np.asarray(run.drive.time)
-    if h.family == "sun":
-        (centre, length), middle, by = h.when.bell, (t[:-1] + t[1:]) / 2, PULSE / 2
+    if (bell := h.when.bell) is not None:
+        i, middle, by = study.fitted.index(k), (t[:-1] + t[1:]) / 2, PULSE / 2
         if edge.what == "centre":
-            return bells.level(middle, centre + by, length) - bells.level(middle, centre - by, length)
-        return bells.level(middle, centre, length + by) - bells.level(middle, centre, length - by)
+            if edge.window != i:
+                return None
+            later, sooner = (bells.level(middle, bell.centres[i] + d, bell.length) for d in (by, -by))
+            return later - sooner
+        longer, shorter = (bells.level(middle, bell.centres[i], bell.length + d) for d in (by, -by))
+        return longer - shorter
     w = h.when.windows[edge.window]
     if w.run != run.name:
         return None

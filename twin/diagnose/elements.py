@@ -249,9 +249,10 @@ def own_place(study: Study, source: int) -> int:
 
 
 def heated_places(study: Study) -> list[int]:
-    """The places of all sources but those of contacts."""
-    sources = study.bench.base.load_model.sources
-    return sorted({own_place(study, j) for j, source in enumerate(sources) if not source.contact})
+    """The faces that sources enter at, but contacts; none of lumped machines, whose nodes have no faces."""
+    sources, places = study.bench.base.load_model.sources, study.bench.places
+    own = {own_place(study, j) for j, source in enumerate(sources) if not source.contact}
+    return sorted(p for p in own if places[p].surfaces)
 
 
 def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:

@@ -1,6 +1,9 @@
-"""Further windows for a cause that comes and goes: where the data ask for them, one after the other."""
+"""Further windows for a cause that comes and goes, where the data ask for them, one after the other; other hours of a
+bell in every run."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +19,8 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
 
     block (L, L): D^T Pi D among the columns of its place. Greedy: the window that brings most, then again.
     """
+    if h.when.bell is not None:
+        return _elsewhere(h, g, block)
     if len(h.when.windows) == 0 or h.batch.fixed or h.family in ("not_thermal", "sun", "joint"):
         return h
     own = g[h.batch.columns[h.place]]
@@ -46,4 +51,27 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
         when = History(f"from {name}", union[k], windows=windows)
         information = float(1.0 / max(inverse[k, 0, 0], 1e-30))
         current = Hypothesis(h.batch, h.place, when, float(statistic[k]), tuple(map(float, a[k])), information)
+    return current
+
+
+def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
+    """A bell with its best hour in every run: runs may start at other hours of the day. Greedy, run by run."""
+    own, current = g[h.batch.columns[h.place]], h
+    for i in range(2 * h.batch.q):
+        run, bell = i % h.batch.q, current.when.bell
+        assert bell is not None
+        for other in h.batch.histories:
+            if other.bell is None or other.bell.length != bell.length:
+                continue
+            weights = current.when.weights.copy()
+            weights[run] = other.weights[run]
+            F = weights @ block @ weights.T
+            a = np.linalg.solve(F + (np.trace(F) * RIDGE + 1e-12) * np.eye(len(F)), weights @ own)
+            statistic = float(a @ weights @ own)
+            if statistic > current.statistic + GROWTH and a[0] >= h.batch.smallest:
+                centres = tuple(other.bell.centres[run] if r == run else c for r, c in enumerate(bell.centres))
+                when = replace(current.when, weights=weights, bell=replace(bell, centres=centres))
+                current = replace(current, when=when, statistic=statistic, amplitude=tuple(map(float, a)))
+                bell = when.bell
+                assert bell is not None
     return current

@@ -209,14 +209,13 @@ def sun(context: Context) -> list[Batch]:
     for i, start, end in blocks:
         time = study.runs[study.fitted[i]].run.drive.time
         longest = max(longest, (start + end) / 2 * (time[1] - time[0]))
-    histories = []
+    runs, histories = study.fitted_runs, []
     for length in BELLS:
         for centre in np.arange(length / 2, longest + HOUR, HOUR):
-            weights, windows = bells.by_blocks(study, blocks, centre, length)
+            bell = bells.Bell((float(centre),) * len(runs), length)
+            weights, windows = bells.by_blocks(runs, blocks, bell)
             if (np.abs(weights).sum(axis=1) > 0).all():
-                histories.append(
-                    History(bells.name(centre, length), weights, windows=windows, bell=(float(centre), length))
-                )
+                histories.append(History(bells.name(bell, runs), weights, windows=windows, bell=bell))
     rows = [(p.name, list(context.elements.block_of["heat", p.name])) for p in context.outer]
     return [_batch(context, "sun", "heat", "W", rows, histories, 1, 2.0)] if histories and rows else []
 

@@ -59,6 +59,12 @@ class Study:
         """(n,) prior standard deviations in units of u."""
         return np.array([p.sigma for p in self.bench.parameters])
 
+    @property
+    def fitted_runs(self) -> list[tuple[str, float]]:
+        """Name and fine step [s] of each fitted run."""
+        runs = [self.runs[k].run for k in self.fitted]
+        return [(run.name, float(run.drive.time[1] - run.drive.time[0])) for run in runs]
+
     def slots(self, k: int) -> Slots:
         """Empty slots for run k, to be filled."""
         run = self.runs[k].run
