@@ -25,9 +25,10 @@ BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant")
 PASSES, WINDOW_PASSES = 3, 8
 ENTRANTS = 5  # candidates that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
+GONE = -0.7  # of a relative change, as a straight line
 WET = 30.0  # W/(m^2 K), from which the film of a coolant is refitted at most
 NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
-LOW, HIGH = -0.95, 20.0  # of relative changes
+LOW, HIGH = -0.99, 20.0  # of relative changes
 AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
 
 
@@ -47,19 +48,23 @@ def judged(
     """
     waiting = sorted(candidates, key=worth, reverse=True)
     done: list[Hypothesis] = []
+    left: list[Hypothesis] = []
     count = 0
-    while waiting:
-        h = waiting.pop(0)
-        if done and worth(h) < (1.0 - BEHIND) * max(worth(d) for d in done):
-            break
-        if _bent(yard, h):
-            if count >= ENTRANTS:
-                continue
-            count += 1
-            h = exact(yard, y, fitted, h)
-        done.append(h)
-    straight = [h for h in waiting if not _bent(yard, h)]
-    return sorted([*done, *straight], key=worth, reverse=True), [h for h in waiting if _bent(yard, h)]
+    for h in waiting:
+        led = bool(done) and worth(h) < (1.0 - BEHIND) * max(worth(d) for d in done)
+        bent = _bent(yard, h)
+        if (led and not _saturated(h)) or (bent and count >= ENTRANTS):
+            left.append(h)
+            continue
+        count += bent
+        done.append(exact(yard, y, fitted, h) if bent else h)
+    straight = [h for h in left if not _bent(yard, h)]
+    return sorted([*done, *straight], key=worth, reverse=True), [h for h in left if _bent(yard, h)]
+
+
+def _saturated(h: Hypothesis) -> bool:
+    """A conductance that is nearly gone: it moves temperatures by far more than its score says."""
+    return h.batch.kind in CONDUCTS and h.amplitude[0] < GONE
 
 
 def _bent(yard: Yardstick, h: Hypothesis) -> bool:

@@ -22,7 +22,7 @@ from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
 from twin.diagnose.search import Search, search
 from twin.diagnose.study import Study, make_study
-from twin.diagnose.verdict import limits_of, pulls_of, rival_of, unknown_of, verdict_of
+from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of
 from twin.diagnose.whiten import measured_of
 from twin.diagnose.yardstick import FORM, NULLS, Yardstick, instruments_of, make_yardstick
 from twin.errors import ArtefactError, LogError
@@ -154,12 +154,13 @@ def diagnose(
     coarse = _coarse(artefact, study, settings)
     if coarse is not None:
         causes, verdict = (coarse, *causes), "named"
+    notes += [f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED]
     if faults:
         causes = (*faults, *causes)
         verdict = "sensor" if verdict == "nothing" else verdict
     groups = {f.name: f.group for f in settings.families}
     extension = (
-        tuple(c for c in causes if groups.get(c.family) == "machine")
+        tuple(c for c in causes if groups.get(c.family) == "machine" and c.history != CALIBRATED)
         if verdict in ("named", "out_of_tolerance", "ambiguous", "signal")
         else ()
     )

@@ -30,6 +30,7 @@ MOST = 3  # causes
 LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 TRIES = 3  # rounds of candidates that the exact model refuses
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
+SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
 REFITS = 5  # passes of an exact refit
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
 NAMED = 0.7  # share of its own threshold that a name needs where another one passes
@@ -92,7 +93,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         # heat of any history pays for its freedom: a name that explains less than that has imitated it
         free = max(parts.values(), default=0.0)
         if free > yard.thresholds["unknown"]:
-            standing = [h for h in standing if h.statistic > COVERS * free]
+            standing = [h for h in standing if h.statistic > COVERS * free or h.family in SEVERAL]
             if not standing:
                 break
         chosen = standing[0]

@@ -25,6 +25,9 @@ CLOSE = 6.0  # within which a rival of another family, or another part, makes a 
 POWER = 1.645  # one-sided 95 %
 REMAINDER = 0.35  # of the evidence for unknown heat that a name must explain to stand
 KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
+STRAINED = 2.5  # prior standard deviations, beyond which a declared parameter is out of its tolerance
+STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint": "joint", "expansion": "expansion"}
+CALIBRATED = "calibration"  # history of a cause that calibration absorbs: it is no extension of the model
 PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
 
 
@@ -118,7 +121,8 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
     if not causes:
-        return "nothing", ()
+        strained = strained_of(found)
+        return ("out_of_tolerance", strained) if strained else ("nothing", ())
     lead, chosen = causes[0], found.accepted[0]
     group = groups.get(lead.family, "machine")
     for other, cosine in chosen.rivals:
@@ -134,6 +138,24 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     declared = lead.family in PLAIN and not lead.windows and not lead.signal
     whole = lead.place.split(".")[0] in ("films", "contacts", "sources", "materials")
     return ("out_of_tolerance" if declared and whole else "named"), causes
+
+
+def strained_of(found: Search) -> tuple[Cause, ...]:
+    """Declared parameters that calibration alone moved beyond STRAINED prior standard deviations."""
+    study = found.yardstick.study
+    sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    result = []
+    for p, pull, spread in zip(study.bench.parameters, found.x0, sigma, strict=True):
+        family = STRAIN.get(p.kind)
+        if family is None or abs(pull) < STRAINED or p.scale == "linear":
+            continue
+        gain, low, high = (float(np.exp(p.sigma * (pull + z * spread))) for z in (0.0, -1.96, 1.96))
+        place = p.path.removesuffix(".gain").removesuffix(".conductance")
+        result.append(Cause(
+            family=family, place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
+            statistic=float(pull) ** 2, threshold=STRAINED**2, history=CALIBRATED,
+        ))  # fmt: skip
+    return tuple(sorted(result, key=lambda c: -c.statistic))
 
 
 def unknown_of(found: Search) -> Unknown | None:
