@@ -34,8 +34,8 @@ SETTINGS = Settings(temperature_sigma=NOISE)
 NULLS, EACH = 200, 10
 SIZES = (1.0, 0.5, 2.0)
 MORE = (("outside", 20), ("null_law", 10), ("pair", 10), ("two", 10), ("effect_and_sensor", 10))
-FAST = 2  # rounds that all nulls are in
-FIRST = 2000  # seed of the first trial: none that anything was tuned on
+FAST = 5  # rounds that all nulls are in
+FIRST = 3000  # seed of the first trial: none that anything was tuned on
 
 Item = tuple[str, float, int]
 

@@ -24,7 +24,7 @@ from twin.machine.load import load_machine
 SETTINGS = Settings(temperature_sigma=0.08)  # as the campaign: they share a yardstick
 QUICK = replace(SETTINGS, form=16, nulls=40)  # thresholds from few synthetic measurements: most are the floor anyway
 
-OWN_LOADS = ("signal_peak", "clock")  # their loads are logged otherwise: they need a yardstick of their own
+OWN = ("signal_peak", "clock", "sensor_stuck")  # other logs, other gaps: they need a yardstick of their own
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def yardstick(settings: Settings = SETTINGS) -> Yardstick:
 def said(settings: Settings, name: str) -> Said:
     """The diagnosis of a trial."""
     runs, _expected = trial(name)
-    if name in OWN_LOADS:
+    if name in OWN:
         yard = prepare(None, load_machine(MODEL), runs[:2], runs[2:], settings)[2]
     else:
         yard = yardstick(settings)

@@ -203,7 +203,8 @@ _MACHINE = (
     )),
     _in_machine("sun", 106, _cause("sun", "column.left", 80.0, "W", windows=SUN)),
     _in_machine("film_gain", 107, _cause("film_gain", "films.headstock", 3.0, "1")),
-    _in_machine("loss_law", 108, _cause("loss_law", "sources.x_motor", 2.2, "1")),
+    _in_machine("loss_law", 108, _cause("loss_law", "sources.x_motor", 2.2, "1"),
+                verdicts=("named", "out_of_tolerance")),
     # a bearing of X or Z gives some 2 W in the mean, too little to be missed: a motor's heat is elsewhere
     _in_machine("misplaced_source", 109, _cause(
         "misplaced_source", "sources.z_motor", math.nan, "", settings={"surface": "bed.stem_left"}
