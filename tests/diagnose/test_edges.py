@@ -50,10 +50,10 @@ def test_the_derivative_by_an_edge_is_that_of_outputs(edge):
     x, a = np.zeros(len(study.bench.parameters)), np.array([100.0])
 
     def at(shift):
-        units = units_of(study, elements, elements.index, moved(study, elements, h, [(edge, shift)]))
+        units = units_of(study, moved(study, elements, h, [(edge, shift)]))
         return study.outputs(0, x, with_pulses(study, elements, h, units, a, [], 0), a)
 
-    units = units_of(study, elements, elements.index, h)
+    units = units_of(study, h)
     _, D = study.by_amplitudes(0, x, with_pulses(study, elements, h, units, a, [edge], 0), [*a, 0.0])
     wanted = (at(PULSE / 2) - at(-PULSE / 2)) / PULSE
     size = np.abs(wanted).max()
@@ -79,10 +79,10 @@ def test_the_derivative_by_a_bell_is_that_of_outputs(edge):
     x, a = np.zeros(len(study.bench.parameters)), np.array([100.0, 60.0])
 
     def at(shift):
-        units = units_of(study, elements, elements.index, moved(study, elements, h, [(edge, shift)]))
+        units = units_of(study, moved(study, elements, h, [(edge, shift)]))
         return study.outputs(1, x, with_pulses(study, elements, h, units, a, [], 1), a)
 
-    units = units_of(study, elements, elements.index, h)
+    units = units_of(study, h)
     _, D = study.by_amplitudes(1, x, with_pulses(study, elements, h, units, a, [edge], 1), [*a, 0.0])
     wanted = (at(PULSE / 2) - at(-PULSE / 2)) / PULSE
     assert np.abs(wanted).max() > 1e-5  # K per s

@@ -35,9 +35,7 @@ class Unit:
     shapes: tuple[np.ndarray, ...]  # per run of the study (n_fine,): history of unit amplitude
 
 
-def units_of(
-    study: Study, elements: Elements, index: dict[tuple[str, str, str], int], h: Hypothesis
-) -> tuple[Unit, ...]:
+def units_of(study: Study, h: Hypothesis) -> tuple[Unit, ...]:
     """The amplitudes of a hypothesis in every run of the study, the sealed one included; none for readings.
 
     Histories of logged signals and the sun go on in the sealed run; windows are there only where the hypothesis lasts.
@@ -52,20 +50,21 @@ def units_of(
     if kind == "coolant":
         half = weights.shape[1] // 2
         return (
-            Unit("film", place, int(columns[0]), _shapes(study, elements, h, weights[0][:half])),
-            Unit("heat", place, int(columns[half]), _shapes(study, elements, h, weights[1][half:])),
+            Unit("film", place, int(columns[0]), _shapes(study, h, 0)),
+            Unit("heat", place, int(columns[half]), _shapes(study, h, 1)),
         )
     if kind in ("moved", "start", "signal", "source", "gradient"):
         place = h.name
     units = []
-    for row in weights:
+    for which, row in enumerate(weights):
         lead = int(columns[np.flatnonzero(row)[0]]) if row.any() else int(columns[0])
-        units.append(Unit(kind, place, lead, _shapes(study, elements, h, row)))
+        units.append(Unit(kind, place, lead, _shapes(study, h, which)))
     return tuple(units)
 
 
-def _shapes(study: Study, elements: Elements, h: Hypothesis, row: np.ndarray) -> tuple[np.ndarray, ...]:
-    when, blocks = h.when, elements.histories.blocks
+def _shapes(study: Study, h: Hypothesis, which: int) -> tuple[np.ndarray, ...]:
+    """Of the amplitude `which`."""
+    when = h.when
     result = []
     for k, planned in enumerate(study.runs):
         run = planned.run
@@ -73,9 +72,9 @@ def _shapes(study: Study, elements: Elements, h: Hypothesis, row: np.ndarray) ->
         if when.windows:
             shape, t = np.zeros(n), np.asarray(run.drive.time)
             if when.bell is not None:  # an amplitude per run, the mean of them in others
-                middle, (own,) = (t[:-1] + t[1:]) / 2 - t[0], {i for b, (i, _, _) in enumerate(blocks) if row[b]}
-                if k == study.fitted[own]:
-                    shape = when.bell.level(middle, own)
+                middle = (t[:-1] + t[1:]) / 2 - t[0]
+                if k == study.fitted[which]:
+                    shape = when.bell.level(middle, which)
                 elif k not in study.fitted:
                     shape = bells.level(middle, when.bell.middle, when.bell.length) / len(study.fitted)
             else:

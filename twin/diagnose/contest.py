@@ -140,7 +140,7 @@ class _Step:
 def _outputs(yard: Yardstick, p: _Point, edges: Sequence[Edge]) -> tuple[np.ndarray, np.ndarray]:
     """Outputs (m,) of all fitted runs and their derivatives (m, q + edges) by amplitudes and pulses at edges."""
     study, n = yard.study, len(p.a) + len(edges)
-    units = units_of(study, yard.elements, yard.index, p.h)
+    units = units_of(study, p.h)
     outputs, derivatives = [], []
     for k in study.fitted:
         if any(u.shapes[k].any() for u in units):

@@ -99,7 +99,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         chosen = standing[0]
         rivals = _rivals(yard, fitted, chosen, [*standing, *others, *ranked])
         start = np.array(chosen.amplitude)
-        units = units_of(yard.study, yard.elements, yard.index, chosen)
+        units = units_of(yard.study, chosen)
         accepted.append(
             Accepted(chosen, units, start, np.eye(len(start)), chosen.statistic, yard.thresholds[chosen.family], rivals)
         )

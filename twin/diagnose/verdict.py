@@ -27,7 +27,7 @@ REMAINDER = 0.35  # of the evidence for unknown heat that a name must explain to
 KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
 STRAINED = 2.5  # prior standard deviations, beyond which a declared parameter is out of its tolerance
 STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint": "joint", "expansion": "expansion"}
-CALIBRATED = "calibration"  # history of a cause that calibration absorbs: it is no extension of the model
+CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
 PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
 
 
