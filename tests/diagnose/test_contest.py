@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tests.diagnose import small_case
 from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.contest import AMPLITUDE, HIGH, LOW, _moved, worth
+from twin.diagnose.contest import AMPLITUDE, EDGE, HIGH, LOW, _moved, proof, worth
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.growth import GROWTH
 
@@ -26,6 +29,22 @@ def test_freedom_has_its_price():
     assert worth(hypothesis(windows=1)) == 100.0
     assert worth(hypothesis(windows=3)) == 100.0 - 2.0 * GROWTH
     assert worth(hypothesis(q=2)) == 100.0 - AMPLITUDE
+
+
+def test_fitted_edges_and_further_windows_are_no_proof():
+    yard = small_case.yardstick()
+    name = yard.study.runs[0].run.name
+
+    def windows(*hours: float) -> Hypothesis:
+        h = hypothesis()
+        own = tuple(Window(name, 3600.0 * hour, 3600.0 * hour + 1800.0) for hour in hours)
+        return replace(h, when=replace(h.when, windows=own))
+
+    assert proof(yard, hypothesis()) == 100.0
+    assert proof(yard, windows(1.0)) == 100.0 - 2 * EDGE
+    assert proof(yard, windows(1.0, 2.0)) == 100.0 - 2 * EDGE - GROWTH
+    reading = replace(windows(1.0), batch=replace(hypothesis().batch, kind="step"))
+    assert proof(yard, reading) == 100.0
 
 
 @pytest.mark.parametrize("step", [-1e6, -1.0, -0.01, 0.0, 0.01, 1.0, 1e6])

@@ -25,6 +25,7 @@ BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant")
 PASSES, WINDOW_PASSES = 3, 8
 ENTRANTS = 5  # candidates that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
+EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
 GONE = -0.7  # of a relative change, as a straight line
 WET = 30.0  # W/(m^2 K), from which the film of a coolant is refitted at most
 NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
@@ -37,6 +38,14 @@ def worth(h: Hypothesis) -> float:
     tried = len(h.batch.places) * len(h.batch.histories)
     more = max(len(h.when.windows) - 1, 0) if h.family not in ("sun", "joint") else 0
     return h.statistic - 2.0 * float(np.log(tried)) - AMPLITUDE * (h.batch.q - 1) - GROWTH * more
+
+
+def proof(yard: Yardstick, h: Hypothesis) -> float:
+    """A refitted statistic as thresholds count it: they know neither edges that are fitted nor further windows."""
+    if h.batch.kind in READINGS:
+        return h.statistic
+    more = max(len(h.when.windows) - 1, 0) if h.when.bell is None and h.family != "joint" else 0
+    return h.statistic - EDGE * len(edges_of(yard.study, h)) - (GROWTH - 2.0 * EDGE) * more
 
 
 def judged(

@@ -14,7 +14,7 @@ import numpy as np
 from twin.diagnose.accepted import Accepted, gains_of, readings_columns, shifted
 from twin.diagnose.acted import RELATIVE, slots_with, units_of
 from twin.diagnose.batch import Hypothesis, best
-from twin.diagnose.contest import judged
+from twin.diagnose.contest import judged, proof
 from twin.diagnose.edges import shape_errors
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.formal import of_channels
@@ -85,8 +85,8 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         if not passing or len(accepted) >= most or fruitless >= TRIES:
             break
         proved, others = judged(yard, y, fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]])
-        standing = [h for h in proved if h.statistic > NAMED * limits[h.family]]
-        if not any(h.statistic > limits[h.family] for h in standing):
+        standing = [h for h in proved if proof(yard, h) > NAMED * limits[h.family]]
+        if not any(proof(yard, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
             continue
