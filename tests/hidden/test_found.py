@@ -9,10 +9,11 @@ from tests.hidden.trials import TRIALS, trial
 from twin.build.workers import each
 from twin.diagnose.verdict import limits_of
 
-# Not said as it should be: `make hidden` shows it, with those that take minutes for a yardstick of their own.
+LONG = ("pair", *OWN)  # minutes long, or for minutes at a yardstick of their own
+# Not said as it should be: `make hidden` shows it, with the long ones.
 MISSED = ("coolant", "film_gain", "joint", "capacity", "outside", "initial_state", "slip")
 NAMES = [name for name in TRIALS if name != "coarse_model"]
-PARAMETERS = [pytest.param(name, marks=[pytest.mark.slow] if name in (*MISSED, *OWN) else []) for name in NAMES]
+PARAMETERS = [pytest.param(name, marks=[pytest.mark.slow] if name in (*MISSED, *LONG) else []) for name in NAMES]
 
 
 @pytest.fixture(scope="session")
