@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.campaign_match import place_of
 from benchmarks.campaign_table import write_tables
 from benchmarks.five_axis import FOLDER, machine
 from benchmarks.hidden_draw import Trial, draw
+from benchmarks.hidden_parts import Hidden
 from twin.build.workers import each
 from twin.calibrate.measured import Measured, measured
 from twin.diagnose.catalogue import FAMILIES
@@ -23,7 +25,7 @@ from twin.diagnose.gain import predicted
 from twin.diagnose.search import Search, search
 from twin.diagnose.settled import settled
 from twin.diagnose.study import with_measured
-from twin.diagnose.verdict import limits_of, unknown_of, verdict_of
+from twin.diagnose.verdict import limits_at, limits_of, unknown_of, verdict_of
 from twin.diagnose.whiten import measured_of
 from twin.diagnose.yardstick import Yardstick
 from twin.progress import bar
@@ -34,8 +36,8 @@ SETTINGS = Settings(temperature_sigma=NOISE)
 NULLS, EACH = 200, 10
 SIZES = (1.0, 0.5, 2.0)
 MORE = (("outside", 20), ("null_law", 10), ("pair", 10), ("two", 10), ("effect_and_sensor", 10))
-FAST = 5  # rounds that all nulls are in
-FIRST = 3000  # seed of the first trial: none that anything was tuned on
+FAST = 2  # rounds that all nulls are in
+FIRST = 4000  # seed of the first trial: none that anything was tuned on
 
 Item = tuple[str, float, int]
 
@@ -62,17 +64,33 @@ def yardstick() -> Yardstick:
     return prepare(nothing, machine(), trial.runs[:2], trial.runs[2:], SETTINGS)[2]
 
 
-def judged(yard: Yardstick, trial: Trial, clean: float) -> dict[str, Any]:
+@cache
+def limits() -> dict[tuple[str, str, str, bool], float]:
+    """What a diagnosis of these runs states as its limits, place by place."""
+    return limits_at(yardstick())
+
+
+def limit(hidden: Hidden) -> float | None:
+    """At the place of a hidden thing, in its unit; None where diagnoses have none."""
+    unit = "K/day" if hidden.unit == "K/s" else hidden.unit
+    place = place_of(asdict(hidden))
+    at = [limits().get((hidden.family, unit, place, w)) for w in (bool(hidden.windows), False)]
+    return next((size for size in at if size is not None), None)
+
+
+def judged(yard: Yardstick, trial: Trial, bare: Trial) -> dict[str, Any]:
     """One trial: what was hidden, what was said, and what it was worth on the sealed run.
 
-    clean: held-out variance of the same machine without what is hidden, see `variance_without`.
+    bare: the same machine, air and noise without what is hidden.
     """
     began = time.perf_counter()
     plans = plans_of(yard, trial)
-    found = search(yard, measured_of(with_measured(yard.study, plans)))
+    y = measured_of(with_measured(yard.study, plans))
+    found = search(yard, y)
     verdict, causes = verdict_of(found, FAMILIES)
     unknown = unknown_of(found) if verdict == "unknown" else None
     seconds = time.perf_counter() - began
+    without = measured_of(with_measured(yard.study, plans_of(yard, bare)))
     return {
         "family": trial.family,
         "factor": trial.factor,
@@ -88,7 +106,9 @@ def judged(yard: Yardstick, trial: Trial, clean: float) -> dict[str, Any]:
         "unknown": None if unknown is None else [unknown.part, unknown.surface, unknown.statistic],
         "evidence": max(found.steps[0].parts.values()),
         "observed": found.steps[0].observed,
-        "variance": [*variance(found, plans[2].temperature, plans[2].tcp), clean],
+        "limits": [limit(h) for h in trial.truth],
+        "present": float(np.nansum((yard.whiten(y) - yard.whiten(without)) ** 2)),
+        "variance": [*variance(found, plans[2].temperature, plans[2].tcp), variance_without(yard, bare)],
         "seconds": seconds,
     }  # fmt: skip
 
@@ -132,7 +152,7 @@ def _one(deadline: float, item: Item) -> None:
     try:
         yard, trial = yardstick(), draw(family, factor, seed)
         bare = draw(family, factor, seed, hidden=False) if trial.truth else trial
-        result = judged(yard, trial, variance_without(yard, bare))
+        result = judged(yard, trial, bare)
     except Exception as e:  # a trial that fails is a result, too
         result = {"family": family, "factor": factor, "seed": seed, "error": f"{type(e).__name__}: {e}"}
     OUT.mkdir(parents=True, exist_ok=True)

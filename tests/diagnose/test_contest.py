@@ -9,7 +9,20 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.contest import AMPLITUDE, EDGE, HIGH, LOW, _moved, proof, worth
+from twin.diagnose.contest import (
+    AMPLITUDE,
+    EDGE,
+    HIGH,
+    LOW,
+    WET,
+    _moved,
+    beginning,
+    lowest,
+    priors,
+    proof,
+    solved,
+    worth,
+)
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.growth import GROWTH
 
@@ -63,3 +76,32 @@ def test_a_small_step_of_a_conductance_is_taken_as_it_is():
 def test_a_signed_amplitude_never_goes_through_zero():
     (after,) = _moved(np.array([4.0]), np.array([-100.0]), False, 1)
     assert after == pytest.approx(0.8)
+
+
+def test_amplitudes_that_would_be_too_low_are_held_and_the_others_make_the_best_of_it():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        V = rng.standard_normal((6, 4))
+        F, known = V.T @ V, 3.0 * rng.standard_normal(4)
+        floor = np.array([-np.inf, 0.2, -np.inf, 0.0])
+        a = solved(F, known, floor)
+        assert np.all(a >= floor)
+        free = a > floor
+        np.testing.assert_allclose((F @ a - known)[free], 0.0, atol=1e-9)  # no slope where nothing holds
+    np.testing.assert_allclose(solved(F, known, np.full(4, -np.inf)), np.linalg.solve(F, known))
+
+
+def test_what_a_cause_may_be():
+    coolant = hypothesis(q=2)
+    coolant = replace(coolant, batch=replace(coolant.batch, kind="coolant", family="coolant", smallest=5.0))
+    np.testing.assert_array_equal(lowest(coolant), [5.0, -np.inf])
+    assert [p[0] for p in priors(coolant)] == [WET, WET**-2]
+    sun = hypothesis(q=2)
+    assert np.all(lowest(replace(sun, batch=replace(sun.batch, family="sun"))) == 0.0)
+    assert np.all(np.isneginf(lowest(sun)))
+    assert not np.any(priors(sun)[1])
+
+
+def test_a_bent_calibration_is_no_place_to_begin():
+    np.testing.assert_array_equal(beginning(np.array([1.0, -2.0])), [1.0, -2.0])
+    np.testing.assert_array_equal(beginning(np.array([1.0, -4.0])), [0.0, 0.0])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.accepted import exchanged
 from twin.diagnose.acted import Unit, slots_with
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.gain import predicted
@@ -55,6 +56,27 @@ def test_a_sensor_that_is_off_is_a_sensor_that_is_off():
     assert verdict == "sensor"
     assert (causes[0].family, causes[0].place, causes[0].history) == ("sensor", "sensors.housing", "drift")
     assert causes[0].amplitude == pytest.approx(18.0, rel=0.1)  # K/day
+
+
+def test_swapped_sensors_are_put_back_and_leave_nothing():
+    """Two channels tens of kelvins apart would bend every parameter: with the channels back, nothing else is found."""
+    study, y = small_case.study(), measured(seed=4)
+    names, first = [], 0
+    for k in study.fitted:
+        (b, s), _ = study.runs[k].shapes
+        names = [*study.runs[k].measured.sensors][:2]
+        T = y[first : first + b * s].reshape(b, s)
+        T[:, [0, 1]] = T[:, [1, 0]]
+        first += study.runs[k].size
+    found = search(small_case.yardstick(), y)
+    verdict, (cause,) = verdict_of(found, FAMILIES)
+    assert (verdict, cause.history, set(cause.place.removeprefix("sensors.").split("<>"))) == (
+        "sensor", "swapped", set(names)
+    )  # fmt: skip
+    assert (cause.amplitude, cause.ci95) == (1.0, (1.0, 1.0))
+    clean = search(small_case.yardstick(), measured(seed=4))
+    np.testing.assert_allclose(found.x, clean.x, atol=0.1)
+    np.testing.assert_array_equal(exchanged(study, y, found.accepted), measured(seed=4))
 
 
 def test_hidden_heat_is_refitted_with_the_exact_model():

@@ -9,6 +9,7 @@ import numpy as np
 
 from twin.diagnose.acted import Unit, slots_with
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.readings import play
 from twin.diagnose.study import Study
 from twin.diagnose.yardstick import Yardstick
 
@@ -54,9 +55,40 @@ def with_shifts(study: Study, accepted: Sequence[Accepted], x: np.ndarray) -> np
 
 
 def readings_columns(yard: Yardstick, h: Hypothesis) -> np.ndarray:
-    """(m, q) white first-order responses of a hypothesis: exact for what acts on what is read."""
+    """(m, q) white first-order responses of a hypothesis: exact for what acts on what is read, but for a play."""
     columns, weights = h.combination()
     return np.asarray(yard.columns.raw[:, columns].astype(float) @ weights.T)
+
+
+def read_columns(yard: Yardstick, a: Accepted, amplitude: np.ndarray) -> np.ndarray:
+    """(m, q) white responses of a cause that acts on what is read, at its amplitude (q,); none of swapped channels."""
+    if a.hypothesis.batch.kind == "swapped":  # `exchanged` has left nothing of it
+        return np.zeros((yard.columns.raw.shape[0], len(amplitude)))
+    if a.hypothesis.batch.kind == "slip":
+        name = a.hypothesis.name.removeprefix("tcp.")
+        return yard.whiten(play(yard.study, yard.nominal, name, abs(float(amplitude[0]))))[:, None]
+    return readings_columns(yard, a.hypothesis)
+
+
+def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
+    """(m,) measurements y with the channels back in place that were found swapped: exact, whatever the parameters."""
+    swaps = [a.hypothesis.name for a in accepted if a.hypothesis.batch.kind == "swapped"]
+    if not swaps:
+        return y
+    parts, first = [], 0
+    for k in study.fitted:
+        planned = study.runs[k]
+        own = y[first : first + planned.size].copy()
+        (b, s), _ = planned.shapes
+        T, names = own[: b * s].reshape(b, s), list(planned.measured.sensors)
+        for name in swaps:
+            pair = name.removeprefix("sensors.").split("<>")
+            if set(pair) <= set(names):
+                i, j = (names.index(n) for n in pair)
+                T[:, [i, j]] = T[:, [j, i]]
+        parts.append(own)
+        first += planned.size
+    return np.concatenate(parts)
 
 
 def stepped(yard: Yardstick, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:

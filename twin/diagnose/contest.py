@@ -27,7 +27,9 @@ ENTRANTS = 5  # candidates that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
 EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
 GONE = -0.7  # of a relative change, as a straight line
-WET = 30.0  # W/(m^2 K), from which the film of a coolant is refitted at most
+WET = 40.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
+HELD = 2  # passes in which its heat and edges are found for that film, before all are free
+BENDS = 2.5  # prior standard deviations that only something hidden moves a parameter by
 NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
 LOW, HIGH = -0.99, 20.0  # of relative changes
 AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
@@ -96,20 +98,25 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
     before = float(none @ fitted.projector(none))
     inner = edges_of(study, h)
     low, high = bounds(study)
-    if h.batch.kind == "coolant":  # a strong film saturates; the heat that it takes does not
-        a[0] = min(a[0], WET)
-    # a strong cause has bent the calibration: begin near the description
-    now = _Point(a, np.clip(fitted.x, -NEAR, NEAR), h)
+    a = np.maximum(a, lowest(h))
+    mean, inverse = priors(h)
+    if h.batch.kind == "coolant":  # a strong film saturates: a score that takes it for a straight line says little
+        a[0] = WET
+    now = _Point(a, beginning(fitted.x), h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
-    for i in range(PASSES if not inner else WINDOW_PASSES):
+    held = HELD if h.batch.kind == "coolant" else 0
+    for i in range(held + (PASSES if not inner else WINDOW_PASSES)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(yard, now, edges)
         _, J = yard.fitter.surrogate.at(now.x)
         projector = yard.fitter.projector(J, fitted.more)
         left = yard.whiten(y - fitted.beside - outputs + J @ now.x)
-        removed = before - float(left @ projector(left))
-        if removed <= statistic:  # too far: back, and less
-            share *= 0.4
+        removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
+        if removed <= statistic:  # too far: back, then less; parameters may do without a step
+            if np.any(step.x):
+                step = replace(step, x=np.zeros_like(step.x))
+            else:
+                share *= 0.4
             if share < 0.1:
                 break
         else:
@@ -118,18 +125,65 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
             D[:, q:] *= [e.per_second for e in edges]
             D = yard.whiten(D)
             PD = projector(D)
-            F = D.T @ PD + np.diag([0.0] * q + [e.prior**-2.0 for e in edges])
-            found = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ left)
+            stiff = 1e9 * inverse if i < held else inverse
+            F = D.T @ PD + np.diag([*stiff, *(e.prior**-2.0 for e in edges)])
+            pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
+            floor = np.concatenate([lowest(h) - now.a, np.full(len(edges), -np.inf)])
+            found = solved(F, PD.T @ left + pulled, floor)
             after = _moved(now.a, found[:q], relative, h.batch.sign)
             shifts = np.clip(found[q:], -STEP, STEP)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
             drift = np.clip(np.clip(nuisance, low, high) - now.x, -NEAR, NEAR)
-            step = _Step(after - now.a, drift, tuple(zip(edges, shifts, strict=True)))
+            step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, shifts, strict=True)))
         shifted = (
             moved(study, yard.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
         )
         now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
+    if h.batch.kind == "coolant" and best.a[0] <= lowest(h)[0] and best.a[1] > 0.0:
+        statistic = 0.0  # that is heat
+    # what better parameters remove is not the cause's
+    plain = np.concatenate([study.outputs(k, best.x) for k in study.fitted])
+    _, J = yard.fitter.surrogate.at(best.x)
+    none = yard.whiten(y - fitted.beside - plain + J @ best.x)
+    statistic += min(float(none @ yard.fitter.projector(J, fitted.more)(none)) - before, 0.0)
     return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
+
+
+def beginning(x: np.ndarray) -> np.ndarray:
+    """(n,) parameters from which a cause is refitted: those without it, or the description where it has bent them."""
+    return x if np.abs(x).max(initial=0.0) < BENDS else np.zeros_like(x)
+
+
+def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:
+    """(n,) the minimum of a^T F a / 2 - known . a; what would be below its `lowest` (n,) is held there."""
+    held = np.zeros(len(known), dtype=bool)
+    while True:
+        free = ~held
+        found = np.where(held, lowest, 0.0)
+        rest = known[free] - F[np.ix_(free, held)] @ found[held]
+        found[free] = np.linalg.pinv(F[np.ix_(free, free)], rcond=1e-9, hermitian=True) @ rest
+        beyond = found < lowest
+        if not beyond.any():
+            return np.asarray(found)
+        held |= beyond
+
+
+def lowest(h: Hypothesis) -> np.ndarray:
+    """(q,) below which no amplitude goes."""
+    result = np.full(h.batch.q, -np.inf)
+    if h.batch.kind == "coolant":
+        result[0] = h.batch.smallest
+    elif h.family == "sun":  # on no day does it cool
+        result[:] = 0.0
+    return result
+
+
+def priors(h: Hypothesis) -> tuple[np.ndarray, np.ndarray]:
+    """(q,) means and inverse variances of amplitudes: a brief coolant tells its heat well and its film hardly."""
+    mean, inverse = np.zeros(h.batch.q), np.zeros(h.batch.q)
+    if h.batch.kind == "coolant":
+        mean[0], inverse[0] = WET, WET**-2
+    return mean, inverse
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ BRIEF = 7200.0  # s, the shortest bell
 PRIOR = 1800.0  # s: standard deviation of an edge about the hour that the search found
 STEP = 1800.0  # s, the longest step of an edge
 EXPONENT = 0.12  # standard deviation of a signal's exponent about the one of the catalogue
+WARMER = 0.15  # standard deviation of what a coolant's heat changes by from the middle of a window to its end
 LONGER = 1800.0  # s, likewise of the length of a bell that was fitted
 
 
@@ -129,8 +130,11 @@ def with_pulses(
 def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarray) -> list[Unit]:
     """Units whose responses at amplitude one are what the shape of a cause leaves open, one standard deviation each.
 
-    The exponent of a logged signal, the length of a bell. Empty for windows, whose edges are fitted.
+    The exponent of a logged signal, the length of a bell, a coolant that becomes warmer, the first edges of windows.
     """
+    if h.batch.kind == "coolant":  # its film shows in how its heat declines, and so would this
+        shapes = tuple(WARMER * float(a[1]) * _ramp(s) for s in units[1].shapes)
+        return [replace(units[1], shapes=shapes)]
     if (bell := h.when.bell) is not None:
         changes = []
         for k in range(len(study.runs)):
@@ -141,6 +145,11 @@ def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarr
             replace(u, shapes=tuple(v * c * s.any() for c, s in zip(changes, u.shapes, strict=True)))
             for u, v in zip(units, a, strict=True)
         ]
+    if h.when.windows:
+        return [
+            replace(u, shapes=tuple(v * _wide(study, h, edge, k) for k in range(len(study.runs))))
+            for edge in edges_of(study, h) for u, v in zip(units, a, strict=True)
+        ]  # fmt: skip
     if not h.when.signal or h.when.exponent == 0.0:
         return []
     by = EXPONENT / h.when.exponent  # d(s^e) / de = s^e ln s = (s^e ln s^e) / e
@@ -148,6 +157,15 @@ def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarr
         replace(u, shapes=tuple(v * by * s * np.log(np.maximum(s, 1e-12)) for s in u.shapes))
         for u, v in zip(units, a, strict=True)
     ]
+
+
+def _ramp(shape: np.ndarray) -> np.ndarray:
+    """(n_fine,) from 1 to -1 over every stretch of a shape, times the shape."""
+    result = np.zeros(len(shape))
+    on = np.concatenate([[False], shape != 0.0, [False]])
+    for start, end in zip(np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(~on[1:] & on[:-1]), strict=True):
+        result[start:end] = np.linspace(1.0, -1.0, end - start) * shape[start:end]
+    return result
 
 
 def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray | None:
@@ -169,6 +187,13 @@ def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray | None
     at = w.end if edge.what == "end" else w.start
     shape = np.clip(np.minimum(t[1:], at + PULSE / 2) - np.maximum(t[:-1], at - PULSE / 2), 0.0, None)
     return np.asarray(shape / (t[1] - t[0]))
+
+
+def _wide(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray:
+    """(n_fine,) likewise by one prior standard deviation, zero in other runs."""
+    pulse = _pulse(study, h, edge, k)
+    n = study.runs[k].run.drive.n_steps
+    return np.zeros(n) if pulse is None else pulse * edge.prior / PULSE
 
 
 def _span(study: Study, k: int) -> float:

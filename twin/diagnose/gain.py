@@ -9,7 +9,7 @@ import numpy as np
 from twin.calibrate.measured import Measured
 from twin.diagnose.accepted import stepped, with_shifts
 from twin.diagnose.diagnosis import Gain
-from twin.diagnose.readings import readings_of
+from twin.diagnose.readings import play, readings_of
 from twin.diagnose.search import Search
 from twin.diagnose.study import Study
 
@@ -55,7 +55,9 @@ def _read(found: Search, k: int) -> np.ndarray:
         h = a.hypothesis
         place = h.name.removeprefix("tcp.expansion.").removeprefix("tcp.").removeprefix("parts.")
         column = index.get((h.batch.kind, place, "always"))
-        if column is not None:
+        if h.batch.kind == "slip":
+            result += a.amplitude[0] * play(one, [nominal], place, abs(float(a.amplitude[0])))
+        elif column is not None:
             result += a.amplitude[0] * columns[:, column]
     return result
 

@@ -139,42 +139,54 @@ def gammas(places: Places, loads: Loads, contact: np.ndarray, n_ports: int) -> n
     return np.asarray(many(*flat, contact, jnp.eye(n_ports)))
 
 
-def varied(c: jax.Array, terms: jax.Array, x: jax.Array) -> jax.Array:
-    """Nothing, with the derivative (dc . terms) x of a matrix c . terms that is itself held fixed.
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _solved(
+    places: Places, many: bool, factor: jax.Array, c: jax.Array, terms: jax.Array, contact: jax.Array,
+    segments: tuple[Array, Array, Array], P: jax.Array, known: jax.Array,
+) -> jax.Array:  # fmt: skip
+    """S^-1 known, by the Cholesky factor of S = c + P Gamma P^T (many: c . terms in c's place).
 
-    A product of every term with every derivative of x, or a matrix per parameter, would cost ten times a step.
+    Derivatives come with c, contact and known; the factor's are not looked at.
+
+    Few derivatives: a matrix dc for each, made once. Many: the products of terms with the solution, which they share.
+    The other way about, either takes several times as long.
     """
-    return (c - lax.stop_gradient(c)) @ (terms @ lax.stop_gradient(x))
+    return jnp.asarray(cho_solve((factor, True), known))
+
+
+@_solved.defjvp
+def _solved_jvp(places: Places, many: bool, at: tuple, d: tuple) -> tuple[jax.Array, jax.Array]:
+    factor, _, terms, _, segments, P, known = at
+    _, dc, _, dcontact, _, _, dknown = d
+    x = cho_solve((factor, True), known)
+    dS = dc @ (terms @ x) if many else dc @ x
+    diagonal, neighbour, weight = segments
+    dS = dS + P @ flows(places, diagonal, neighbour, weight, dcontact, (P.T @ x)[:, None])[:, 0]
+    return x, cho_solve((factor, True), dknown - dS)
 
 
 @dataclass(frozen=True)
-class Capacity:
-    """E x of all steps of a trajectory, with its derivatives by the capacities' factors and amplitudes."""
+class Operators:
+    """What stays during a trajectory."""
 
-    value: jax.Array  # (r, r)
-    terms: jax.Array  # (q, r, r)
-    factors: jax.Array  # (q,)
-    derivative: bool
+    A: jax.Array  # (p, r, r): terms of films and joints, then of slots
+    E: jax.Array  # (q, r, r): terms of the model's capacities, then of slots
+    factors: jax.Array  # (q,) of E
 
     @classmethod
-    def of(cls, members: Array, factors: jax.Array, slots: Array, a: jax.Array, derivative: bool) -> Capacity:
-        """1 + factors . members + a . slots."""
-        terms = jnp.concatenate([jnp.asarray(members), jnp.asarray(slots)])
-        c = jnp.concatenate([factors, a])
-        return cls(jnp.eye(terms.shape[1]) + jnp.tensordot(lax.stop_gradient(c), terms, 1), terms, c, derivative)
-
-    def __call__(self, x: jax.Array) -> jax.Array:
-        fixed = self.value @ x
-        return fixed + varied(self.factors, self.terms, x) if self.derivative else fixed
+    def of(cls, system: System, effects: Effects, slots: Slots, f: Factors, a: jax.Array) -> Operators:
+        """At factors f and amplitudes a."""
+        A = jnp.concatenate([jnp.asarray(system.A[0]), jnp.asarray(slots.A)])
+        E = jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)])
+        return cls(A, E, jnp.concatenate([f.capacity - 1.0, a]))
 
 
 def _step(
-    layout: Layout, places: Places, derivative: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
-    fixed: tuple[Array, Array, Capacity], z: jax.Array, now: tuple[Loads, Slots],
+    layout: Layout, places: Places, many: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
+    fixed: Operators, M_slots: Array, z: jax.Array, now: tuple[Loads, Slots],
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     """The state after one coarse step, and those after its fine ones (m, r)."""
     loads, slots = now
-    A_slots, M_slots, E = jnp.asarray(fixed[0]), jnp.asarray(fixed[1]), fixed[2]
     n, T_ref = layout.n_films, system.reference_temperature
     following, losing = np.array(layout.following_films, dtype=int), np.array(layout.following_losses, dtype=int)
     environment = jnp.asarray(loads.environment) + f.environment + jnp.einsum("k,mke->me", a, slots.environment)
@@ -200,18 +212,23 @@ def _step(
     total = totals.mean(axis=0)
     joint_factor = f.joint * jnp.maximum(1.0 + a @ jnp.asarray(slots.joint), 0.02)
     joints = jnp.asarray(loads.theta)[n:] * joint_factor
-    coefficients = jnp.concatenate([total, joints]) - jnp.asarray(system.nominal)
     contact = f.contact * jnp.maximum(1.0 + a @ jnp.asarray(slots.contact), 0.02)
-    terms, P, rate = jnp.asarray(system.A[0]), jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / GAMMA
+    P, rate = jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / GAMMA
     gate = a * jnp.asarray(slots.gate)
+    coefficients = jnp.concatenate([jnp.concatenate([total, joints]) - jnp.asarray(system.nominal), gate])
+    held = lax.stop_gradient if many else jnp.asarray
+    E = jnp.eye(len(z)) + jnp.tensordot(held(fixed.factors), fixed.E, 1)
+    matrix = rate * E + jnp.asarray(system.A0[0]) + jnp.tensordot(held(coefficients), fixed.A, 1)
+    if many:
+        c, terms = jnp.concatenate([coefficients, rate * fixed.factors]), jnp.concatenate([fixed.A, fixed.E])
+    else:
+        c, terms = matrix, jnp.zeros(())
 
-    fixed_A = jnp.asarray(system.A0[0]) + jnp.tensordot(lax.stop_gradient(coefficients), terms, 1)
-    fixed_A = fixed_A + jnp.tensordot(lax.stop_gradient(gate), A_slots, 1)
-    matrix = rate * E.value + fixed_A
-
-    def A(x: jax.Array) -> jax.Array:
-        fixed = fixed_A @ x
-        return fixed + varied(coefficients, terms, x) + varied(gate, A_slots, x) if derivative else fixed
+    def capacity(x: jax.Array) -> jax.Array:
+        if not many:
+            return rate * (E @ x)
+        change = fixed.factors - lax.stop_gradient(fixed.factors)
+        return rate * (E @ x + change @ (fixed.E @ lax.stop_gradient(x)))
 
     tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
     winding = T_ref + system.source_rows @ z
@@ -224,19 +241,11 @@ def _step(
         forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + system.B @ power + ports
         forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ M_slots + a @ jnp.asarray(slots.forcing)[i]
         diagonal, neighbour, weight = (jnp.asarray(v)[i] for v in (loads.diagonal, loads.neighbour, loads.weight))
-        own = partial(flows, places, diagonal, neighbour, weight)
-        gamma = own(lax.stop_gradient(contact), jnp.eye(P.shape[1]))
-        factor = jnp.linalg.cholesky(matrix + P @ gamma @ P.T)
-
-        def solve(known: jax.Array) -> jax.Array:
-            solved = cho_solve((factor, True), lax.stop_gradient(known))
-            if not derivative:
-                return jnp.asarray(solved)
-            S = rate * E(solved) + A(solved) + P @ own(contact, P.T @ solved[:, None])[:, 0]
-            return jnp.asarray(solved + cho_solve((factor, True), known - S))
-
-        middle = solve(rate * E(x) + forcing)
-        after = solve(rate * E(x + (1.0 - GAMMA) / GAMMA * (middle - x)) + forcing)
+        gamma = flows(places, diagonal, neighbour, weight, lax.stop_gradient(contact), jnp.eye(P.shape[1]))
+        factor = jnp.linalg.cholesky(lax.stop_gradient(matrix) + P @ gamma @ P.T)
+        solve = partial(_solved, places, many, factor, c, terms, contact, (diagonal, neighbour, weight), P)
+        middle = solve(capacity(x) + forcing)
+        after = solve(capacity(x + (1.0 - GAMMA) / GAMMA * (middle - x)) + forcing)
         return after, after
 
     m = loads.environment.shape[0]
@@ -244,7 +253,7 @@ def _step(
 
 
 def trajectory(
-    layout: Layout, places: Places, derivative: bool, system: System, effects: Effects, loads: Loads, slots: Slots,
+    layout: Layout, places: Places, many: bool, system: System, effects: Effects, loads: Loads, slots: Slots,
     start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
     """States (n m + 1, r) at the fine steps from start (r,); v: parameters u of the machine, then amplitudes a (K,)."""
@@ -253,23 +262,22 @@ def trajectory(
     u, a = v[:n], v[n:]
     f = factors_at(effects, u)
     z0 = jnp.asarray(start) + a @ jnp.asarray(slots.initial)
-    E = Capacity.of(effects.E, f.capacity - 1.0, slots.E, a, derivative)
-    fixed = (slots.A, slots.M, E)
+    fixed = Operators.of(system, effects, slots, f, a)
     steps = replace(slots, A=jnp.zeros(len(loads.rate)), M=jnp.zeros(len(loads.rate)), E=jnp.zeros(len(loads.rate)),
                     initial=jnp.zeros(len(loads.rate)))  # fmt: skip
-    one = partial(_step, layout, places, derivative, system, effects, f, a, fixed)
+    one = partial(_step, layout, places, many, system, effects, f, a, fixed, slots.M)
     _, states = lax.scan(one, z0, (loads, steps))
     return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0])])
 
 
 def outputs_of(
-    layout: Layout, places: Places, derivative: bool, from_first: bool, system: System, effects: Effects, loads: Loads,
+    layout: Layout, places: Places, many: bool, from_first: bool, system: System, effects: Effects, loads: Loads,
     slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
     """Means of sensors over bins (b s,) [degC], then TCP rows (k 3,) [m]."""
     from twin.calibrate.march import displacements, temperatures
 
-    states = trajectory(layout, places, derivative, system, effects, loads, slots, start, v)
+    states = trajectory(layout, places, many, system, effects, loads, slots, start, v)
     mean_of, column = bins
     T = jnp.asarray(mean_of) @ temperatures(system, states)[:, column]
     w = displacements(effects, rows, states, jnp.asarray(v))
@@ -295,7 +303,7 @@ def by_amplitudes(
 
     def both(a: jax.Array) -> tuple[jax.Array, jax.Array]:
         v = jnp.concatenate([jnp.asarray(u), a])
-        y = outputs_of(layout, places, True, from_first, system, effects, loads, slots, rows, bins, start, v)
+        y = outputs_of(layout, places, False, from_first, system, effects, loads, slots, rows, bins, start, v)
         return y, y
 
     return jax.jacfwd(both, has_aux=True)(jnp.asarray(a))

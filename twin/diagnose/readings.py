@@ -5,7 +5,7 @@ offset    sensor       1 K;   drift  1 K/day;   lag  1 s;   detached  all of it;
 clock     run          1 s later than stated
 scale     axis<part    1 m/m/K of an encoder scale as warm as a part, from the middle of the stroke
 expansion part         100 % more
-slip      dx           1 m of play, seen at WIDTH
+slip      dx           1 m of play, seen at WIDTH; at other widths by `play`
 step      dx           1 m from a measurement on
 load      dx:signal    1 m per unit of a signal
 probe     dx           1 m/s of drift;   frame dx:axis  1 m/m;   heated dx  1 m from first to last row of a set
@@ -24,7 +24,7 @@ from twin.rom.apply import member_mean
 
 Add = Callable[[Key, Sequence[np.ndarray]], None]  # a column in parts, one per fitted run
 
-WIDTH = 4e-6  # m
+WIDTH, NARROW = 4e-6, 0.5e-6  # m
 COMPONENTS = ("dx", "dy", "dz")
 DAY = 86400.0  # s
 SET_GAP = 600.0  # s: rows closer than that belong to one measurement
@@ -148,8 +148,7 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
             grown = [np.einsum("kcr,kr->kc", g, x) for g, x in zip(rows, z, strict=True)]
             add(("expansion", member, "always"), column(grown))
     for c, name in enumerate(COMPONENTS):
-        play = [_play(plan, own, c) for plan, own in zip(plans, nominal, strict=True)]
-        add(("slip", name, "always"), component(c, play))
+        add(("slip", name, "always"), component(c, [_play(p, own, c) for p, own in zip(plans, nominal, strict=True)]))
         for r, t in enumerate(times):
             for start in _sets(t)[1:]:
                 values = [np.zeros(len(x)) if k < r else np.ones(len(x)) for k, x in enumerate(times)]
@@ -166,6 +165,17 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
             values = [_at(plan, signal.name, t) for plan, t in zip(plans, times, strict=True)]
             if max((float(np.ptp(v)) for v in values if len(v)), default=0.0) > 0.0:
                 add(("load", f"{name}:{signal.name}", "always"), component(c, values))
+
+
+def play(study: Study, nominal: Sequence[Nominal], name: str, width: float) -> np.ndarray:
+    """(m,) what a play of `width` [m] in a component of the TCP makes it read in the fitted runs, per metre of play."""
+    c, parts = COMPONENTS.index(name), []
+    for k in study.fitted:
+        plan = study.runs[k]
+        w = np.zeros((plan.shapes[1][0], 3))
+        w[:, c] = _play(plan, nominal[k], c, max(width, NARROW))
+        parts.append(np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), w.ravel()]))
+    return np.concatenate(parts)
 
 
 def _positions(plan: Planned, time: np.ndarray) -> np.ndarray:
@@ -205,14 +215,14 @@ def _within_set(time: np.ndarray) -> np.ndarray:
     return result
 
 
-def _play(plan: Planned, nominal: Nominal, c: int) -> np.ndarray:
-    """Where a play of width WIDTH lags the thermal displacement of a component, per width: -1/2 .. 1/2."""
+def _play(plan: Planned, nominal: Nominal, c: int, width: float = WIDTH) -> np.ndarray:
+    """Where a play lags the thermal displacement of a component, per width: -1/2 .. 1/2."""
     if not len(plan.measured.tcp):
         return np.zeros(0)
     row = np.asarray(plan.rows.row)[:, c].mean(axis=0)
     w = nominal.states @ row
     lagging, at = np.zeros_like(w), w[0]
     for i, value in enumerate(w):
-        at = min(max(at, value - WIDTH / 2), value + WIDTH / 2)
-        lagging[i] = (at - value) / WIDTH
+        at = min(max(at, value - width / 2), value + width / 2)
+        lagging[i] = (at - value) / width
     return lagging[np.asarray(plan.rows.step)]

@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, gains_of, readings_columns, shifted
+from twin.diagnose.accepted import Accepted, exchanged, gains_of, read_columns, readings_columns, shifted
 from twin.diagnose.acted import RELATIVE, slots_with, units_of
 from twin.diagnose.batch import Hypothesis, best
-from twin.diagnose.contest import judged, proof
+from twin.diagnose.contest import beginning, judged, lowest, priors, proof, solved
 from twin.diagnose.edges import shape_errors
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.formal import of_channels
 from twin.diagnose.growth import grown
+from twin.diagnose.lost import lost_candidates
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight, sight
 from twin.diagnose.study import K, Study
@@ -30,6 +31,7 @@ MOST = 3  # causes
 LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 TRIES = 3  # rounds of candidates that the exact model refuses
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
+WINDOWS = 3  # in which a cause comes and goes; what does so more often has a history that no name tells
 SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
 REFITS = 5  # passes of an exact refit
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
@@ -67,10 +69,11 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
     fitted = yard.fitter(y)
     accepted, steps = list[Accepted](), list[Step]()
-    refused, fruitless = set[tuple[str, str]](), 0
+    refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
         seen = sight(yard.columns, fitted.projector, yard.whiten(fitted.residual))
-        ranked = _distinct(best(seen.ready, seen.g))
+        lost = lost_candidates(yard.lost, yard.columns.batches, fitted.projector, yard.whiten(fitted.residual))
+        ranked = _distinct(sorted([*best(seen.ready, seen.g), *lost], key=lambda h: -h.statistic))
         parts = evidence(seen.heat, seen.g)
         top = ranked[:10]
         steps.append(Step(tuple(top), _cosines(yard, fitted, top), seen.largest(), parts))
@@ -82,9 +85,11 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
             if alarm and h.statistic > NAMED * limits[h.family] and used + h.batch.q <= K
             and (h.family, h.name) not in refused and not _again(h, accepted)
         ]  # fmt: skip
-        if not passing or len(accepted) >= most or fruitless >= TRIES:
+        if not passing or len(accepted) >= most or fruitless >= TRIES or imitated:
             break
-        proved, others = judged(yard, y, fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]])
+        proved, others = judged(
+            yard, exchanged(yard.study, y, accepted), fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]]
+        )
         standing = [h for h in proved if proof(yard, h) > NAMED * limits[h.family]]
         if not any(proof(yard, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
@@ -93,7 +98,11 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         # heat of any history pays for its freedom: a name that explains less than that has imitated it
         free = max(parts.values(), default=0.0)
         if free > yard.thresholds["unknown"]:
-            standing = [h for h in standing if h.statistic > COVERS * free or h.family in SEVERAL]
+            standing = [
+                h for h in standing
+                if (h.statistic > COVERS * free or h.family in SEVERAL)
+                and (len(h.when.windows) <= WINDOWS or h.when.bell is not None)
+            ]  # fmt: skip
             if not standing:
                 break
         chosen = standing[0]
@@ -103,10 +112,14 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         accepted.append(
             Accepted(chosen, units, start, np.eye(len(start)), chosen.statistic, yard.thresholds[chosen.family], rivals)
         )
-        fitted, accepted = refit(yard, y, fitted.x, accepted)
+        fitted, accepted = refit(yard, y, beginning(fitted.x), accepted)
         while weak := [a for a in accepted if not _stands(a)]:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
             accepted = [a for a in accepted if a not in weak]
+            fitted, accepted = refit(yard, y, fitted.x, accepted) if accepted else (yard.fitter(y), accepted)
+        if in_turn := _in_turn(yard.study, accepted):
+            imitated = True
+            accepted = [a for a in accepted if a not in in_turn]
             fitted, accepted = refit(yard, y, fitted.x, accepted) if accepted else (yard.fitter(y), accepted)
     x0, covariance = settled(yard, y, ())
     x, covariance = settled(yard, y, accepted) if accepted else (x0, covariance)
@@ -121,6 +134,23 @@ def _with_more_windows(seen: Sight, h: Hypothesis) -> Hypothesis:
 def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
     return any(h.family == a.hypothesis.family and h.name == a.hypothesis.name and h.when.name == a.hypothesis.when.name
                for a in accepted)  # fmt: skip
+
+
+def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:
+    """Causes of several families that come and go at one part: together they imitate a history that none has."""
+    passing = [(a, _parts(study, a.hypothesis.name)) for a in accepted if a.hypothesis.when.windows and a.units]
+    return [
+        a for a, own in passing
+        if any(own & other and b.hypothesis.family != a.hypothesis.family for b, other in passing)
+    ]  # fmt: skip
+
+
+def _parts(study: Study, name: str) -> set[str]:
+    """The parts that a surface or a film belongs to."""
+    head, _, rest = name.partition(".")
+    if head == "films":
+        return {p.name.partition(".")[0] for p in study.bench.places if p.film == rest}
+    return {head}
 
 
 def _stands(a: Accepted) -> bool:
@@ -149,13 +179,20 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
     stepped = np.concatenate([np.full(len(a.amplitude), bool(a.units)) for a in accepted])
     amplitude = np.concatenate([a.amplitude for a in accepted])
     D = np.zeros((len(y), len(amplitude)))
-    linear = [readings_columns(yard, a.hypothesis) for a in accepted if not a.units]
-    if linear:
-        D[:, ~stepped] = np.hstack(linear)
+    y = exchanged(study, y, accepted)
+    swapped = np.concatenate([np.full(len(a.amplitude), a.hypothesis.batch.kind == "swapped") for a in accepted])
     gains = gains_of(study, accepted)
+    mean, inverse_prior = (np.concatenate(p) for p in zip(*(priors(a.hypothesis) for a in accepted), strict=True))
+    floor = np.concatenate([lowest(a.hypothesis) for a in accepted])
     for _ in range(REFITS):
         there = shifted(study, x, gains, amplitude)
         _, J = fitter.surrogate.at(there)
+        first = 0
+        for a in accepted:
+            own = slice(first, first + len(a.amplitude))
+            first = own.stop
+            if not a.units:
+                D[:, own] = read_columns(yard, a, amplitude[own])
         for i, j in gains:  # a parameter beyond its prior: its own column, per unit of the amplitude
             D[:, i] = yard.whiten(J[:, [j]])[:, 0] / study.scale[j]
         if units:
@@ -175,12 +212,12 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         errors = np.hstack([_own_errors(study, D, accepted, amplitude), yard.whiten(shapes)])
         projector = fitter.projector(J, errors)
         PD = projector(D)
-        F = D.T @ PD
-        found = np.linalg.pinv(F, rcond=1e-9, hermitian=True) @ (PD.T @ white)
+        F = D.T @ PD + np.diag(inverse_prior)
+        found = solved(F, PD.T @ white + inverse_prior * mean, floor)
         nuisance = np.clip(projector.most_likely(white - D @ found)[: len(x)], low, high)
         step = np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))
         moved = max(float(np.abs(nuisance - x).max(initial=0.0)), float(step.max(initial=0.0)))
-        x, amplitude = nuisance, _limited(found, accepted)
+        x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, accepted))
         if moved < 0.1:
             break
     inverse = np.linalg.pinv(F)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, readings_columns, stepped, with_shifts
+from twin.diagnose.accepted import Accepted, exchanged, read_columns, stepped, with_shifts
 from twin.diagnose.fitter import CLOSE, bounds
 from twin.diagnose.study import Study
 from twin.diagnose.yardstick import Yardstick
@@ -31,10 +31,11 @@ def settled(yard: Yardstick, y: np.ndarray, accepted: Sequence[Accepted]) -> tup
     low, high = bounds(study)
     N = yard.fitter.others
     W = 1.0 / (1.0 + _rows(study) * (N**2).sum(axis=1))
+    y = exchanged(study, y, accepted)
     read = np.zeros(len(y))
     for a in accepted:
         if not a.units and a.hypothesis.batch.kind != "gain":
-            read += readings_columns(yard, a.hypothesis) @ a.amplitude
+            read += read_columns(yard, a, a.amplitude) @ a.amplitude
     x = np.zeros(len(low))
     for _ in range(PASSES):
         before = x

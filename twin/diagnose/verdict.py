@@ -11,6 +11,7 @@ from twin.diagnose.accepted import Accepted
 from twin.diagnose.acted import RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
+from twin.diagnose.contest import AMPLITUDE
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.elements import pivot
 from twin.diagnose.fitter import bounds
@@ -27,15 +28,28 @@ REMAINDER = 0.35  # of the evidence for unknown heat that a name must explain to
 KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
 STRAINED = 2.5  # prior standard deviations, beyond which a declared parameter is out of its tolerance
 STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint": "joint", "expansion": "expansion"}
+# What a size may be wrong by because the model's form is: relative standard deviations, by kind. Coefficients of films
+# are known least, and temperatures that nobody measured.
+OWN = {"film": 0.12, "group_film": 0.12, "coolant": 0.12, "scale": 0.12, "moved": 0.1, "capacity": 0.1, "slip": 0.12}
+OWN_OTHERS = 0.05
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
 PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
 
 
-def cause_of(a: Accepted, study: Study) -> Cause:
-    """A cause as reports and edits take it: factors as factors, differences as differences."""
+def cause_of(a: Accepted, study: Study, x: np.ndarray) -> Cause:
+    """A cause as reports and edits take it: factors as factors, differences as differences.
+
+    x (n,): parameters in prior standard deviations. The interval counts that the model's own form is wrong, see OWN.
+    """
     h = a.hypothesis
     kind, unit = h.batch.kind, h.batch.unit
-    value, sigma = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
+    value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
+    if h.family == "misplaced_source":  # the share of what the source emits, not of what the description says
+        paths = [p.path for p in study.bench.parameters]
+        i = paths.index(f"{h.name.split('>')[0]}.gain")
+        emitted = float(np.exp(study.scale[i] * x[i]))
+        value, variance = value / emitted, variance / emitted**2
+    sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), OWN.get(kind, OWN_OTHERS) * value))
     low, high = value - 1.96 * sigma, value + 1.96 * sigma
     settings: dict[str, float | str] = {}
     if kind in RELATIVE:
@@ -116,7 +130,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     thresholds = found.yardstick.thresholds
     left = max(found.steps[-1].parts.values(), default=0.0)
     before = max(found.steps[0].parts.values(), default=0.0)
-    causes = tuple(cause_of(a, found.yardstick.study) for a in found.accepted)
+    causes = tuple(cause_of(a, found.yardstick.study, found.x) for a in found.accepted)
     if left > thresholds["unknown"] and (not causes or left > REMAINDER * before):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
@@ -126,7 +140,8 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     lead, chosen = causes[0], found.accepted[0]
     group = groups.get(lead.family, "machine")
     for other, cosine in chosen.rivals:
-        near = other.statistic > chosen.hypothesis.statistic - CLOSE
+        more = AMPLITUDE * (other.batch.q - chosen.hypothesis.batch.q)
+        near = other.statistic - more > chosen.hypothesis.statistic - CLOSE
         apart = min(chosen.hypothesis.statistic, other.statistic) * (1.0 - cosine**2) > APART
         same = other.family == lead.family and _part(other.name) == _part(chosen.hypothesis.name)
         if same and chosen.hypothesis.when.signal and other.when.name != chosen.hypothesis.when.name:
@@ -197,23 +212,37 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
     )
 
 
-def limits_of(yard: Yardstick) -> tuple[Limit, ...]:
-    """Per family and unit the size that would have been named in 95 of 100 cases, over its places."""
-    result: dict[tuple[str, str], list[tuple[float, str]]] = {}
-    n = len(yard.study.bench.parameters)
-    _, J = yard.fitter.surrogate.at(np.zeros(n))
+def limits_at(yard: Yardstick) -> dict[tuple[str, str, str, bool], float]:
+    """(family, unit, place, whether it comes and goes) -> the size that would have been named in 95 of 100 cases.
+
+    The median over histories, in `unit`.
+    """
+    result: dict[tuple[str, str, str, bool], float] = {}
+    _, J = yard.fitter.surrogate.at(np.zeros(len(yard.study.bench.parameters)))
     for own in sight(yard.columns, yard.fitter.projector(J), np.zeros(len(J))).ready:
         batch = own.batch
         if batch.fixed:
             continue
         sizes = (np.sqrt(yard.thresholds[batch.family]) + POWER) / np.sqrt(np.maximum(own.information, 1e-30))
         sizes = np.maximum(sizes, batch.smallest)
-        plain = [i for i, h in enumerate(batch.histories) if not h.windows] or list(range(sizes.shape[1]))
-        for p, name in enumerate(batch.places):
-            result.setdefault((batch.family, batch.unit), []).append((float(np.median(sizes[p, plain])), name))
+        for windowed in (False, True):
+            chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
+            for p, name in enumerate(batch.places if chosen else ()):
+                key = (batch.family, batch.unit, name, windowed)
+                result[key] = min(float(np.median(sizes[p, chosen])), result.get(key, np.inf))
+    return result
+
+
+def limits_of(yard: Yardstick) -> tuple[Limit, ...]:
+    """Per family and unit `limits_at` its places, for what always acts where there is such."""
+    at = limits_at(yard)
+    found: dict[tuple[str, str], list[tuple[float, str]]] = {}
+    for (family, unit, place, windowed), size in at.items():
+        if not windowed or (family, unit, place, False) not in at:
+            found.setdefault((family, unit), []).append((size, place))
     limits = []
-    for (family, unit), sizes_of in result.items():
-        ordered = sorted(sizes_of)
+    for (family, unit), sizes in found.items():
+        ordered = sorted(sizes)
         median, place = ordered[len(ordered) // 2]
         limits.append(Limit(family, place, median, ordered[0][0], ordered[-1][0], unit))
     return tuple(limits)

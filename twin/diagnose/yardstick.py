@@ -21,6 +21,7 @@ from twin.diagnose.elements import Elements, elements_of, slim
 from twin.diagnose.fitter import Fitter
 from twin.diagnose.formal import known_forms
 from twin.diagnose.hypotheses import Context
+from twin.diagnose.lost import Lost, lost_conductances
 from twin.diagnose.nulls import Form, Instruments, null
 from twin.diagnose.readings import readings_of
 from twin.diagnose.sight import Columns, sight
@@ -51,6 +52,7 @@ class Yardstick:
     columns: Columns
     nulls: dict[str, np.ndarray]  # per family, and "unknown": largest statistic in every null
     thresholds: dict[str, float]
+    lost: Lost
 
     @property
     def whiten(self) -> Whitener:
@@ -126,7 +128,8 @@ def make_yardstick(
     names = [*(f.name for f in families), "unknown"]
     nulls = {name: np.array([of_null.get(name, 0.0) for of_null in largest]) for name in names}
     small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
-    return Yardstick(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls))
+    lost = lost_conductances(study, elements, whiten, progress)
+    return Yardstick(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost)
 
 
 def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:
