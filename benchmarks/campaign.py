@@ -90,7 +90,6 @@ def judged(yard: Yardstick, trial: Trial, bare: Trial) -> dict[str, Any]:
     verdict, causes = verdict_of(found, FAMILIES)
     unknown = unknown_of(found) if verdict == "unknown" else None
     seconds = time.perf_counter() - began
-    without = measured_of(with_measured(yard.study, plans_of(yard, bare)))
     return {
         "family": trial.family,
         "factor": trial.factor,
@@ -107,10 +106,15 @@ def judged(yard: Yardstick, trial: Trial, bare: Trial) -> dict[str, Any]:
         "evidence": max(found.steps[0].parts.values()),
         "observed": found.steps[0].observed,
         "limits": [limit(h) for h in trial.truth],
-        "present": float(np.nansum((yard.whiten(y) - yard.whiten(without)) ** 2)),
+        "present": _distance(yard, y, measured_of(with_measured(yard.study, plans_of(yard, bare)))),
         "variance": [*variance(found, plans[2].temperature, plans[2].tcp), variance_without(yard, bare)],
         "seconds": seconds,
     }  # fmt: skip
+
+
+def _distance(yard: Yardstick, y: np.ndarray, without: np.ndarray) -> float:
+    """Sum of squares of what is hidden, in units of noise; infinite where it changes what was measured at all."""
+    return float(np.nansum((yard.whiten(y) - yard.whiten(without)) ** 2)) if len(y) == len(without) else np.inf
 
 
 def plans_of(yard: Yardstick, trial: Trial) -> list[Measured]:

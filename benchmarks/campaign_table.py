@@ -227,6 +227,33 @@ def _named(truth: Mapping[str, Any], r: Result) -> bool:
     return any(c["family"] == truth["family"] and same_place(truth, c) for c in r["causes"])
 
 
+def mistakes(results: Sequence[Result]) -> list[list[str]]:
+    """Rows of false alarms and of wrong names or places: hidden, seed, what was said first, its size and statistic."""
+    rows = []
+    for r in results:
+        if "error" in r:
+            rows.append([_hidden(r), str(r["seed"]), "error", str(r["error"]), "", ""])
+            continue
+        wrong = detected(r) and not place_right(r) if r["family"] in CATALOGUE else r["family"] in NULLS and detected(r)
+        if not wrong:
+            continue
+        first = lead(r)
+        if r["verdict"] == "unknown":
+            rows.append([_hidden(r), str(r["seed"]), "unknown", str((r["unknown"] or [""])[0]), "", ""])
+        elif first is not None:
+            size = f"{first['amplitude']:.3g} {first['unit']}"
+            place = f"{first['place']}, {first['history']}"
+            rows.append([_hidden(r), str(r["seed"]), str(first["family"]), place, size, f"{first['statistic']:.0f}"])
+    return rows
+
+
+def _hidden(r: Result) -> str:
+    if not r.get("truth"):
+        return str(r["family"])
+    truth = _truth(r)
+    return f"{truth['family']} {truth['place']}, {truth['history']}, {truth['size']:.3g} {truth['unit']}"
+
+
 def confusion(results: Sequence[Result]) -> tuple[list[str], list[list[str]]]:
     """Header and rows: what was hidden against what was said, a family or a verdict; nominal and twice sizes."""
     chosen = [r for r in results if r["factor"] >= 1.0]
@@ -279,6 +306,9 @@ def page(results: Sequence[Result], limits: Sequence[Limit], model: Path, top: T
     if more := several(results):
         head = ["trials of", "trials", "failed", "all named", "one named", "ambiguous"]
         parts += ["\n## Several at once, and hard to tell apart\n", _table(head, more)]
+    if wrong_ones := mistakes(results):
+        head = ["hidden", "seed", "said first", "place, history", "size", "statistic"]
+        parts += ["\n## False alarms, wrong names and wrong places\n", _table(head, wrong_ones)]
     stated = [[m.family, m.unit, f"{m.size:.3g}", f"{m.smallest:.3g}", f"{m.largest:.3g}", m.place] for m in limits]
     if stated:
         head = ["family", "unit", "median", "smallest", "largest", "place of the median"]

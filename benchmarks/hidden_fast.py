@@ -186,6 +186,7 @@ class Effects:
     shape: Callable[[MachineModel], MachineModel] = lambda model: model  # the reduced machine made another
     laws: bool = False  # whether `shape` changes laws, so that the logs must be evaluated anew
     warm: Mapping[tuple[int, str], float] = field(default_factory=dict)  # (run, body) -> K warmer at the start
+    late: Mapping[int, float] = field(default_factory=dict)  # run -> s that its measurements are behind their times
 
 
 def fast_truth(fast: Fast, values: Mapping[str, float], effects: Effects = Effects()) -> tuple[Clean, ...]:
@@ -209,7 +210,7 @@ def fast_truth(fast: Fast, values: Mapping[str, float], effects: Effects = Effec
         start = prepared.uniform(START) + _warmer(there, prepared.back, warmer)
         z = np.concatenate([start[None], march(prepared, inputs_of(there.load_model, drive, SUBSTEPS), start).z])
         # a row is taken at the end of the step that it falls in, as the full model's
-        at = np.clip(np.searchsorted(drive.time, fast.tcp_time[r], side="left"), 0, drive.n_steps)
+        at = np.clip(np.searchsorted(drive.time, fast.tcp_time[r] - effects.late.get(r, 0.0)), 0, drive.n_steps)
         tcp = np.einsum("mcn,mn->mc", rows[r], z[at])
         shown = {name: T_ref + z @ row for name, row in means.items()}
         moved = z @ rows[r].mean(axis=0).T

@@ -106,6 +106,7 @@ def together(parts: Sequence[Part]) -> Part:
         films=tuple(dict.fromkeys(f for p in parts for f in p.effects.films)),
         acting=acting, loads=loads, shape=shape, laws=any(p.effects.laws for p in parts),
         warm={k: v for p in parts for k, v in p.effects.warm.items()},
+        late={k: v for p in parts for k, v in p.effects.late.items()},
     )  # fmt: skip
     hidden = tuple(h for p in parts for h in p.hidden)
     return Part(hidden, effects, factors, readings, logs, any(p.coarse for p in parts))

@@ -124,18 +124,12 @@ def _clock(rng: np.random.Generator, factor: float) -> Part:
         if k != r:
             return run
         assert run.temperatures is not None
-        assert run.tcp is not None
         time = run.temperatures.time
         shifted = {n: np.interp(time - late, time, v) for n, v in run.temperatures.columns.items()}
-        kept = run.tcp.time + late <= time[-1]
-        tcp = replace(
-            run.tcp, time=run.tcp.time[kept] + late, position=run.tcp.position[kept],
-            displacement=run.tcp.displacement[kept],
-            sigma=None if run.tcp.sigma is None else run.tcp.sigma[kept],
-        )  # fmt: skip
-        return replace(run, temperatures=replace(run.temperatures, columns=shifted), tcp=tcp)
+        return replace(run, temperatures=replace(run.temperatures, columns=shifted))
 
-    return Part((Hidden("signal", f"runs.{RUNS[r]}", "clock", late, "s"),), readings=readings)
+    hidden = Hidden("signal", f"runs.{RUNS[r]}", "clock", late, "s")
+    return Part((hidden,), Effects(late={r: late}), readings=readings)
 
 
 def _displaced(hidden: Hidden, more: Callable[[int, Run, Clean], np.ndarray], heats: tuple[str, ...] = ()) -> Part:

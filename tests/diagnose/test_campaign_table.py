@@ -10,6 +10,7 @@ from benchmarks.campaign_table import (
     confusion,
     goals,
     lower,
+    mistakes,
     page,
     per_family,
     recovered,
@@ -183,6 +184,36 @@ def test_sizes_are_compared_in_one_unit_or_not_at_all():
     assert size_of(hidden("signal", "signals.a", 0.5, "1", "factor"),
                    cause("signal", "signals.a", 0.5, "1", history="factor"), top) is None  # fmt: skip
     assert effect(hidden("joint", "contacts.a", 0.15, "1"), top) == pytest.approx(0.85)
+
+
+def test_mistakes_are_listed_with_what_was_said():
+    rows = mistakes(RESULTS)
+    assert [row[2:4] for row in rows] == [
+        ["film_gain", "films.bed, always"],
+        ["heat_source", "bed.right, always"],
+        ["sun", "bed.left, always"],
+        ["unknown", "bed"],
+        ["error", "ValueError: no"],
+    ]
+    assert rows[0][0] == "null"
+    assert rows[1][0] == "heat_source bed.left, always, 12 W"
+    assert rows[1][4:] == ["12 W", "50"]
+
+
+def test_limits_are_those_of_the_place_and_weak_effects_are_told_apart():
+    weak = {**trial("heat_source", [HEAT], verdict="nothing"), "limits": [1.0], "present": 3.0}
+    strong = {**trial("heat_source", [HEAT], [cause("heat_source", "bed.left", 12.0, "W")]), "limits": [7.0]}
+    found = values(goals([weak, strong], LIMITS, top, TABLES))
+    assert found["detected at twice the stated limit and more"] == ("0.000", "0 of 1")  # 12 W at a limit of 1 W
+    assert found["detected at nominal size"] == ("0.500", "1 of 2")
+    assert found["detected at nominal size, of what the data show"] == ("1.000", "1 of 1")
+
+
+def test_a_part_of_a_warm_body_is_the_right_place():
+    truth = hidden("initial_state", "runs.diagnosis_2", 1.5, "K", "offset", body="carriage")
+    for part, right in (("carriage", True), ("table", True), ("bed", False)):
+        assert same_place(truth, cause("initial_state", f"runs.diagnosis_2.{part}", 1.4, "K")) is right
+    assert not same_place(truth, cause("initial_state", "runs.diagnosis_1.carriage", 1.4, "K"))
 
 
 def test_an_unfinished_campaign_has_its_tables(tmp_path, capsys):

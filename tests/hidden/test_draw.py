@@ -170,10 +170,20 @@ def test_a_clock_is_late_for_temperatures_and_the_tool_alike():
     late = part.readings(r, run, clean)
     T = run.temperatures.columns["x_motor"]
     np.testing.assert_allclose(late.temperatures.columns["x_motor"][6:], T[:-6])
-    np.testing.assert_allclose(late.tcp.time, run.tcp.time[: len(late.tcp.time)] + 360.0)
-    assert late.tcp.time[-1] <= run.temperatures.time[-1]
+    np.testing.assert_array_equal(late.tcp.time, run.tcp.time)  # measured when it was asked for, told 6 min later
+    assert together([part, part_of("heat_source", 1.0, 0)]).effects.late == {r: 360.0}
     other, did = made_up(1 - r)
     assert part.readings(1 - r, other, did) is other
+
+
+@pytest.mark.slow
+def test_the_tool_is_late_with_the_temperatures():
+    seed = next(s for s in range(60) if part_of("signal", 1.0, s).hidden[0].history == "clock")
+    late, right = draw("signal", 1.0, seed), draw("signal", 1.0, seed, hidden=False)
+    r = RUNS.index(late.truth[0].place.removeprefix("runs."))
+    for k, (a, b) in enumerate(zip(late.runs, right.runs, strict=True)):
+        moved = float(np.abs(a.tcp.displacement - b.tcp.displacement).max())
+        assert 0.2e-6 < moved < 20e-6 if k == r else moved == 0.0
 
 
 @pytest.mark.parametrize("kind", ["offset", "drift", "lag", "detached", "stuck", "swapped"])

@@ -27,14 +27,18 @@ class Accepted:
     rivals: tuple[tuple[Hypothesis, float], ...]  # nearly as likely, with the cosine to this one
 
 
+def parameter_of(study: Study, name: str) -> int:
+    """The declared parameter that a cause of kind "gain" is beyond its tolerance of."""
+    paths = [p.path for p in study.bench.parameters]
+    return paths.index(name if name in paths else f"{name}.gain")
+
+
 def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
     """(amplitude, parameter) of causes that are a declared parameter beyond its tolerance."""
-    paths = [p.path for p in study.bench.parameters]
     result, first = [], 0
     for a in accepted:
         if a.hypothesis.batch.kind == "gain":
-            name = a.hypothesis.name
-            result.append((first, paths.index(name if name in paths else f"{name}.gain")))
+            result.append((first, parameter_of(study, a.hypothesis.name)))
         first += len(a.amplitude)
     return result
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, exchanged, gains_of, read_columns, readings_columns, shifted
+from twin.diagnose.accepted import Accepted, exchanged, gains_of, parameter_of, read_columns, readings_columns, shifted
 from twin.diagnose.acted import RELATIVE, slots_with, units_of
 from twin.diagnose.batch import Hypothesis, best
 from twin.diagnose.contest import beginning, judged, lowest, priors, proof, solved
@@ -26,12 +26,15 @@ from twin.diagnose.study import K, Study
 from twin.diagnose.unknown import Heat, evidence
 from twin.diagnose.yardstick import Yardstick
 
+PULLED = 2.5  # standard deviations, of what tolerances allow a settled parameter, beyond which it is out of tolerance
+BEYOND = 3.0  # prior standard deviations likewise of one that was fitted with errors of form
+TOLD = 0.94  # variance of a settled parameter that says something of its own
 WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
 MOST = 3  # causes
 LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 TRIES = 3  # rounds of candidates that the exact model refuses
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
-WINDOWS = 3  # in which a cause comes and goes; what does so more often has a history that no name tells
+WINDOWS = 4  # in which a cause comes and goes at one place; what does so more often has a history that no name tells
 SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
 REFITS = 5  # passes of an exact refit
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
@@ -68,15 +71,16 @@ class Search:
 def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
     fitted = yard.fitter(y)
+    x0, covariance = settled(yard, y, ())
+    relaxed = _strained(yard, y, fitted, x0, covariance)
+    if relaxed and (closed := _closed(yard, y, fitted, relaxed, x0)):
+        return closed
     accepted, steps = list[Accepted](), list[Step]()
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
-        seen = sight(yard.columns, fitted.projector, yard.whiten(fitted.residual))
-        lost = lost_candidates(yard.lost, yard.columns.batches, fitted.projector, yard.whiten(fitted.residual))
-        ranked = _distinct(sorted([*best(seen.ready, seen.g), *lost], key=lambda h: -h.statistic))
-        parts = evidence(seen.heat, seen.g)
-        top = ranked[:10]
-        steps.append(Step(tuple(top), _cosines(yard, fitted, top), seen.largest(), parts))
+        seen, ranked, step = _look(yard, fitted)
+        steps.append(step)
+        parts = step.parts
         used = sum((len(a.units) for a in accepted), 0)
         limits = {name: (LATER if accepted else 1.0) * value for name, value in yard.thresholds.items()}
         alarm = any(h.statistic > limits[h.family] and (h.family, h.name) not in refused for h in ranked)
@@ -101,7 +105,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
             standing = [
                 h for h in standing
                 if (h.statistic > COVERS * free or h.family in SEVERAL)
-                and (len(h.when.windows) <= WINDOWS or h.when.bell is not None)
+                and (len(h.when.windows) <= WINDOWS or h.when.bell is not None or h.name.startswith("environment."))
             ]  # fmt: skip
             if not standing:
                 break
@@ -121,9 +125,62 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
             imitated = True
             accepted = [a for a in accepted if a not in in_turn]
             fitted, accepted = refit(yard, y, fitted.x, accepted) if accepted else (yard.fitter(y), accepted)
-    x0, covariance = settled(yard, y, ())
     x, covariance = settled(yard, y, accepted) if accepted else (x0, covariance)
     return Search(yard, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance)
+
+
+def _look(yard: Yardstick, fitted: Fitted) -> tuple[Sight, list[Hypothesis], Step]:
+    """All hypotheses there, the best of every family and place first."""
+    white = yard.whiten(fitted.residual)
+    seen = sight(yard.columns, fitted.projector, white)
+    lost = lost_candidates(yard.lost, yard.columns.batches, fitted.projector, white)
+    ranked = _distinct(sorted([*best(seen.ready, seen.g), *lost], key=lambda h: -h.statistic))
+    top = ranked[:10]
+    return seen, ranked, Step(tuple(top), _cosines(yard, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
+
+
+def _closed(
+    yard: Yardstick, y: np.ndarray, before: Fitted, relaxed: tuple[Fitted, Accepted], x0: np.ndarray
+) -> Search | None:
+    """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
+    what was seen before is too strong to be a number that merely pulls."""
+    fitted, one = relaxed
+    _, ranked, first = _look(yard, before)
+    seen, left, last = _look(yard, fitted)
+    weak = all(h.statistic < LATER * yard.thresholds[h.family] for h in [*ranked, *left])
+    if not weak or max(last.parts.values(), default=0.0) > yard.thresholds["unknown"]:
+        return None
+    x, covariance = settled(yard, y, (one,))
+    return Search(yard, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance)
+
+
+def _strained(
+    yard: Yardstick, y: np.ndarray, fitted: Fitted, x0: np.ndarray, covariance: np.ndarray
+) -> tuple[Fitted, Accepted] | None:
+    """The declared source or film that calibration moves farthest, freed of its tolerance; None if all are within.
+
+    x0 (n,), covariance (n, n): settled. Where tolerances are right, x0 has the variance 1 - covariance.
+    """
+    variance = np.diag(covariance)
+    pulls = np.where(variance < TOLD, x0 / np.sqrt(np.maximum(1.0 - variance, 1.0 - TOLD)), 0.0)
+    strain = np.maximum(np.abs(pulls) / PULLED, np.abs(fitted.x) / BEYOND)
+    found = []
+    for batch in yard.columns.batches:
+        for i, name in enumerate(batch.places if batch.kind in ("gain", "group") else ()):
+            j = parameter_of(yard.study, name)
+            always = next(h for h in batch.histories if not h.windows)
+            size = float(fitted.x[j] * yard.study.scale[j])
+            if batch.kind == "group":
+                size = float(np.expm1(size))
+            likelihood = float((PULLED * strain[j]) ** 2)
+            found.append(Hypothesis(batch, i, always, likelihood, (size,), float(yard.study.scale[j] ** -2.0)))
+    top = max(found, key=lambda h: h.statistic, default=None)
+    if top is None or top.statistic < PULLED**2:
+        return None
+    units = units_of(yard.study, top)
+    one = Accepted(top, units, np.array(top.amplitude), np.eye(1), top.statistic, PULLED**2, ())
+    fitted, (one,) = refit(yard, y, fitted.x, [one])
+    return fitted, one
 
 
 def _with_more_windows(seen: Sight, h: Hypothesis) -> Hypothesis:
