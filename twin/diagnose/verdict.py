@@ -28,9 +28,18 @@ REMAINDER = 0.35  # of the evidence for unknown heat that a name must explain to
 KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
 STRAINED = 2.5  # prior standard deviations, beyond which a declared parameter is out of its tolerance
 STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint": "joint", "expansion": "expansion"}
-# What a size may be wrong by because the model's form is: relative standard deviations, by kind. Coefficients of films
-# are known least, and temperatures that nobody measured.
-OWN = {"film": 0.12, "group_film": 0.12, "coolant": 0.12, "scale": 0.12, "moved": 0.1, "capacity": 0.1, "slip": 0.12}
+# What a size may be wrong by because the model's form is: relative standard deviations, by family or kind. Coefficients
+# of films are known least, and temperatures that nobody measured.
+OWN = {
+    "film": 0.12,
+    "group_film": 0.12,
+    "coolant": 0.12,
+    "scale": 0.12,
+    "moved": 0.1,
+    "capacity": 0.1,
+    "slip": 0.12,
+    "sun": 0.08,
+}
 OWN_OTHERS = 0.05
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
 PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
@@ -49,7 +58,11 @@ def cause_of(a: Accepted, study: Study, x: np.ndarray) -> Cause:
         i = paths.index(f"{h.name.split('>')[0]}.gain")
         emitted = float(np.exp(study.scale[i] * x[i]))
         value, variance = value / emitted, variance / emitted**2
-    sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), OWN.get(kind, OWN_OTHERS) * value))
+    sigma = (
+        0.0
+        if h.batch.fixed
+        else float(np.hypot(np.sqrt(variance), OWN.get(h.family, OWN.get(kind, OWN_OTHERS)) * value))
+    )
     low, high = value - 1.96 * sigma, value + 1.96 * sigma
     settings: dict[str, float | str] = {}
     if kind in RELATIVE:
