@@ -126,10 +126,20 @@ def displacement(d: Damage, run: Run = RUN) -> np.ndarray:
     return 1e6 * (damaged(run, d).tcp.displacement - run.tcp.displacement)
 
 
-def test_a_slip_returns_and_a_step_stays():
-    slip = displacement(of_kind("slip", "step"))
-    assert slip[:, 0].tolist() == pytest.approx([0.0] * 5 + [4.0] * 10 + [0.0] * 5)
+def test_a_play_stays_behind_until_it_is_used_up():
+    there = np.concatenate([np.linspace(0.0, 10e-6, 10), np.linspace(10e-6, 0.0, 10)])
+    run = replace(RUN, tcp=replace(RUN.tcp, displacement=np.stack([there, 0 * there, 0 * there], axis=1)))
+    slip = displacement(of_kind("slip", "play"), run)  # 4 um
     assert not slip[:, 1:].any()
+    assert np.abs(slip[:, 0]).max() == pytest.approx(2.0)
+    assert slip[9, 0] == pytest.approx(-2.0)  # behind while it moves on
+    assert slip[-1, 0] == pytest.approx(2.0)  # and on the other side on the way back
+    pairs = replace(run.tcp, time=np.repeat(run.tcp.time[::2], 2) + np.tile([0.0, 60.0], 10))
+    one = displacement(of_kind("slip", "play"), replace(run, tcp=pairs))[:, 0].reshape(10, 2)
+    np.testing.assert_allclose(one[:, 0], one[:, 1], atol=1e-9)  # rows of one measurement
+
+
+def test_a_step_stays():
     step = displacement(of_kind("not_thermal", "step", start=18000.0))
     assert step[:, 0].tolist() == pytest.approx([0.0] * 10 + [4.0] * 10)
 
@@ -185,4 +195,4 @@ def test_what_is_not_there_is_told(d, told):
 
 def test_faults_of_the_tool_need_its_measurements():
     with pytest.raises(LogError, match=r"no tcp\.csv"):
-        damaged(replace(RUN, tcp=None), of_kind("slip", "step"))
+        damaged(replace(RUN, tcp=None), of_kind("slip", "play"))

@@ -251,7 +251,7 @@ _LOG = (
     _in_log("sensor_stuck", Damage(
         "sensor", "sensors.quill_top", 4.0 * HOUR, "stuck", start=5.0 * HOUR
     ), "s", "sensor", RUNS[:1]),
-    _in_log("slip", Damage("slip", "tcp.dy", 6e-6, "step"), "m", "named", families=("not_thermal",)),
+    _in_log("slip", Damage("slip", "tcp.dy", 6e-6, "play"), "m", "named"),
     Trial(
         "not_thermal", Expected(("named",), "not_thermal", "tcp.dx", 10e-6, "m", "step"), truth="null_0",
         damages=tuple(

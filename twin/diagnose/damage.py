@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.damage_access import (
+    COMPONENTS,
     Damage,
     acts,
     column_at,
@@ -26,6 +27,7 @@ from twin.diagnose.damage_access import (
     with_sensors,
     with_tcp,
 )  # fmt: skip
+from twin.diagnose.readings import SET_GAP
 from twin.errors import LogError
 from twin.logs.run import Run
 from twin.nearest import did_you_mean
@@ -150,12 +152,20 @@ def _step(run: Run, d: Damage) -> Run:
 
 
 def _slip(run: Run, d: Damage) -> Run:
-    """A joint slips as the machine warms and slips back as it cools: in the second and third quarter, unless told."""
-    time = tcp_time(run)
-    span = time[-1] - time[0]
-    start = time[0] + 0.25 * span if d.start == -math.inf else d.start
-    end = time[0] + 0.75 * span if d.end == math.inf else d.end
-    return _step(run, replace(d, start=start, end=end))
+    """A support with play: the tool stays behind until the displacement has moved on by the size.
+
+    The play is that of the mean of every measurement (rows that follow each other within `SET_GAP`): rows of one differ
+    by their positions, not by what the machine did.
+    """
+    time, c = tcp_time(run), component(d.place, COMPONENTS)
+    assert run.tcp is not None
+    group = np.concatenate([[0], np.cumsum(np.diff(time) > SET_GAP)])
+    level = np.bincount(group, run.tcp.displacement[:, c]) / np.bincount(group)
+    held, behind = level[0], np.zeros(len(level))
+    for i, value in enumerate(level):
+        held = min(max(held, value - d.size / 2), value + d.size / 2)
+        behind[i] = held - value
+    return with_tcp(run, d, behind[group] / d.size * acts(time, d))
 
 
 def _measured_drift(run: Run, d: Damage) -> Run:
@@ -215,7 +225,7 @@ DAMAGES: dict[str, dict[str, Kind]] = {
         "averaged": Kind(_averaged, "s", "is logged as means over this time"),
         "clock": Kind(_clock, "s", "is stamped too late by this"),
     },
-    "slip": {"step": Kind(_slip, "m", "a joint slips, and slips back")},
+    "slip": {"play": Kind(_slip, "m", "a support has this play")},
     "initial_state": {"offset": Kind(_initial_state, "K", "the stated temperature is too high by this")},
     "measurement": {
         "drift": Kind(_measured_drift, "m", "the device drifts in a straight line, in all by this"),
