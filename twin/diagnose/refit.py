@@ -1,0 +1,105 @@
+"""All accepted causes fitted with the exact model, together with the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.accepted import Accepted, exchanged, gains_of, read_columns, shifted
+from twin.diagnose.acted import RELATIVE, slots_with
+from twin.diagnose.contest import lowest, priors, solved
+from twin.diagnose.edges import shape_errors
+from twin.diagnose.fitter import Fitted, bounds
+from twin.diagnose.formal import of_channels
+from twin.diagnose.study import K, Study
+from twin.diagnose.yardstick import Yardstick
+
+WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
+REFITS = 5  # passes
+
+
+def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]) -> tuple[Fitted, list[Accepted]]:
+    """Parameters and all amplitudes with the exact model. The residual has the accepted causes in its projector."""
+    study, fitter = yard.study, yard.fitter
+    low, high = bounds(study)
+    units = [u for a in accepted for u in a.units]
+    open_shapes = [u for a in accepted if a.units for u in shape_errors(study, a.hypothesis, a.units, a.amplitude)]
+    open_shapes = open_shapes[: K - len(units)]
+    slots = [slots_with(study, yard.elements, [*units, *open_shapes], k) for k in study.fitted] if units else []
+    # amplitudes in the order of the accepted: those of slots are stepped, those of readings are linear
+    stepped = np.concatenate([np.full(len(a.amplitude), bool(a.units)) for a in accepted])
+    amplitude = np.concatenate([a.amplitude for a in accepted])
+    D = np.zeros((len(y), len(amplitude)))
+    y = exchanged(study, y, accepted)
+    swapped = np.concatenate([np.full(len(a.amplitude), a.hypothesis.batch.kind == "swapped") for a in accepted])
+    gains = gains_of(study, accepted)
+    mean, inverse_prior = (np.concatenate(p) for p in zip(*(priors(a.hypothesis) for a in accepted), strict=True))
+    floor = np.concatenate([lowest(a.hypothesis) for a in accepted])
+    for _ in range(REFITS):
+        there = shifted(study, x, gains, amplitude)
+        _, J = fitter.surrogate.at(there)
+        first = 0
+        for a in accepted:
+            own = slice(first, first + len(a.amplitude))
+            first = own.stop
+            if not a.units:
+                D[:, own] = read_columns(yard, a, amplitude[own])
+        for i, j in gains:  # a parameter beyond its prior: its own column, per unit of the amplitude
+            D[:, i] = yard.whiten(J[:, [j]])[:, 0] / study.scale[j]
+        if units:
+            now = [*amplitude[stepped], *np.zeros(len(open_shapes))]
+            parts = [study.by_amplitudes(k, there, slot, now) for k, slot in zip(study.fitted, slots, strict=True)]
+            f = np.concatenate([p for p, _ in parts])
+            every = np.vstack([d for _, d in parts])
+            exact, shapes = every[:, : len(units)], every[:, len(units) : len(units) + len(open_shapes)]
+            D[:, stepped] = yard.whiten(exact)
+        else:
+            f = np.concatenate([study.outputs(k, there) for k in study.fitted])
+            exact = shapes = np.zeros((len(y), 0))
+        residual = y - f + J @ x + exact @ amplitude[stepped]
+        white = yard.whiten(residual)
+        for i, _ in gains:
+            white = white + D[:, i] * amplitude[i]
+        errors = np.hstack([_own_errors(study, D, accepted, amplitude), yard.whiten(shapes)])
+        projector = fitter.projector(J, errors)
+        PD = projector(D)
+        F = D.T @ PD + np.diag(inverse_prior)
+        found = solved(F, PD.T @ white + inverse_prior * mean, floor)
+        nuisance = np.clip(projector.most_likely(white - D @ found)[: len(x)], low, high)
+        step = np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))
+        moved = max(float(np.abs(nuisance - x).max(initial=0.0)), float(step.max(initial=0.0)))
+        x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, accepted))
+        if moved < 0.1:
+            break
+    inverse = np.linalg.pinv(F)
+    result, first = [], 0
+    for a in accepted:
+        own = slice(first, first + len(a.amplitude))
+        result.append(replace(a, amplitude=amplitude[own], covariance=inverse[own, own]))
+        first = own.stop
+    more = np.hstack([WIDE * D * np.sqrt(np.diag(inverse)), errors])
+    bare = np.concatenate([study.outputs(k, there) for k in study.fitted]) if units else f
+    return Fitted(x, J, residual, fitter.projector(J, more), f - bare, more), result
+
+
+def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], amplitude: np.ndarray) -> np.ndarray:
+    """(m, k) white: what channels may show of causes in the machine beside what the model says."""
+    parts, first = [np.zeros((len(D), 0))], 0
+    for a in accepted:
+        own = slice(first, first + len(a.amplitude))
+        first = own.stop
+        if a.units:
+            parts.append(of_channels(study, D[:, own] @ amplitude[own]))
+    return np.hstack(parts)
+
+
+def _limited(found: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
+    """Amplitudes that no exchange becomes negative by: relative changes stay above -0.97."""
+    result, first = found.copy(), 0
+    for a in accepted:
+        if a.hypothesis.batch.kind in RELATIVE:
+            result[first] = max(result[first], -0.97)
+        first += len(a.amplitude)
+    return result
