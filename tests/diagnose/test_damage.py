@@ -134,6 +134,9 @@ def test_a_play_stays_behind_until_it_is_used_up():
     assert np.abs(slip[:, 0]).max() == pytest.approx(2.0)
     assert slip[9, 0] == pytest.approx(-2.0)  # behind while it moves on
     assert slip[-1, 0] == pytest.approx(2.0)  # and on the other side on the way back
+    gap = np.where(np.arange(20)[:, None] == 0, np.nan, run.tcp.displacement)
+    after = damaged(replace(run, tcp=replace(run.tcp, displacement=gap)), of_kind("slip", "play")).tcp.displacement
+    assert np.isfinite(after[1:]).all()
     pairs = replace(run.tcp, time=np.repeat(run.tcp.time[::2], 2) + np.tile([0.0, 60.0], 10))
     one = displacement(of_kind("slip", "play"), replace(run, tcp=pairs))[:, 0].reshape(10, 2)
     np.testing.assert_allclose(one[:, 0], one[:, 1], atol=1e-9)  # rows of one measurement

@@ -161,11 +161,13 @@ def _slip(run: Run, d: Damage) -> Run:
     assert run.tcp is not None
     group = np.concatenate([[0], np.cumsum(np.diff(time) > SET_GAP)])
     level = np.bincount(group, run.tcp.displacement[:, c]) / np.bincount(group)
-    held, behind = level[0], np.zeros(len(level))
+    half, behind = abs(d.size) / 2, np.zeros(len(level))
+    held = level[np.isfinite(level)][0] if np.isfinite(level).any() else 0.0
     for i, value in enumerate(level):
-        held = min(max(held, value - d.size / 2), value + d.size / 2)
-        behind[i] = held - value
-    return with_tcp(run, d, behind[group] / d.size * acts(time, d))
+        if np.isfinite(value):
+            held = min(max(held, value - half), value + half)
+            behind[i] = held - value
+    return with_tcp(run, replace(d, size=1.0), behind[group] * acts(time, d))
 
 
 def _measured_drift(run: Run, d: Damage) -> Run:

@@ -58,8 +58,8 @@ def lost_candidates(lost: Lost, batches: Sequence[Batch], projector: Projector, 
     information = np.maximum((lost.responses * P).sum(axis=0), 1e-30)
     found = []
     for (kind, place), share, own in zip(lost.names, P.T @ white / information, information, strict=True):
-        batch = next(b for b in batches if b.kind == kind and f"contacts.{place}" in b.places)
-        if NEAR[0] < share < NEAR[1]:
+        batch = next((b for b in batches if b.kind == kind and f"contacts.{place}" in b.places), None)
+        if batch is not None and NEAR[0] < share < NEAR[1]:
             always = next(h for h in batch.histories if h.name == "always")
             size = share * (LEFT - 1.0)
             i = batch.places.index(f"contacts.{place}")
