@@ -251,7 +251,9 @@ def _hidden(r: Result) -> str:
     if not r.get("truth"):
         return str(r["family"])
     truth = _truth(r)
-    return f"{truth['family']} {truth['place']}, {truth['history']}, {truth['size']:.3g} {truth['unit']}"
+    return f"{truth['family']} {truth['place']}, {truth['history']}, {truth['size']:.3g} {truth['unit']}".removesuffix(
+        " 1"
+    )
 
 
 def confusion(results: Sequence[Result]) -> tuple[list[str], list[list[str]]]:

@@ -15,8 +15,6 @@ from twin.diagnose.gain import predicted
 from twin.diagnose.search import search
 from twin.diagnose.verdict import limits_of, pulls_of, verdict_of
 
-pytestmark = pytest.mark.slow  # the yardstick of 64 synthetic measurements
-
 
 def measured(kind="", place="", size=0.0, seed=0):
     """(m,) what the machine shows with noise, and a cause that always acts."""

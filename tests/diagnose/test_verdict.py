@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.search import PULLED, search
-from twin.diagnose.verdict import verdict_of
+from twin.diagnose.verdict import CALIBRATED, STRAINED, strained_of, verdict_of
 
 
 @pytest.mark.parametrize(("pull", "wanted"), [(0.8, "nothing"), (4.5, "out_of_tolerance")])
@@ -30,3 +32,19 @@ def test_a_source_beyond_its_tolerance_is_out_of_it(pull, wanted):
     assert (cause.family, cause.place, cause.history) == ("loss_law", parameter.path.removesuffix(".gain"), "always")
     assert cause.statistic > PULLED**2
     assert 1.0 < cause.ci95[0] < np.exp(parameter.sigma * pull) < cause.ci95[1]  # freed of its tolerance
+
+
+def test_contacts_that_calibration_strains_are_told_with_what_they_became():
+    yard = small_case.yardstick()
+    parameters = yard.study.bench.parameters
+    contact = next(i for i, p in enumerate(parameters) if p.kind in ("contact", "joint"))
+    y = np.concatenate([yard.study.outputs(k, np.zeros(len(parameters))) for k in yard.study.fitted])
+    found = search(yard, y)
+    assert strained_of(found) == ()
+    x0 = found.x0.copy()
+    x0[contact] = -1.2 * STRAINED
+    (cause,) = strained_of(replace(found, x0=x0))
+    assert (cause.family, cause.parameter, cause.history) == ("joint", parameters[contact].path, CALIBRATED)
+    assert cause.statistic == pytest.approx(1.44 * cause.threshold)
+    assert cause.ci95[0] < cause.amplitude < cause.ci95[1]
+    assert cause.amplitude == pytest.approx(np.exp(-1.2 * STRAINED * parameters[contact].sigma))

@@ -58,11 +58,8 @@ def cause_of(a: Accepted, study: Study, x: np.ndarray) -> Cause:
         i = paths.index(f"{h.name.split('>')[0]}.gain")
         emitted = float(np.exp(study.scale[i] * x[i]))
         value, variance = value / emitted, variance / emitted**2
-    sigma = (
-        0.0
-        if h.batch.fixed
-        else float(np.hypot(np.sqrt(variance), OWN.get(h.family, OWN.get(kind, OWN_OTHERS)) * value))
-    )
+    own = OWN.get(h.family, OWN.get(kind, OWN_OTHERS)) * value
+    sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), own))
     low, high = value - 1.96 * sigma, value + 1.96 * sigma
     settings: dict[str, float | str] = {}
     if kind in RELATIVE:
