@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.accepted import parameter_of
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.search import PULLED, search
+from twin.diagnose.search import PULLED, _strained, search
 from twin.diagnose.verdict import CALIBRATED, STRAINED, strained_of, verdict_of
 
 
@@ -32,6 +33,21 @@ def test_a_source_beyond_its_tolerance_is_out_of_it(pull, wanted):
     assert (cause.family, cause.place, cause.history) == ("loss_law", parameter.path.removesuffix(".gain"), "always")
     assert cause.statistic > PULLED**2
     assert 1.0 < cause.ci95[0] < np.exp(parameter.sigma * pull) < cause.ci95[1]  # freed of its tolerance
+
+
+def test_films_without_a_declared_gain_are_not_asked_for_it():
+    """`[[parameters]]` may leave films out; their hypotheses are there all the same."""
+    yard = small_case.yardstick()
+    bench = yard.study.bench
+    told = tuple(replace(p, path=f"other.{i}") if p.kind == "film" else p for i, p in enumerate(bench.parameters))
+    other = replace(yard, study=replace(yard.study, bench=replace(bench, parameters=told)))
+    assert {b.kind for b in yard.columns.batches} >= {"gain", "group"}
+    film = next(p.path.removesuffix(".gain") for p in bench.parameters if p.kind == "film")
+    assert parameter_of(yard.study, film) is not None
+    assert parameter_of(other.study, film) is None
+    n = len(told)
+    y = np.concatenate([yard.study.outputs(k, np.zeros(n)) for k in yard.study.fitted])
+    assert _strained(other, y, yard.fitter(y), np.zeros(n), 0.5 * np.eye(n)) is None
 
 
 def test_contacts_that_calibration_strains_are_told_with_what_they_became():

@@ -27,18 +27,18 @@ class Accepted:
     rivals: tuple[tuple[Hypothesis, float], ...]  # nearly as likely, with the cosine to this one
 
 
-def parameter_of(study: Study, name: str) -> int:
-    """The declared parameter that a cause of kind "gain" is beyond its tolerance of."""
+def parameter_of(study: Study, name: str) -> int | None:
+    """The parameter of this path, or the gain of this source or film; None where `[[parameters]]` leaves it out."""
     paths = [p.path for p in study.bench.parameters]
-    return paths.index(name if name in paths else f"{name}.gain")
+    return next((paths.index(path) for path in (name, f"{name}.gain") if path in paths), None)
 
 
 def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
     """(amplitude, parameter) of causes that are a declared parameter beyond its tolerance."""
     result, first = [], 0
     for a in accepted:
-        if a.hypothesis.batch.kind == "gain":
-            result.append((first, parameter_of(study, a.hypothesis.name)))
+        if a.hypothesis.batch.kind == "gain" and (j := parameter_of(study, a.hypothesis.name)) is not None:
+            result.append((first, j))
         first += len(a.amplitude)
     return result
 

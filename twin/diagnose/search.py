@@ -164,7 +164,8 @@ def _strained(
     found = []
     for batch in yard.columns.batches:
         for i, name in enumerate(batch.places if batch.kind in ("gain", "group") else ()):
-            j = parameter_of(yard.study, name)
+            if (j := parameter_of(yard.study, name)) is None:
+                continue
             always = next(h for h in batch.histories if not h.windows)
             size = float(fitted.x[j] * yard.study.scale[j])
             if batch.kind == "group":

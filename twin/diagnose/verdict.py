@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted
+from twin.diagnose.accepted import Accepted, parameter_of
 from twin.diagnose.acted import RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
@@ -54,9 +54,8 @@ def cause_of(a: Accepted, study: Study, x: np.ndarray) -> Cause:
     kind, unit = h.batch.kind, h.batch.unit
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
     if h.family == "misplaced_source":  # the share of what the source emits, not of what the description says
-        paths = [p.path for p in study.bench.parameters]
-        i = paths.index(f"{h.name.split('>')[0]}.gain")
-        emitted = float(np.exp(study.scale[i] * x[i]))
+        i = parameter_of(study, h.name.split(">")[0])
+        emitted = 1.0 if i is None else float(np.exp(study.scale[i] * x[i]))
         value, variance = value / emitted, variance / emitted**2
     own = OWN.get(h.family, OWN.get(kind, OWN_OTHERS)) * value
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), own))
