@@ -23,18 +23,19 @@ FIVE_AXIS = next(path.parent for path in MACHINES if path.parent.name == "five_a
 
 @pytest.fixture
 def measured(tmp_path):
-    """A run folder with two sensors and the TCP, as if measured."""
+    """A run folder with two sensors and the TCP, as if measured: 20 um of growth, set by set."""
     log = read_run(SHORT)
     time = log.loads.time
     columns = {"bed_front": 20.0 + time / 3600.0, "plate": 21.0 + time / 1800.0}
-    rows = time[::60]
+    rows = time[:: max(1, round(900.0 / (time[1] - time[0])))]
+    growth = np.repeat(np.linspace(0.0, 20e-6, len(rows))[:, None], 3, axis=1)
     folder = tmp_path / "measured"
     write_run(
         folder,
         replace(
             log,
             temperatures=Table(time, columns, dict.fromkeys(columns, "degC")),
-            tcp=Tcp(rows, ("x",), np.zeros((len(rows), 1)), np.full((len(rows), 3), 2e-6)),
+            tcp=Tcp(rows, ("x",), np.zeros((len(rows), 1)), growth),
             synthetic=(),
         ),
     )
