@@ -7,11 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnose.acted import Unit, slots_with
+from twin.diagnose.acted import CONDUCTS, Unit, slots_with
 from twin.diagnose.batch import Hypothesis
-from twin.diagnose.readings import play
+from twin.diagnose.fitter import bounds
+from twin.diagnose.readings import late, play
 from twin.diagnose.study import Study
 from twin.diagnose.yardstick import Yardstick
+
+CURVED = ("slip", "clock")  # kinds that act on what is read, and not in proportion to their size
+ASIDE = 0.1  # of a size, by which such a one is moved for its derivative
 
 
 @dataclass(frozen=True)
@@ -28,9 +32,42 @@ class Accepted:
 
 
 def parameter_of(study: Study, name: str) -> int | None:
-    """The parameter of this path, or the gain of this source or film; None where `[[parameters]]` leaves it out."""
+    """The parameter of this path, or the gain of this source or film, or the conductance of this contact.
+
+    None where `[[parameters]]` leaves it out.
+    """
     paths = [p.path for p in study.bench.parameters]
-    return next((paths.index(path) for path in (name, f"{name}.gain") if path in paths), None)
+    return next((paths.index(p) for p in (name, f"{name}.gain", f"{name}.conductance") if p in paths), None)
+
+
+def freed(study: Study, h: Hypothesis) -> list[int]:
+    """The parameter, if any, that a cause takes the place of: it stays at its declared value.
+
+    Side by side the two would share one change.
+    """
+    if h.batch.kind not in ("gain", *CONDUCTS) or h.when.windows or h.when.signal:
+        return []
+    j = parameter_of(study, h.name)
+    return [] if j is None else [j]
+
+
+def jacobian(yard: Yardstick, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]]) -> np.ndarray:
+    """(m, n) derivatives by the parameters at x (n,), with causes of these amplitudes.
+
+    The surrogate knows nothing of causes, and a film of nine times its size changes what every other parameter does:
+    those that take a parameter's place are put there, as far as its bounds. Its own column is left empty.
+    """
+    study = yard.study
+    low, high = bounds(study)
+    there, held = x.copy(), list[int]()
+    for h, amplitude in causes:
+        for j in freed(study, h):
+            size = amplitude if h.batch.kind == "gain" else float(np.log1p(amplitude))
+            there[j] = np.clip(size / study.scale[j], low[j], high[j])
+            held.append(j)
+    J = yard.fitter.surrogate.at(there)[1]
+    J[:, held] = 0.0
+    return J
 
 
 def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
@@ -59,19 +96,38 @@ def with_shifts(study: Study, accepted: Sequence[Accepted], x: np.ndarray) -> np
 
 
 def readings_columns(yard: Yardstick, h: Hypothesis) -> np.ndarray:
-    """(m, q) white first-order responses of a hypothesis: exact for what acts on what is read, but for a play."""
+    """(m, q) white first-order responses of a hypothesis: exact for what acts on what is read, but for `CURVED`."""
     columns, weights = h.combination()
     return np.asarray(yard.columns.raw[:, columns].astype(float) @ weights.T)
 
 
-def read_columns(yard: Yardstick, a: Accepted, amplitude: np.ndarray) -> np.ndarray:
-    """(m, q) white responses of a cause that acts on what is read, at its amplitude (q,); none of swapped channels."""
-    if a.hypothesis.batch.kind == "swapped":  # `exchanged` has left nothing of it
-        return np.zeros((yard.columns.raw.shape[0], len(amplitude)))
-    if a.hypothesis.batch.kind == "slip":
-        name = a.hypothesis.name.removeprefix("tcp.")
-        return yard.whiten(play(yard.study, yard.nominal, name, abs(float(amplitude[0]))))[:, None]
-    return readings_columns(yard, a.hypothesis)
+def read_change(yard: Yardstick, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """(m,) white change by what acts on what is read, at its amplitude (q,); none of swapped channels.
+
+    x (n,): parameters that a clock's run is stepped with.
+    """
+    if h.batch.kind == "swapped":  # `exchanged` has left nothing of it
+        return np.zeros(yard.columns.raw.shape[0])
+    if h.batch.kind in CURVED:
+        return yard.whiten(curved_change(yard, h, float(amplitude[0]), x))
+    return np.asarray(readings_columns(yard, h) @ amplitude)
+
+
+def curved_change(yard: Yardstick, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
+    """(m,) likewise of the kinds CURVED, in what is measured."""
+    study = yard.study
+    if h.batch.kind == "slip":
+        return size * play(study, yard.nominal, h.name.removeprefix("tcp."), abs(size))
+    run = h.name.removeprefix("runs.")
+    states = {k: study.states(k, x) for k in study.fitted if study.runs[k].run.name == run}
+    return size * late(study, states, size)
+
+
+def curved_slope(yard: Yardstick, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
+    """(m,) its derivative by the size."""
+    by = ASIDE * max(abs(size), h.batch.smallest)
+    more, less = (curved_change(yard, h, size + d, x) for d in (by, -by))
+    return np.asarray((more - less) / (2.0 * by))
 
 
 def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twin.diagnose.accepted import CURVED, curved_change, curved_slope, freed, jacobian
 from twin.diagnose.acted import CONDUCTS, READINGS, units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.edges import STEP, Edge, edges_of, moved, with_pulses
@@ -22,12 +23,13 @@ from twin.diagnose.study import K
 from twin.diagnose.yardstick import Yardstick
 
 BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant")
-PASSES, WINDOW_PASSES = 3, 8
+PASSES, WINDOW_PASSES, READ_PASSES = 3, 8, 6
 ENTRANTS = 5  # candidates that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
 EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
 GONE = -0.7  # of a relative change, as a straight line
 WET = 40.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
+ENOUGH = 0.02  # of a size, that a pass moves it by when it has arrived
 HELD = 2  # passes in which its heat and edges are found for that film, before all are free
 BENDS = 2.5  # prior standard deviations that only something hidden moves a parameter by
 NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
@@ -79,7 +81,7 @@ def _saturated(h: Hypothesis) -> bool:
 
 
 def _bent(yard: Yardstick, h: Hypothesis) -> bool:
-    return h.batch.kind in BENT or (h.batch.kind not in READINGS and bool(edges_of(yard.study, h)))
+    return h.batch.kind in (*BENT, *CURVED) or (h.batch.kind not in READINGS and bool(edges_of(yard.study, h)))
 
 
 def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
@@ -87,6 +89,8 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
 
     y (m,): NaN where nothing was measured. What accepted causes do is added to what it does.
     """
+    if h.batch.kind in CURVED:
+        return _read_anew(yard, fitted, h)
     study = yard.study
     relative, q = h.batch.kind in CONDUCTS, h.batch.q
     a = np.array(h.amplitude)
@@ -102,13 +106,15 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
     mean, inverse = priors(h)
     if h.batch.kind == "coolant":  # a strong film saturates: a score that takes it for a straight line says little
         a[0] = WET
-    now = _Point(a, beginning(fitted.x), h)
+    x0 = beginning(fitted.x).copy()
+    x0[freed(study, h)] = 0.0
+    now = _Point(a, x0, h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
     held = HELD if h.batch.kind == "coolant" else 0
     for i in range(held + (PASSES if not inner else WINDOW_PASSES)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(yard, now, edges)
-        _, J = yard.fitter.surrogate.at(now.x)
+        J = jacobian(yard, now.x, [(h, float(now.a[0]))])
         projector = yard.fitter.projector(J, fitted.more)
         left = yard.whiten(y - fitted.beside - outputs + J @ now.x)
         removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
@@ -147,6 +153,22 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
     none = yard.whiten(y - fitted.beside - plain + J @ best.x)
     statistic += min(float(none @ yard.fitter.projector(J, fitted.more)(none)) - before, 0.0)
     return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
+
+
+def _read_anew(yard: Yardstick, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+    """A hypothesis about readings that are not in proportion to its size, at the size that removes most misfit."""
+    left = fitted.projector(yard.whiten(fitted.residual))
+    size, tried, x = h.amplitude[0], list[tuple[float, float]](), beginning(fitted.x)
+    for _ in range(READ_PASSES):
+        change, D = (yard.whiten(f(yard, h, size, x)) for f in (curved_change, curved_slope))
+        kept = left - fitted.projector(change)
+        tried.append((float(change @ (left + kept)), size))
+        step = float(D @ kept) / max(float(D @ fitted.projector(D)), 1e-30)
+        size += float(np.clip(step, -0.5 * abs(size), abs(size)))
+        if abs(step) < ENOUGH * abs(size):
+            break
+    statistic, best = max(tried)
+    return replace(h, statistic=max(statistic, 0.0), amplitude=(best,))
 
 
 def beginning(x: np.ndarray) -> np.ndarray:

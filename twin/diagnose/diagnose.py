@@ -116,7 +116,7 @@ def _closed(m: Measured) -> Measured:
 
 AFTER = (  # modules that only use a yardstick
     "accepted", "acted", "channels", "contest", "damage", "diagnose", "diagnosis", "edges", "edit", "extension", "gain",
-    "growth", "hide", "refit", "report", "search", "settled", "site", "verdict",
+    "growth", "hide", "refit", "report", "search", "settled", "site", "sizes", "verdict",
 )  # fmt: skip
 
 

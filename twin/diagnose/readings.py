@@ -2,7 +2,7 @@
 
 gain      parameter    one prior standard deviation of a declared parameter in ln or its unit
 offset    sensor       1 K;   drift  1 K/day;   lag  1 s;   detached  all of it;   swapped a<>b  all of it
-clock     run          1 s later than stated
+clock     run          1 s later than stated, to first order; exactly by `late`
 scale     axis<part    1 m/m/K of an encoder scale as warm as a part, from the middle of the stroke
 expansion part         100 % more
 slip      dx           1 m of play, seen at WIDTH; at other widths by `play`
@@ -13,7 +13,7 @@ probe     dx           1 m/s of drift;   frame dx:axis  1 m/m;   heated dx  1 m 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -124,10 +124,8 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
             made.append(w)
         return column(made)
 
-    z = []
-    for plan, own in zip(plans, nominal, strict=True):
-        step, share = np.asarray(plan.rows.step), np.asarray(plan.rows.share)[:, None]
-        z.append(own.states[step] + share * (own.states[step + 1] - own.states[step]))
+    z = [_state(own.states, np.asarray(p.rows.step) + np.asarray(p.rows.share))
+         for p, own in zip(plans, nominal, strict=True)]  # fmt: skip
     positions = [_positions(plan, t) for plan, t in zip(plans, times, strict=True)]
     axes = bench.base.load_model.axes
     for m, member in enumerate(body.members):
@@ -176,6 +174,37 @@ def play(study: Study, nominal: Sequence[Nominal], name: str, width: float) -> n
         w[:, c] = _play(plan, nominal[k], c, max(width, NARROW))
         parts.append(np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), w.ravel()]))
     return np.concatenate(parts)
+
+
+def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.ndarray:
+    """(m,) what the fitted runs read more where a clock is late by `seconds` [s], per second.
+
+    states: (n_fine + 1, r) of the runs, by their number, that this clock has stamped.
+    """
+    (body,) = study.bench.base.bodies
+    by = seconds if abs(seconds) > 1.0 else 1.0
+    parts = []
+    for k in study.fitted:
+        plan = study.runs[k]
+        T, w = np.zeros(plan.shapes[0]), np.zeros(plan.shapes[1])
+        if k in states:
+            z, steps = states[k], by / float(plan.run.drive.time[1] - plan.run.drive.time[0])
+            fine = np.arange(len(z), dtype=float)
+            read = z @ body.C.T[:, plan.measured.column]
+            moved = np.stack([np.interp(fine - steps, fine, v) for v in read.T], axis=1)
+            T = plan.measured.mean_of @ (moved - read)
+            at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
+            w = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), _state(z, at - steps) - _state(z, at))
+        parts.append(np.concatenate([T.ravel(), w.ravel()]) / by)
+    return np.concatenate(parts)
+
+
+def _state(states: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """(k, r) states (n + 1, r) between fine steps; the first one before the start."""
+    at = np.clip(at, 0.0, len(states) - 1.0)
+    step = np.minimum(at.astype(int), len(states) - 2)
+    share = (at - step)[:, None]
+    return np.asarray(states[step] + share * (states[step + 1] - states[step]))
 
 
 def _positions(plan: Planned, time: np.ndarray) -> np.ndarray:

@@ -7,8 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, exchanged, gains_of, read_columns, shifted
+from twin.diagnose.accepted import (
+    CURVED,
+    Accepted,
+    curved_change,
+    curved_slope,
+    exchanged,
+    freed,
+    gains_of,
+    jacobian,
+    readings_columns,
+    shifted,
+)  # fmt: skip
 from twin.diagnose.acted import RELATIVE, slots_with
+from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import lowest, priors, solved
 from twin.diagnose.edges import shape_errors
 from twin.diagnose.fitter import Fitted, bounds
@@ -17,7 +29,8 @@ from twin.diagnose.study import K, Study
 from twin.diagnose.yardstick import Yardstick
 
 WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
-REFITS = 5  # passes
+REFITS = 10  # passes
+LONGEST = 0.7  # step of the logarithm of a factor
 
 
 def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]) -> tuple[Fitted, list[Accepted]]:
@@ -37,17 +50,27 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
     gains = gains_of(study, accepted)
     mean, inverse_prior = (np.concatenate(p) for p in zip(*(priors(a.hypothesis) for a in accepted), strict=True))
     floor = np.concatenate([lowest(a.hypothesis) for a in accepted])
+    held = [j for a in accepted for j in freed(study, a.hypothesis)]
+    x = x.copy()
+    x[held] = 0.0
     for _ in range(REFITS):
         there = shifted(study, x, gains, amplitude)
-        _, J = fitter.surrogate.at(there)
-        first = 0
+        J = jacobian(yard, x, _sizes(accepted, amplitude))
+        first, bent = 0, np.zeros(len(y))
         for a in accepted:
             own = slice(first, first + len(a.amplitude))
             first = own.stop
-            if not a.units:
-                D[:, own] = read_columns(yard, a, amplitude[own])
+            if a.hypothesis.batch.kind in CURVED:
+                size = float(amplitude[own][0])
+                slope = curved_slope(yard, a.hypothesis, size, there)
+                D[:, own] = yard.whiten(slope)[:, None]
+                bent += size * slope - curved_change(yard, a.hypothesis, size, there)
+            elif a.hypothesis.batch.kind == "swapped":  # `exchanged` has left nothing of it
+                D[:, own] = 0.0
+            elif not a.units:
+                D[:, own] = readings_columns(yard, a.hypothesis)
         for i, j in gains:  # a parameter beyond its prior: its own column, per unit of the amplitude
-            D[:, i] = yard.whiten(J[:, [j]])[:, 0] / study.scale[j]
+            D[:, i] = yard.whiten(fitter.surrogate.at(there)[1][:, [j]])[:, 0] / study.scale[j]
         if units:
             now = [*amplitude[stepped], *np.zeros(len(open_shapes))]
             parts = [study.by_amplitudes(k, there, slot, now) for k, slot in zip(study.fitted, slots, strict=True)]
@@ -58,7 +81,7 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         else:
             f = np.concatenate([study.outputs(k, there) for k in study.fitted])
             exact = shapes = np.zeros((len(y), 0))
-        residual = y - f + J @ x + exact @ amplitude[stepped]
+        residual = y - f + J @ x + exact @ amplitude[stepped] + bent
         white = yard.whiten(residual)
         for i, _ in gains:
             white = white + D[:, i] * amplitude[i]
@@ -70,7 +93,7 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         nuisance = np.clip(projector.most_likely(white - D @ found)[: len(x)], low, high)
         step = np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))
         moved = max(float(np.abs(nuisance - x).max(initial=0.0)), float(step.max(initial=0.0)))
-        x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, accepted))
+        x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
         if moved < 0.1:
             break
     inverse = np.linalg.pinv(F)
@@ -95,11 +118,23 @@ def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], ampli
     return np.hstack(parts)
 
 
-def _limited(found: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
-    """Amplitudes that no exchange becomes negative by: relative changes stay above -0.97."""
+def _sizes(accepted: Sequence[Accepted], amplitude: np.ndarray) -> list[tuple[Hypothesis, float]]:
+    """Every cause with its first amplitude."""
+    first = np.cumsum([0, *(len(a.amplitude) for a in accepted)])
+    return [(a.hypothesis, float(amplitude[i])) for a, i in zip(accepted, first, strict=False)]
+
+
+def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
+    """Amplitudes after a step; factors move by their logarithms, of which a step is no longer than LONGEST."""
     result, first = found.copy(), 0
     for a in accepted:
+        old, new = before[first], found[first]
         if a.hypothesis.batch.kind in RELATIVE:
-            result[first] = max(result[first], -0.97)
+            step = np.clip((new - old) / (1.0 + old), -LONGEST, LONGEST)
+            result[first] = (1.0 + old) * np.exp(step) - 1.0
+        elif a.hypothesis.batch.kind == "gain":
+            result[first] = np.clip(new, old - LONGEST, old + LONGEST)
+        elif a.hypothesis.batch.kind in CURVED:
+            result[first] = np.clip(new, old - 0.5 * abs(old), old + 0.5 * abs(old))
         first += len(a.amplitude)
     return result

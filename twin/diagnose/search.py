@@ -7,7 +7,7 @@ too small to name or negative, is dropped and not looked at again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from twin.diagnose.lost import lost_candidates
 from twin.diagnose.refit import refit
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight, sight
+from twin.diagnose.sizes import sized_candidates
 from twin.diagnose.study import K, Study
 from twin.diagnose.unknown import Heat, evidence
 from twin.diagnose.yardstick import Yardstick
@@ -33,6 +34,7 @@ LATER = 2.5  # times its threshold that a cause beside another one needs: the fi
 TRIES = 3  # rounds of candidates that the exact model refuses
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
 WINDOWS = 4  # in which a cause comes and goes at one place; what does so more often has a history that no name tells
+FEW = 2  # windows likewise that a cause may have and still leave heat where it is
 SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
 NAMED = 0.7  # share of its own threshold that a name needs where another one passes
@@ -76,6 +78,10 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
         seen, ranked, step = _look(yard, fitted)
+        if restless := _restless(yard, accepted, step.parts):
+            imitated = True
+            fitted, accepted = _without(yard, y, fitted, accepted, restless)
+            seen, ranked, step = _look(yard, fitted)
         steps.append(step)
         parts = step.parts
         used = sum((len(a.units) for a in accepted), 0)
@@ -116,14 +122,20 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         fitted, accepted = refit(yard, y, beginning(fitted.x), accepted)
         while weak := [a for a in accepted if not _stands(a)]:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
-            accepted = [a for a in accepted if a not in weak]
-            fitted, accepted = refit(yard, y, fitted.x, accepted) if accepted else (yard.fitter(y), accepted)
+            fitted, accepted = _without(yard, y, fitted, accepted, weak)
         if in_turn := _in_turn(yard.study, accepted):
             imitated = True
-            accepted = [a for a in accepted if a not in in_turn]
-            fitted, accepted = refit(yard, y, fitted.x, accepted) if accepted else (yard.fitter(y), accepted)
+            fitted, accepted = _without(yard, y, fitted, accepted, in_turn)
     x, covariance = settled(yard, y, accepted) if accepted else (x0, covariance)
     return Search(yard, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance)
+
+
+def _without(
+    yard: Yardstick, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], dropped: Sequence[Accepted]
+) -> tuple[Fitted, list[Accepted]]:
+    """The fit with the accepted causes that are not dropped."""
+    left = [a for a in accepted if a not in dropped]
+    return refit(yard, y, fitted.x, left) if left else (yard.fitter(y), left)
 
 
 def _look(yard: Yardstick, fitted: Fitted) -> tuple[Sight, list[Hypothesis], Step]:
@@ -131,7 +143,8 @@ def _look(yard: Yardstick, fitted: Fitted) -> tuple[Sight, list[Hypothesis], Ste
     white = yard.whiten(fitted.residual)
     seen = sight(yard.columns, fitted.projector, white)
     lost = lost_candidates(yard.lost, yard.columns.batches, fitted.projector, white)
-    ranked = _distinct(sorted([*best(seen.ready, seen.g), *lost], key=lambda h: -h.statistic))
+    sized = sized_candidates(yard, fitted.projector, white)
+    ranked = _distinct(sorted([*best(seen.ready, seen.g), *lost, *sized], key=lambda h: -h.statistic))
     top = ranked[:10]
     return seen, ranked, Step(tuple(top), _cosines(yard, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
 
@@ -140,15 +153,31 @@ def _closed(
     yard: Yardstick, y: np.ndarray, before: Fitted, relaxed: tuple[Fitted, Accepted], x0: np.ndarray
 ) -> Search | None:
     """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
-    what was seen before is too strong to be a number that merely pulls."""
+    something else that was seen before explains more."""
     fitted, one = relaxed
     _, ranked, first = _look(yard, before)
     seen, left, last = _look(yard, fitted)
-    weak = all(h.statistic < LATER * yard.thresholds[h.family] for h in [*ranked, *left])
-    if not weak or max(last.parts.values(), default=0.0) > yard.thresholds["unknown"]:
+    misfits = (1.0 - COVERS) * one.statistic  # that it may leave
+    if not _weak(yard, left, misfits) or max(last.parts.values(), default=0.0) > max(
+        yard.thresholds["unknown"], misfits
+    ):
+        return None
+    removed = _misfit(yard, before) - _misfit(yard, fitted)
+    if not _weak(yard, ranked) and removed < max((h.statistic for h in ranked), default=0.0):
         return None
     x, covariance = settled(yard, y, (one,))
     return Search(yard, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance)
+
+
+def _weak(yard: Yardstick, ranked: Sequence[Hypothesis], misfits: float = 0.0) -> bool:
+    """Whether nothing is strong enough to be named beside another cause."""
+    return all(h.statistic < max(LATER * yard.thresholds[h.family], misfits) for h in ranked)
+
+
+def _misfit(yard: Yardstick, fitted: Fitted) -> float:
+    """Sum of squares of what a fit leaves, in units of noise and errors of form."""
+    white = yard.whiten(fitted.residual)
+    return float(white @ fitted.projector(white))
 
 
 def _strained(
@@ -177,8 +206,11 @@ def _strained(
         return None
     units = units_of(yard.study, top)
     one = Accepted(top, units, np.array(top.amplitude), np.eye(1), top.statistic, PULLED**2, ())
-    fitted, (one,) = refit(yard, y, fitted.x, [one])
-    return fitted, one
+    fitted, (one,) = refit(yard, y, beginning(fitted.x), [one])
+    change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
+    if top.batch.kind == "group":  # as a logarithm: derivatives at many times a film say little of the film itself
+        change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
+    return fitted, replace(one, statistic=(change / sigma) ** 2)
 
 
 def _with_more_windows(seen: Sight, h: Hypothesis) -> Hypothesis:
@@ -192,11 +224,25 @@ def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
 
 
 def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:
-    """Causes of several families that come and go at one part: together they imitate a history that none has."""
+    """Causes that come and go at one part, of several families or twice at one place: together they imitate a history
+    that none has."""
     passing = [(a, _parts(study, a.hypothesis.name)) for a in accepted if a.hypothesis.when.windows and a.units]
     return [
         a for a, own in passing
-        if any(own & other and b.hypothesis.family != a.hypothesis.family for b, other in passing)
+        if any(own & other and b is not a and _differ(a.hypothesis, b.hypothesis) for b, other in passing)
+    ]  # fmt: skip
+
+
+def _differ(a: Hypothesis, b: Hypothesis) -> bool:
+    return a.family != b.family or a.name == b.name
+
+
+def _restless(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
+    """Causes that come and go more than FEW times and leave heat at their part: a history that no name tells."""
+    return [
+        a for a in accepted
+        if len(a.hypothesis.when.windows) > FEW and a.hypothesis.when.bell is None and a.units
+        and any(parts.get(p, 0.0) > LATER * yard.thresholds["unknown"] for p in _parts(yard.study, a.hypothesis.name))
     ]  # fmt: skip
 
 
@@ -214,9 +260,8 @@ def _stands(a: Accepted) -> bool:
     if batch.fixed:
         return True
     first = float(a.amplitude[0])
-    explained = float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude)
     return (
-        explained > STANDS * a.threshold
+        float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude) > STANDS * a.threshold
         and abs(first) >= 0.5 * batch.smallest
         and (batch.sign == 0 or batch.sign * first > 0.0)
     )

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, exchanged, read_columns, stepped, with_shifts
+from twin.diagnose.accepted import Accepted, exchanged, freed, read_change, stepped, with_shifts
 from twin.diagnose.fitter import CLOSE, bounds
 from twin.diagnose.study import Study
 from twin.diagnose.yardstick import Yardstick
@@ -32,17 +32,19 @@ def settled(yard: Yardstick, y: np.ndarray, accepted: Sequence[Accepted]) -> tup
     N = yard.fitter.others
     W = 1.0 / (1.0 + _rows(study) * (N**2).sum(axis=1))
     y = exchanged(study, y, accepted)
-    read = np.zeros(len(y))
-    for a in accepted:
-        if not a.units and a.hypothesis.batch.kind != "gain":
-            read += read_columns(yard, a, a.amplitude) @ a.amplitude
+    reading = [a for a in accepted if not a.units and a.hypothesis.batch.kind != "gain"]
+    held = [j for a in accepted for j in freed(study, a.hypothesis)]
     x = np.zeros(len(low))
     for _ in range(PASSES):
         before = x
         there = with_shifts(study, accepted, x)
+        read = np.zeros(len(y))
+        for a in reading:
+            read += read_change(yard, a.hypothesis, a.amplitude, there)
         beside = np.concatenate([stepped(yard, accepted, k, there) for k in study.fitted]) - surrogate.at(there)[0]
         for _ in range(INNER):
             f, J = surrogate.at(with_shifts(study, accepted, x))
+            J[:, held] = 0.0
             white = whiten(J)
             A = np.linalg.inv(np.eye(len(x)) + white.T @ (W[:, None] * white))
             found = A @ (white.T @ (W * (whiten(y - f - beside + J @ x) - read)))

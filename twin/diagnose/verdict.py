@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, parameter_of
+from twin.diagnose.accepted import Accepted, freed, parameter_of
 from twin.diagnose.acted import RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
@@ -32,6 +32,7 @@ STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint"
 # of films are known least, and temperatures that nobody measured.
 OWN = {
     "film": 0.12,
+    "group": 0.12,
     "group_film": 0.12,
     "coolant": 0.12,
     "scale": 0.12,
@@ -138,7 +139,9 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     groups = {f.name: f.group for f in families}
     thresholds = found.yardstick.thresholds
     left = max(found.steps[-1].parts.values(), default=0.0)
-    before = max(found.steps[0].parts.values(), default=0.0)
+    # a declared number out of its tolerance had been fitted before, as far as its tolerance went
+    relaxed = [a.statistic for a in found.accepted if freed(found.yardstick.study, a.hypothesis)]
+    before = max([*found.steps[0].parts.values(), *relaxed], default=0.0)
     causes = tuple(cause_of(a, found.yardstick.study, found.x) for a in found.accepted)
     if left > thresholds["unknown"] and (not causes or left > REMAINDER * before):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine

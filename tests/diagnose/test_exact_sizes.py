@@ -1,0 +1,105 @@
+"""Causes that are not in proportion to their size come out at their size: clocks, plays, films many times as strong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from twin.diagnose.accepted import freed, parameter_of
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.contest import exact
+from twin.diagnose.readings import late
+from twin.diagnose.search import search
+from twin.diagnose.sizes import sized_candidates
+from twin.diagnose.verdict import verdict_of
+
+
+def noise(seed):
+    """(m,) of sensors and TCP."""
+    study, rng = small_case.study(), np.random.default_rng(seed)
+    parts = []
+    for k in study.fitted:
+        (b, s), (rows, _) = study.runs[k].shapes
+        sigma = np.concatenate([np.full(b * s, small_case.NOISE / np.sqrt(5)), np.full(rows * 3, 3e-7)])
+        parts.append(sigma * rng.standard_normal(len(sigma)))
+    return np.concatenate(parts)
+
+
+def clean(x=None):
+    """(m,) of the fitted runs."""
+    study = small_case.study()
+    x = np.zeros(len(study.bench.parameters)) if x is None else x
+    return np.concatenate([study.outputs(k, x) for k in study.fitted])
+
+
+def test_a_late_clock_reads_what_was_there_before():
+    study = small_case.study()
+    k = study.fitted[0]
+    x = np.zeros(len(study.bench.parameters))
+    whole = late(study, {k: study.states(k, x)}, 600.0) * 600.0
+    T = study.runs[k].split(clean()[: study.runs[k].size])[0]
+    moved = study.runs[k].split(whole[: study.runs[k].size])[0]
+    bins = round(600.0 / float(np.diff(study.runs[k].measured.bin_time)[0]))
+    np.testing.assert_allclose((T + moved)[bins + 1 : -1], T[1 : -bins - 1], atol=1e-6)  # the last bin is a half one
+    assert not whole[study.runs[k].size :].any()
+
+
+@pytest.mark.parametrize("seconds", [-60.0, 90.0])
+def test_a_clock_is_found_at_its_size(seconds):
+    study = small_case.study()
+    k = study.fitted[1]
+    x = 0.5 * np.random.default_rng(8).standard_normal(len(study.bench.parameters))
+    y = clean(x) + seconds * late(study, {k: study.states(k, x)}, seconds) + noise(8)
+    verdict, causes = verdict_of(search(small_case.yardstick(), y), FAMILIES)
+    assert (verdict, causes[0].history) == ("signal", "clock")
+    assert causes[0].place == f"runs.{study.runs[k].run.name}"
+    assert causes[0].amplitude == pytest.approx(seconds, rel=0.08)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_a_play_is_found_at_its_width(share):
+    """Made of the displacements alone, row by row: none of the model's own play."""
+    study, y = small_case.study(), clean()
+    first, total = 0, 0.0
+    for k in study.fitted:
+        (b, s), shape = study.runs[k].shapes
+        own = y[first + b * s : first + study.runs[k].size].reshape(shape)
+        total = max(total, float(np.ptp(own[:, 2])))
+        first += study.runs[k].size
+    width, first = share * total, 0
+    for k in study.fitted:
+        (b, s), shape = study.runs[k].shapes
+        own, held = y[first + b * s : first + study.runs[k].size].reshape(shape), 0.0
+        for i, value in enumerate(own[:, 2].copy()):
+            held = min(max(held, value - width / 2), value + width / 2)
+            own[i, 2] = held
+        first += study.runs[k].size
+    yard = small_case.yardstick()
+    fitted = yard.fitter(y)
+    white = yard.whiten(fitted.residual)
+    best = max(
+        (h for h in sized_candidates(yard, fitted.projector, white) if h.name == "tcp.dz"), key=lambda h: h.statistic
+    )
+    assert best.statistic > 36.0
+    found = exact(yard, y, fitted, best)
+    assert found.statistic >= 0.99 * best.statistic
+    assert found.amplitude[0] == pytest.approx(width, rel=0.25)
+
+
+def test_a_film_many_times_as_strong_takes_its_parameter_along():
+    """Eight times the film of the front: far beyond the bounds of the parameter, and told as one number."""
+    study = small_case.study()
+    j = next(i for i, p in enumerate(study.bench.parameters) if p.path.startswith("films.") and p.kind == "film")
+    x = np.zeros(len(study.bench.parameters))
+    x[j] = np.log(8.0) / study.scale[j]
+    found = search(small_case.yardstick(), clean(x) + noise(9))
+    verdict, causes = verdict_of(found, FAMILIES)
+    assert verdict == "out_of_tolerance"
+    place = study.bench.parameters[j].path.removesuffix(".gain")
+    assert (causes[0].family, causes[0].place) == ("film_gain", place)
+    low, high = causes[0].ci95
+    assert low < 8.0 < high
+    (one,) = found.accepted
+    assert freed(study, one.hypothesis) == [j] == [parameter_of(study, place)]
+    assert found.x[j] == pytest.approx(0.0, abs=1e-9)
