@@ -36,8 +36,8 @@ SETTINGS = Settings(temperature_sigma=NOISE)
 NULLS, EACH = 200, 10
 SIZES = (1.0, 0.5, 2.0)
 MORE = (("outside", 20), ("null_law", 10), ("pair", 10), ("two", 10), ("effect_and_sensor", 10))
-FAST = 2  # rounds that all nulls are in
-FIRST = 4000  # seed of the first trial: none that anything was tuned on
+FAST = 4  # rounds that all nulls are in
+FIRST = 4100  # seed of the first trial: none that anything was tuned on
 
 Item = tuple[str, float, int]
 
@@ -48,9 +48,9 @@ def items() -> list[Item]:
     result: list[Item] = []
     for k in range(EACH):
         nulls = range(min(k * NULLS // FAST, NULLS), min((k + 1) * NULLS // FAST, NULLS))
-        result += [("null", 1.0, FIRST + i) for i in nulls]
         result += [(family, size, FIRST + k) for size in SIZES for family in families]
         result += [(name, 1.0, FIRST + i) for name, n in MORE for i in range(k * n // EACH, (k + 1) * n // EACH)]
+        result += [("null", 1.0, FIRST + i) for i in nulls]
     return result
 
 
