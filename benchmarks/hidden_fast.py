@@ -184,7 +184,8 @@ class Effects:
     acting: Callable[[int, Drive], Acting] = lambda _run, _drive: Acting()  # the drive as the machine feels it
     loads: Callable[[int, Drive], Drive] = lambda _run, drive: drive  # of the description: what really drives
     shape: Callable[[MachineModel], MachineModel] = lambda model: model  # the reduced machine made another
-    laws: bool = False  # whether `shape` changes laws, so that the logs must be evaluated anew
+    really: Callable[[int, Run], Run] = lambda _run, log: log  # the loads that the machine had where the log is wrong
+    laws: bool = False  # whether `shape` changes laws, or `really` loads: the logs must be evaluated anew
     warm: Mapping[tuple[int, str], float] = field(default_factory=dict)  # (run, body) -> K warmer at the start
     late: Mapping[int, float] = field(default_factory=dict)  # run -> s that its measurements are behind their times
 
@@ -196,7 +197,9 @@ def fast_truth(fast: Fast, values: Mapping[str, float], effects: Effects = Effec
     """
     nominal = effects.shape(_slotted(fast, effects))
     there = with_values(nominal, fast.parameters, values)
-    made = [_evaluated(pruned(nominal), run, STEP) for run in runs()] if effects.laws else _nominal_drives()
+    made = _nominal_drives()
+    if effects.laws:
+        made = [_evaluated(pruned(nominal), effects.really(r, log), STEP) for r, log in enumerate(runs())]
     prepared = prepare(there)
     bare, wanted = pruned(nominal).load_model, pruned(there).load_model
     C, T_ref = np.asarray(prepared.system.C), there.reference_temperature

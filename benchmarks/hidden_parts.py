@@ -87,6 +87,11 @@ def together(parts: Sequence[Part]) -> Part:
             model = p.effects.shape(model)
         return model
 
+    def really(r: int, log: Run) -> Run:
+        for p in parts:
+            log = p.effects.really(r, log)
+        return log
+
     def readings(r: int, run: Run, clean: Clean) -> Run:
         for p in parts:
             run = p.readings(r, run, clean)
@@ -104,7 +109,7 @@ def together(parts: Sequence[Part]) -> Part:
     effects = Effects(
         heats=tuple(dict.fromkeys(h for p in parts for h in p.effects.heats)),
         films=tuple(dict.fromkeys(f for p in parts for f in p.effects.films)),
-        acting=acting, loads=loads, shape=shape, laws=any(p.effects.laws for p in parts),
+        acting=acting, loads=loads, shape=shape, really=really, laws=any(p.effects.laws for p in parts),
         warm={k: v for p in parts for k, v in p.effects.warm.items()},
         late={k: v for p in parts for k, v in p.effects.late.items()},
     )  # fmt: skip

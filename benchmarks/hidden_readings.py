@@ -102,7 +102,10 @@ def _stuck(rng: np.random.Generator, name: str) -> Part:
 
 
 def signal(rng: np.random.Generator, factor: float) -> Part:
-    """A current logged sqrt(2) or half as large, a speed twice as large, or a run's measurements 6 min late."""
+    """A current logged sqrt(2) times or half as large, a speed twice as large, or a run's measurements 6 min late.
+
+    The log is that of every trial, and the machine had other loads: what a diagnosis makes of loads alone serves all.
+    """
     if rng.random() < 0.25:
         return _clock(rng, factor)
     name = one_of(
@@ -110,11 +113,12 @@ def signal(rng: np.random.Generator, factor: float) -> Part:
     )
     logged = 2.0 if name.endswith("speed") else (math.sqrt(2.0), 0.5)[rng.integers(2)]
 
-    def logs(_: int, run: Run) -> Run:
-        return with_column(run, name, logged * np.asarray(run.loads.columns[name]))
+    def really(_: int, log: Run) -> Run:
+        return with_column(log, name, np.asarray(log.loads.columns[name]) / logged)
 
     # the size is what the logged values want, as a declaration corrected has it
-    return Part((Hidden("signal", f"signals.{name}", "factor", 1.0 / logged, "1", signal=name),), logs=logs)
+    hidden = Hidden("signal", f"signals.{name}", "factor", 1.0 / logged, "1", signal=name)
+    return Part((hidden,), Effects(really=really, laws=True))
 
 
 def _clock(rng: np.random.Generator, factor: float) -> Part:

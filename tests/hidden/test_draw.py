@@ -217,8 +217,9 @@ def test_the_signal_wants_the_factor_that_is_told():
     (hidden,) = part.hidden
     run, _ = made_up(0)
     name = hidden.place.removeprefix("signals.")
-    logged = part.logs(0, run).loads.columns[name]
-    np.testing.assert_allclose(hidden.size * logged, run.loads.columns[name])
+    was = part.effects.really(0, run).loads.columns[name]
+    np.testing.assert_allclose(hidden.size * run.loads.columns[name], was)
+    assert part.logs(0, run) is run  # the log is the one that is read
     assert hidden.size in (0.5, 2.0, pytest.approx(math.sqrt(0.5)))
 
 

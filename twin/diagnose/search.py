@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, exchanged, parameter_of, readings_columns
+from twin.diagnose.accepted import Accepted, exchanged, freed, parameter_of, readings_columns
 from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Hypothesis, best
 from twin.diagnose.contest import beginning, judged, proof
@@ -19,6 +19,7 @@ from twin.diagnose.fitter import Fitted
 from twin.diagnose.growth import grown
 from twin.diagnose.lost import lost_candidates
 from twin.diagnose.refit import refit
+from twin.diagnose.search_declared import declared_candidates, misfit
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight, sight
 from twin.diagnose.sizes import sized_candidates
@@ -36,6 +37,7 @@ COVERS = 0.9  # of the evidence for heat of any history that a name must explain
 WINDOWS = 4  # in which a cause comes and goes at one place; what does so more often has a history that no name tells
 FEW = 2  # windows likewise that a cause may have and still leave heat where it is
 SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
+ALIKE = 0.9  # cosine of what a signal's factor and a declared number do, from which the one may be the other
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
 NAMED = 0.7  # share of its own threshold that a name needs where another one passes
 STANDS = 0.5  # share of its threshold that a cause must explain beside the others
@@ -71,13 +73,14 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
     fitted = yard.fitter(y)
     x0, covariance = settled(yard, y, ())
+    declared = declared_candidates(yard, y, fitted)
     relaxed = _strained(yard, y, fitted, x0, covariance)
-    if relaxed and (closed := _closed(yard, y, fitted, relaxed, x0)):
+    if relaxed and (closed := _closed(yard, y, fitted, declared, relaxed, x0)):
         return closed
     accepted, steps = list[Accepted](), list[Step]()
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
-        seen, ranked, step = _look(yard, fitted)
+        seen, ranked, step = _look(yard, fitted, () if accepted or refused else declared)
         if restless := _restless(yard, accepted, step.parts):
             imitated = True
             fitted, accepted = _without(yard, y, fitted, accepted, restless)
@@ -138,46 +141,56 @@ def _without(
     return refit(yard, y, fitted.x, left) if left else (yard.fitter(y), left)
 
 
-def _look(yard: Yardstick, fitted: Fitted) -> tuple[Sight, list[Hypothesis], Step]:
-    """All hypotheses there, the best of every family and place first."""
+def _look(yard: Yardstick, fitted: Fitted, more: Sequence[Hypothesis] = ()) -> tuple[Sight, list[Hypothesis], Step]:
+    """All hypotheses there and some more, the best of every family and place first."""
     white = yard.whiten(fitted.residual)
     seen = sight(yard.columns, fitted.projector, white)
     lost = lost_candidates(yard.lost, yard.columns.batches, fitted.projector, white)
     sized = sized_candidates(yard, fitted.projector, white)
-    ranked = _distinct(sorted([*best(seen.ready, seen.g), *lost, *sized], key=lambda h: -h.statistic))
+    ranked = _distinct(sorted([*best(seen.ready, seen.g), *lost, *sized, *more], key=lambda h: -h.statistic))
     top = ranked[:10]
     return seen, ranked, Step(tuple(top), _cosines(yard, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
 
 
 def _closed(
-    yard: Yardstick, y: np.ndarray, before: Fitted, relaxed: tuple[Fitted, Accepted], x0: np.ndarray
-) -> Search | None:
+    yard: Yardstick, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis], relaxed: tuple[Fitted, Accepted],
+    x0: np.ndarray,
+) -> Search | None:  # fmt: skip
     """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
-    something else that was seen before explains more."""
+    something else that was seen before explains more. Signals that explain as much are its rivals."""
     fitted, one = relaxed
-    _, ranked, first = _look(yard, before)
+    _, ranked, first = _look(yard, before, declared)
     seen, left, last = _look(yard, fitted)
     misfits = (1.0 - COVERS) * one.statistic  # that it may leave
-    if not _weak(yard, left, misfits) or max(last.parts.values(), default=0.0) > max(
-        yard.thresholds["unknown"], misfits
-    ):
+    room = max(yard.thresholds["unknown"], misfits)
+    if not _weak(yard, left, misfits) or max(last.parts.values(), default=0.0) > room:
         return None
-    removed = _misfit(yard, before) - _misfit(yard, fitted)
-    if not _weak(yard, ranked) and removed < max((h.statistic for h in ranked), default=0.0):
+    removed = misfit(yard, before) - misfit(yard, fitted)
+    others = max((h.statistic - NEAR * any(h is d for d in declared) for h in ranked), default=0.0)
+    if not _weak(yard, ranked) and removed < others:
         return None
+    # both begin at the declared number: what either explains is the same but for what is left
+    as_much = (replace(h, statistic=h.statistic - removed + one.statistic) for h in declared)
+    rivals = tuple((h, 1.0) for h in as_much if h.statistic > one.statistic - NEAR and _reads(yard, h, one))
+    one = replace(one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals)
     x, covariance = settled(yard, y, (one,))
     return Search(yard, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance)
+
+
+def _reads(yard: Yardstick, signal: Hypothesis, one: Accepted) -> bool:
+    """Whether a factor of a signal does what a declared number does: it is read there, and nearly nowhere else."""
+    (j,) = freed(yard.study, one.hypothesis)
+    pair = np.column_stack([
+        readings_columns(yard, signal)[:, 0],
+        yard.whiten(yard.fitter.surrogate.at(np.zeros(len(yard.study.bench.parameters)))[1][:, j]),
+    ])  # fmt: skip
+    gram = pair.T @ pair
+    return bool(abs(gram[0, 1]) > ALIKE * np.sqrt(gram[0, 0] * gram[1, 1]))
 
 
 def _weak(yard: Yardstick, ranked: Sequence[Hypothesis], misfits: float = 0.0) -> bool:
     """Whether nothing is strong enough to be named beside another cause."""
     return all(h.statistic < max(LATER * yard.thresholds[h.family], misfits) for h in ranked)
-
-
-def _misfit(yard: Yardstick, fitted: Fitted) -> float:
-    """Sum of squares of what a fit leaves, in units of noise and errors of form."""
-    white = yard.whiten(fitted.residual)
-    return float(white @ fitted.projector(white))
 
 
 def _strained(
