@@ -189,10 +189,8 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
         T, w = np.zeros(plan.shapes[0]), np.zeros(plan.shapes[1])
         if k in states:
             z, steps = states[k], by / float(plan.run.drive.time[1] - plan.run.drive.time[0])
-            fine = np.arange(len(z), dtype=float)
             read = z @ body.C.T[:, plan.measured.column]
-            moved = np.stack([np.interp(fine - steps, fine, v) for v in read.T], axis=1)
-            T = plan.measured.mean_of @ (moved - read)
+            T = plan.measured.mean_of @ (_state(read, np.arange(len(z)) - steps) - read)
             at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
             w = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), _state(z, at - steps) - _state(z, at))
         parts.append(np.concatenate([T.ravel(), w.ravel()]) / by)

@@ -115,6 +115,9 @@ def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float) -> Rival:
 
 def remedy(a: Hypothesis, b: Hypothesis) -> str:
     """What would tell two causes apart that these data do not."""
+    wrong = next((h.name for h in (a, b) if h.family == "signal" and h.name.startswith("signals.")), None)
+    if wrong is not None:
+        return f"one reading of {wrong.split('*')[0]} beside an instrument, or what the drive's manual says it logs"
     if a.name != b.name and a.when.name == b.when.name:
         return f"a temperature sensor between {a.name} and {b.name}, nearer to one of them"
     signals = [h.when.signal for h in (a, b) if h.when.signal]
