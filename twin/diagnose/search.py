@@ -221,6 +221,8 @@ def _strained(
     one = Accepted(top, units, np.array(top.amplitude), np.eye(1), top.statistic, PULLED**2, ())
     fitted, (one,) = refit(yard, y, beginning(fitted.x), [one])
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
+    if not sigma > 0.0:  # it has run to where it changes nothing
+        return None
     if top.batch.kind == "group":  # as a logarithm: derivatives at many times a film say little of the film itself
         change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
     return fitted, replace(one, statistic=(change / sigma) ** 2)
