@@ -18,7 +18,7 @@ from twin.diagnose.accepted import (
     jacobian,
     readings_columns,
     shifted,
-)  # fmt: skip
+)
 from twin.diagnose.acted import RELATIVE, slots_with
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import lowest, priors, solved
