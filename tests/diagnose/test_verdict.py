@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,21 @@ def test_films_without_a_declared_gain_are_not_asked_for_it():
     n = len(told)
     y = np.concatenate([yard.study.outputs(k, np.zeros(n)) for k in yard.study.fitted])
     assert _strained(other, y, yard.fitter(y), np.zeros(n), 0.5 * np.eye(n)) is None
+
+
+def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch):
+    yard = small_case.yardstick()
+    study = yard.study
+    j = next(i for i, p in enumerate(study.bench.parameters) if p.kind == "source")
+    x = np.zeros(len(study.bench.parameters))
+    x[j] = 4.5
+    y = np.concatenate([study.outputs(k, x) for k in study.fitted])
+    fitted, half = yard.fitter(y), 0.5 * np.eye(len(x))
+    assert _strained(yard, y, fitted, x, half) is not None
+    module = sys.modules[search.__module__]
+    gone = lambda *a: (fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
+    monkeypatch.setattr(module, "refit", gone)
+    assert _strained(yard, y, fitted, x, half) is None
 
 
 def test_contacts_that_calibration_strains_are_told_with_what_they_became():

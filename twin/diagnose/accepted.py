@@ -113,13 +113,16 @@ def read_change(yard: Yardstick, h: Hypothesis, amplitude: np.ndarray, x: np.nda
     return np.asarray(readings_columns(yard, h) @ amplitude)
 
 
-def curved_change(yard: Yardstick, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
-    """(m,) likewise of the kinds CURVED, in what is measured."""
+def curved_change(yard: Yardstick, h: Hypothesis, size: float, x: np.ndarray | None) -> np.ndarray:
+    """(m,) likewise of the kinds CURVED, in what is measured; x None: of the nominal machine, which costs no step."""
     study = yard.study
     if h.batch.kind == "slip":
         return size * play(study, yard.nominal, h.name.removeprefix("tcp."), abs(size))
     run = h.name.removeprefix("runs.")
-    states = {k: study.states(k, x) for k in study.fitted if study.runs[k].run.name == run}
+    states = {
+        k: yard.nominal[k].states if x is None else study.states(k, x)
+        for k in study.fitted if study.runs[k].run.name == run
+    }  # fmt: skip
     return size * late(study, states, size)
 
 

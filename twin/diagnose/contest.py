@@ -37,6 +37,12 @@ LOW, HIGH = -0.99, 20.0  # of relative changes
 AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
 
 
+def misfit(yard: Yardstick, fitted: Fitted) -> float:
+    """Sum of squares of what a fit leaves, in units of noise and errors of form."""
+    white = yard.whiten(fitted.residual)
+    return float(white @ fitted.projector(white))
+
+
 def worth(h: Hypothesis) -> float:
     """A statistic less the price of its freedom: how many like it were tried, amplitudes, further windows."""
     tried = len(h.batch.places) * len(h.batch.histories)
@@ -98,8 +104,7 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
         a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, LOW, HIGH)  # as if temperatures were linear in t
     if h.when.bell is not None:
         h = moved(study, yard.elements, h, ())  # hours found by `growth` get their windows
-    none = yard.whiten(fitted.residual)
-    before = float(none @ fitted.projector(none))
+    before = misfit(yard, fitted)
     inner = edges_of(study, h)
     low, high = bounds(study)
     a = np.maximum(a, lowest(h))

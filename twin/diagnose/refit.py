@@ -30,6 +30,7 @@ from twin.diagnose.yardstick import Yardstick
 
 WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
 REFITS = 10  # passes
+GONE = -0.97  # of a relative change: what a score says beyond it would be an exchange the wrong way
 LONGEST = 0.7  # step of the logarithm of a factor
 
 
@@ -130,6 +131,7 @@ def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted]
     for a in accepted:
         old, new = before[first], found[first]
         if a.hypothesis.batch.kind in RELATIVE:
+            old = max(old, GONE)
             step = np.clip((new - old) / (1.0 + old), -LONGEST, LONGEST)
             result[first] = (1.0 + old) * np.exp(step) - 1.0
         elif a.hypothesis.batch.kind == "gain":

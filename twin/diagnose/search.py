@@ -14,12 +14,12 @@ import numpy as np
 from twin.diagnose.accepted import Accepted, exchanged, freed, parameter_of, readings_columns
 from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Hypothesis, best
-from twin.diagnose.contest import beginning, judged, proof
+from twin.diagnose.contest import beginning, judged, misfit, proof
 from twin.diagnose.fitter import Fitted
 from twin.diagnose.growth import grown
 from twin.diagnose.lost import lost_candidates
 from twin.diagnose.refit import refit
-from twin.diagnose.search_declared import declared_candidates, misfit
+from twin.diagnose.search_declared import declared_candidates
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight, sight
 from twin.diagnose.sizes import sized_candidates

@@ -10,17 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.contest import misfit
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.yardstick import Yardstick
 
 CLOSELY = 3  # factors that are looked at again where their parameters are
 PASSES = 4
-
-
-def misfit(yard: Yardstick, fitted: Fitted) -> float:
-    """Sum of squares of what a fit leaves, in units of noise and errors of form."""
-    white = yard.whiten(fitted.residual)
-    return float(white @ fitted.projector(white))
 
 
 def declared_candidates(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:

@@ -7,10 +7,12 @@ others are scored when they are looked for.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from twin.diagnose.batch import Batch, Hypothesis
-from twin.diagnose.readings import late, play
+from twin.diagnose.accepted import curved_change
+from twin.diagnose.batch import Hypothesis
 from twin.diagnose.whiten import Projector
 from twin.diagnose.yardstick import Yardstick
 
@@ -26,20 +28,10 @@ def sized_candidates(yard: Yardstick, projector: Projector, white: np.ndarray) -
     for batch in yard.columns.batches:
         for i in range(len(batch.places) if batch.kind in SIZES else 0):
             for size in SIZES[batch.kind]:
-                change = yard.whiten(_change(yard, batch, i, size))
+                h = Hypothesis(batch, i, batch.histories[0], 0.0, (size,), 0.0)
+                change = yard.whiten(curved_change(yard, h, size, None))
                 P = projector(change)
                 statistic = float(P @ (2.0 * white - change))
                 if statistic > 0.0:
-                    information = float(P @ change) / size**2
-                    found.append(Hypothesis(batch, i, batch.histories[0], statistic, (size,), information))
+                    found.append(replace(h, statistic=statistic, information=float(P @ change) / size**2))
     return found
-
-
-def _change(yard: Yardstick, batch: Batch, i: int, size: float) -> np.ndarray:
-    """(m,) of the nominal machine."""
-    study, name = yard.study, batch.places[i]
-    if batch.kind == "slip":
-        return size * play(study, yard.nominal, name.removeprefix("tcp."), size)
-    run = name.removeprefix("runs.")
-    states = {k: yard.nominal[k].states for k in study.fitted if study.runs[k].run.name == run}
-    return size * late(study, states, size)
