@@ -21,10 +21,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jax.scipy.linalg import cho_solve
 
 from twin.calibrate.effects import Effects, Factors, contact_names, factors_at
 from twin.calibrate.march import Places, Rows
+from twin.diagnose.ports_first import Factor, basis, factor, held, solved, turned, within
 from twin.rom.drive import Drive
 from twin.rom.following import FilmPlan, difference_place, film_state, read_table, temperature_place
 from twin.rom.model import MachineModel
@@ -78,6 +78,15 @@ def no_slots(n: int, m: int, K: int, r: int, model: MachineModel) -> Slots:
         rise=np.zeros((n, m, K)), forcing=np.zeros((n, m, K, r)), film=np.zeros((n, K, len(load.films))),
         joint=np.zeros((n, K, len(load.joints))), contact=np.zeros((n, K, len(contact_names(model)))),
         environment=np.zeros((n, m, K, len(load.environments))), initial=np.zeros((K, r)),
+    )  # fmt: skip
+
+
+def first_slots(slots: Slots, k: int) -> Slots:
+    """The first k of them."""
+    return Slots(
+        A=slots.A[:k], M=slots.M[:k], E=slots.E[:k], gate=slots.gate[:, :k], rise=slots.rise[:, :, :k],
+        forcing=slots.forcing[:, :, :k], film=slots.film[:, :k], joint=slots.joint[:, :k],
+        contact=slots.contact[:, :k], environment=slots.environment[:, :, :k], initial=slots.initial[:k],
     )  # fmt: skip
 
 
@@ -141,44 +150,49 @@ def gammas(places: Places, loads: Loads, contact: np.ndarray, n_ports: int) -> n
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))
 def _solved(
-    places: Places, many: bool, factor: jax.Array, c: jax.Array, terms: jax.Array, contact: jax.Array,
+    places: Places, many: bool, known_factor: Factor, c: jax.Array, terms: jax.Array, contact: jax.Array,
     segments: tuple[Array, Array, Array], P: jax.Array, known: jax.Array,
 ) -> jax.Array:  # fmt: skip
-    """S^-1 known, by the Cholesky factor of S = c + P Gamma P^T (many: c . terms in c's place).
+    """S^-1 known, by the factor of S = c + P Gamma P^T (many: c . terms in c's place).
 
     Derivatives come with c, contact and known; the factor's are not looked at.
 
     Few derivatives: a matrix dc for each, made once. Many: the products of terms with the solution, which they share.
     The other way about, either takes several times as long.
     """
-    return jnp.asarray(cho_solve((factor, True), known))
+    return solved(known_factor, known)
 
 
 @_solved.defjvp
 def _solved_jvp(places: Places, many: bool, at: tuple, d: tuple) -> tuple[jax.Array, jax.Array]:
-    factor, _, terms, _, segments, P, known = at
+    known_factor, _, terms, _, segments, P, known = at
     _, dc, _, dcontact, _, _, dknown = d
-    x = cho_solve((factor, True), known)
+    x = solved(known_factor, known)
     dS = dc @ (terms @ x) if many else dc @ x
     diagonal, neighbour, weight = segments
     dS = dS + P @ flows(places, diagonal, neighbour, weight, dcontact, (P.T @ x)[:, None])[:, 0]
-    return x, cho_solve((factor, True), dknown - dS)
+    return x, solved(known_factor, dknown - dS)
 
 
 @dataclass(frozen=True)
 class Operators:
-    """What stays during a trajectory."""
+    """What stays during a trajectory, in the coordinates of `twin.diagnose.ports_first`."""
 
     A: jax.Array  # (p, r, r): terms of films and joints, then of slots
-    E: jax.Array  # (q, r, r): terms of the model's capacities, then of slots
-    factors: jax.Array  # (q,) of E
+    terms: jax.Array  # (q, r, r): of E: of the model's capacities, then of slots
+    factors: jax.Array  # (q,) of these
+    E: jax.Array  # (r, r), many: its derivatives left out
 
     @classmethod
-    def of(cls, system: System, effects: Effects, slots: Slots, f: Factors, a: jax.Array) -> Operators:
-        """At factors f and amplitudes a."""
-        A = jnp.concatenate([jnp.asarray(system.A[0]), jnp.asarray(slots.A)])
-        E = jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)])
-        return cls(A, E, jnp.concatenate([f.capacity - 1.0, a]))
+    def of(
+        cls, system: System, effects: Effects, slots: Slots, f: Factors, a: jax.Array, Q: jax.Array, many: bool
+    ) -> Operators:
+        """At factors f and amplitudes a; system: turned by Q."""
+        A = jnp.concatenate([jnp.asarray(system.A[0]), within(Q, slots.A)])
+        terms = within(Q, jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)]))
+        factors = jnp.concatenate([f.capacity - 1.0, a])
+        E = jnp.eye(len(Q)) + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
+        return cls(A, terms, factors, E)
 
 
 def _step(
@@ -216,19 +230,20 @@ def _step(
     P, rate = jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / GAMMA
     gate = a * jnp.asarray(slots.gate)
     coefficients = jnp.concatenate([jnp.concatenate([total, joints]) - jnp.asarray(system.nominal), gate])
-    held = lax.stop_gradient if many else jnp.asarray
-    E = jnp.eye(len(z)) + jnp.tensordot(held(fixed.factors), fixed.E, 1)
-    matrix = rate * E + jnp.asarray(system.A0[0]) + jnp.tensordot(held(coefficients), fixed.A, 1)
+    valued = lax.stop_gradient(coefficients) if many else coefficients
+    matrix = rate * fixed.E + jnp.asarray(system.A0[0]) + jnp.tensordot(valued, fixed.A, 1)
     if many:
-        c, terms = jnp.concatenate([coefficients, rate * fixed.factors]), jnp.concatenate([fixed.A, fixed.E])
+        c, terms = jnp.concatenate([coefficients, rate * fixed.factors]), jnp.concatenate([fixed.A, fixed.terms])
     else:
         c, terms = matrix, jnp.zeros(())
+    kept = held(lax.stop_gradient(matrix), P.shape[1])
+    R = P[: P.shape[1]]
 
     def capacity(x: jax.Array) -> jax.Array:
         if not many:
-            return rate * (E @ x)
+            return rate * (fixed.E @ x)
         change = fixed.factors - lax.stop_gradient(fixed.factors)
-        return rate * (E @ x + change @ (fixed.E @ lax.stop_gradient(x)))
+        return rate * (fixed.E @ x + change @ (fixed.terms @ lax.stop_gradient(x)))
 
     tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
     winding = T_ref + system.source_rows @ z
@@ -241,9 +256,9 @@ def _step(
         forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + system.B @ power + ports
         forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ M_slots + a @ jnp.asarray(slots.forcing)[i]
         diagonal, neighbour, weight = (jnp.asarray(v)[i] for v in (loads.diagonal, loads.neighbour, loads.weight))
-        gamma = flows(places, diagonal, neighbour, weight, lax.stop_gradient(contact), jnp.eye(P.shape[1]))
-        factor = jnp.linalg.cholesky(lax.stop_gradient(matrix) + P @ gamma @ P.T)
-        solve = partial(_solved, places, many, factor, c, terms, contact, (diagonal, neighbour, weight), P)
+        contacts = R @ flows(places, diagonal, neighbour, weight, lax.stop_gradient(contact), R.T)
+        now = factor(kept, contacts)
+        solve = partial(_solved, places, many, now, c, terms, contact, (diagonal, neighbour, weight), P)
         middle = solve(capacity(x) + forcing)
         after = solve(capacity(x + (1.0 - GAMMA) / GAMMA * (middle - x)) + forcing)
         return after, after
@@ -261,13 +276,17 @@ def trajectory(
     v = jnp.asarray(v)
     u, a = v[:n], v[n:]
     f = factors_at(effects, u)
+    Q = basis(system.P[0])
     z0 = jnp.asarray(start) + a @ jnp.asarray(slots.initial)
-    fixed = Operators.of(system, effects, slots, f, a)
+    system = turned(system, Q)
+    fixed = Operators.of(system, effects, slots, f, a, Q, many)
+    loads = replace(loads, contact_heat=jnp.asarray(loads.contact_heat) @ Q)
+    slots = replace(slots, M=jnp.asarray(slots.M) @ Q, forcing=jnp.asarray(slots.forcing) @ Q)
     steps = replace(slots, A=jnp.zeros(len(loads.rate)), M=jnp.zeros(len(loads.rate)), E=jnp.zeros(len(loads.rate)),
                     initial=jnp.zeros(len(loads.rate)))  # fmt: skip
     one = partial(_step, layout, places, many, system, effects, f, a, fixed, slots.M)
-    _, states = lax.scan(one, z0, (loads, steps))
-    return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0])])
+    _, states = lax.scan(one, z0 @ Q, (loads, steps))
+    return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0]) @ Q.T])
 
 
 def outputs_of(

@@ -32,6 +32,10 @@ WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good a
 REFITS = 10  # passes
 GONE = -0.97  # of a relative change: what a score says beyond it would be an exchange the wrong way
 LONGEST = 0.7  # step of the logarithm of a factor
+STILL, ALIKE = (
+    0.1,
+    0.5,
+)  # standard deviations of amplitudes, and likelihood-ratio units: a pass that changes less is the last
 
 
 def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]) -> tuple[Fitted, list[Accepted]]:
@@ -54,6 +58,7 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
     x = x.copy()
     x[held] = 0.0
+    misfit = np.inf
     for _ in range(REFITS):
         there = shifted(study, x, gains, amplitude)
         J = jacobian(yard, x, _sizes(accepted, amplitude))
@@ -92,10 +97,12 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         F = D.T @ PD + np.diag(inverse_prior)
         found = solved(F, PD.T @ white + inverse_prior * mean, floor)
         nuisance = np.clip(projector.most_likely(white - D @ found)[: len(x)], low, high)
-        step = np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))
-        moved = max(float(np.abs(nuisance - x).max(initial=0.0)), float(step.max(initial=0.0)))
+        step = float((np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))).max(initial=0.0))
+        left = white - D @ amplitude
+        before, misfit = misfit, float(left @ projector(left))
         x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
-        if moved < 0.1:
+        # parameters that the data hardly tell wander on for long, and nothing gets better
+        if step < STILL and misfit > before - ALIKE:
             break
     inverse = np.linalg.pinv(F)
     result, first = [], 0

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.accepted import Accepted, exchanged, freed, parameter_of, readings_columns
-from twin.diagnose.acted import units_of
+from twin.diagnose.acted import CONDUCTS, units_of
 from twin.diagnose.batch import Hypothesis, best
 from twin.diagnose.contest import beginning, judged, misfit, proof
 from twin.diagnose.fitter import Fitted
@@ -205,12 +205,12 @@ def _strained(
     strain = np.maximum(np.abs(pulls) / PULLED, np.abs(fitted.x) / BEYOND)
     found = []
     for batch in yard.columns.batches:
-        for i, name in enumerate(batch.places if batch.kind in ("gain", "group") else ()):
+        for i, name in enumerate(batch.places if batch.kind in ("gain", *CONDUCTS) else ()):
             if (j := parameter_of(yard.study, name)) is None:
                 continue
             always = next(h for h in batch.histories if not h.windows)
             size = float(fitted.x[j] * yard.study.scale[j])
-            if batch.kind == "group":
+            if batch.kind in CONDUCTS:
                 size = float(np.expm1(size))
             likelihood = float((PULLED * strain[j]) ** 2)
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(yard.study.scale[j] ** -2.0)))
@@ -223,7 +223,7 @@ def _strained(
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
     if not sigma > 0.0:  # it has run to where it changes nothing
         return None
-    if top.batch.kind == "group":  # as a logarithm: derivatives at many times a film say little of the film itself
+    if top.batch.kind in CONDUCTS:  # as a logarithm: derivatives at many times a film say little of the film itself
         change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
     return fitted, replace(one, statistic=(change / sigma) ** 2)
 

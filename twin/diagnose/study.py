@@ -12,7 +12,7 @@ from twin.calibrate.effects import Effects, effects_of
 from twin.calibrate.march import Rows, displacements
 from twin.calibrate.measured import Measured
 from twin.diagnose.bench import Bench, BenchRun
-from twin.diagnose.march import INNER, Slots, by_amplitudes, jacobian, no_slots, outputs, states_of
+from twin.diagnose.march import INNER, Slots, by_amplitudes, first_slots, jacobian, no_slots, outputs, states_of
 from twin.errors import TwinError
 
 K = 4  # amplitudes that may be active at once
@@ -86,12 +86,11 @@ class Study:
         return np.asarray(J) * np.concatenate([self.scale, np.ones(K)])
 
     def by_amplitudes(self, k: int, x: np.ndarray, slots: Slots, a: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-        """Outputs (size,) of run k and their derivatives (size, K) by the amplitudes."""
+        """Outputs (size,) of run k and their derivatives (size, len(a)) by the amplitudes of the first len(a) slots."""
         planned = self.runs[k]
-        n = len(self.bench.parameters)
-        v = self._v(x, a)
         D, y = by_amplitudes(self.bench.layout, self.bench.contacts, planned.measured.from_first,
-                             *self._arguments(k, slots), v[:n], v[n:])  # fmt: skip
+                             *self._arguments(k, first_slots(slots, len(a))), self._v(x, ())[:-K],
+                             np.array(a, dtype=float))  # fmt: skip
         return np.asarray(y), np.asarray(D)
 
     def states(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
