@@ -22,7 +22,8 @@ from twin.calibrate.measured import Measured, measured
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.gain import predicted
-from twin.diagnose.search import Search, search
+from twin.diagnose.search import search
+from twin.diagnose.search_look import Search
 from twin.diagnose.settled import settled
 from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import limits_at, limits_of, unknown_of, verdict_of

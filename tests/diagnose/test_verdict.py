@@ -11,7 +11,8 @@ import pytest
 from tests.diagnose import small_case
 from twin.diagnose.accepted import parameter_of
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.search import PULLED, _strained, search
+from twin.diagnose.search import search
+from twin.diagnose.search_strained import PULLED, strained
 from twin.diagnose.verdict import CALIBRATED, STRAINED, strained_of, verdict_of
 
 
@@ -48,7 +49,7 @@ def test_films_without_a_declared_gain_are_not_asked_for_it():
     assert parameter_of(other.study, film) is None
     n = len(told)
     y = np.concatenate([yard.study.outputs(k, np.zeros(n)) for k in yard.study.fitted])
-    assert _strained(other, y, yard.fitter(y), np.zeros(n), 0.5 * np.eye(n)) is None
+    assert strained(other, y, yard.fitter(y), np.zeros(n), 0.5 * np.eye(n)) is None
 
 
 def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch):
@@ -59,11 +60,11 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     x[j] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
     fitted, half = yard.fitter(y), 0.5 * np.eye(len(x))
-    assert _strained(yard, y, fitted, x, half) is not None
-    module = sys.modules[search.__module__]
+    assert strained(yard, y, fitted, x, half) is not None
+    module = sys.modules[strained.__module__]
     gone = lambda *a: (fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
     monkeypatch.setattr(module, "refit", gone)
-    assert _strained(yard, y, fitted, x, half) is None
+    assert strained(yard, y, fitted, x, half) is None
 
 
 def test_contacts_that_calibration_strains_are_told_with_what_they_became():

@@ -55,7 +55,8 @@ def jacobian(yard: Yardstick, x: np.ndarray, causes: Sequence[tuple[Hypothesis, 
     """(m, n) derivatives by the parameters at x (n,), with causes of these amplitudes.
 
     The surrogate knows nothing of causes, and a film of nine times its size changes what every other parameter does:
-    those that take a parameter's place are put there, as far as its bounds. Its own column is left empty.
+    those that take a parameter's place are put there. Beyond its bounds, where no surrogate holds, derivatives are made
+    anew. Its own column is left empty.
     """
     study = yard.study
     low, high = bounds(study)
@@ -63,9 +64,12 @@ def jacobian(yard: Yardstick, x: np.ndarray, causes: Sequence[tuple[Hypothesis, 
     for h, amplitude in causes:
         for j in freed(study, h):
             size = amplitude if h.batch.kind == "gain" else float(np.log1p(amplitude))
-            there[j] = np.clip(size / study.scale[j], low[j], high[j])
+            there[j] = size / study.scale[j]
             held.append(j)
-    J = yard.fitter.surrogate.at(there)[1]
+    if np.all((low <= there) & (there <= high)):
+        J = yard.fitter.surrogate.at(there)[1]
+    else:
+        J = np.vstack([study.jacobian(k, there)[:, : len(x)] for k in study.fitted])
     J[:, held] = 0.0
     return J
 

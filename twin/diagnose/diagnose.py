@@ -20,7 +20,8 @@ from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
 from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
-from twin.diagnose.search import Search, search
+from twin.diagnose.search import search
+from twin.diagnose.search_look import Search
 from twin.diagnose.study import Study, make_study
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of
 from twin.diagnose.whiten import measured_of
@@ -116,7 +117,7 @@ def _closed(m: Measured) -> Measured:
 
 AFTER = (  # modules that only use a yardstick
     "accepted", "acted", "channels", "contest", "damage", "diagnose", "diagnosis", "edges", "edit", "extension", "gain",
-    "growth", "hide", "refit", "report", "search", "settled", "site", "sizes", "verdict",
+    "growth", "hide", "hotter", "refit", "report", "search", "settled", "site", "sizes", "verdict",
 )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from twin.calibrate.measured import Measured
 from twin.diagnose.accepted import stepped, with_shifts
 from twin.diagnose.diagnosis import Gain
 from twin.diagnose.readings import play, readings_of
-from twin.diagnose.search import Search
+from twin.diagnose.search_look import Search
 from twin.diagnose.study import Study
 
 MACHINE_READINGS = ("scale", "expansion")  # kinds that act on what is read, and belong to the machine

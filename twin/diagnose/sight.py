@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -31,6 +31,10 @@ class Columns:
         grams = tuple(np.stack([_gram(raw, c) for c in b.columns]) for b in batches)
         with_F = with_information(heat, [_gram(raw, c) for c in heat.columns])
         return cls(raw, tuple(batches), grams, with_F, _product(others, raw))
+
+    def beside(self, others: np.ndarray) -> Columns:
+        """The same with other nuisance columns (m, q), white."""
+        return replace(self, others=_product(others, self.raw))
 
 
 def _product(left: np.ndarray, raw: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from twin.diagnose.contest import AMPLITUDE
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.elements import pivot
 from twin.diagnose.fitter import bounds
-from twin.diagnose.search import Search
+from twin.diagnose.search_look import Search
 from twin.diagnose.sight import sight
 from twin.diagnose.study import Study
 from twin.diagnose.unknown import history
@@ -33,6 +33,7 @@ STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint"
 OWN = {
     "film": 0.12,
     "group": 0.12,
+    "gain": 0.1,
     "group_film": 0.12,
     "coolant": 0.12,
     "scale": 0.12,

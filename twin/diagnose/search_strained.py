@@ -1,0 +1,137 @@
+"""One declared number out of its tolerance: a source, film, joint or contact that calibration moves too far.
+
+It is the verdict where freeing it leaves nothing, or so little that a wrong form of its own explains that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.accepted import Accepted, freed, parameter_of, readings_columns
+from twin.diagnose.acted import CONDUCTS, units_of
+from twin.diagnose.batch import Hypothesis
+from twin.diagnose.contest import beginning, misfit
+from twin.diagnose.fitter import Fitted
+from twin.diagnose.refit import WIDE, refit
+from twin.diagnose.search_look import Search, look
+from twin.diagnose.settled import settled
+from twin.diagnose.yardstick import Yardstick
+
+PULLED = 2.5  # standard deviations, of what tolerances allow a settled parameter, beyond which it is out of tolerance
+BEYOND = 3.0  # prior standard deviations likewise of one that was fitted with errors of form
+TOLD = 0.94  # variance of a settled parameter that says something of its own
+LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
+COVERS = 0.9  # of the evidence for heat of any history that a name must explain
+NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
+ALIKE = 0.9  # cosine of what a signal's factor and a declared number do, from which the one may be the other
+SAME = 0.998  # cosine likewise of what is read nowhere else
+FORM = 0.1  # of the logarithm of a source's factor, that a wrong form of the model takes
+OTHERS = 12  # other explanations that are looked at
+
+
+def closed(
+    yard: Yardstick, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis], relaxed: tuple[Fitted, Accepted],
+    x0: np.ndarray,
+) -> Search | None:  # fmt: skip
+    """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
+    something else that was seen before explains more. Signals that explain as much are its rivals."""
+    fitted, one = relaxed
+    _, ranked, first = look(yard, before, declared)
+    seen, left, last = look(yard, fitted)
+    misfits = (1.0 - COVERS) * one.statistic  # that it may leave
+    room = max(yard.thresholds["unknown"], misfits)
+    if not _weak(yard, left, misfits) or max(last.parts.values(), default=0.0) > room:
+        return None
+    removed = misfit(yard, before) - misfit(yard, fitted)
+    more = [h for h in ranked if h.statistic - NEAR * any(h is d for d in declared) > removed]
+    if not _weak(yard, more) and not _stays(yard, before, one, more[:OTHERS]):
+        return None
+    # both begin at the declared number: what either explains is the same but for what is left
+    fits = {h.name for h in declared if h.statistic > removed - NEAR}
+    rivals = tuple(
+        (Hypothesis(batch, i, batch.histories[0], one.statistic, (1.0,), 0.0), 1.0)
+        for batch in yard.columns.batches if batch.kind == "signal"
+        for i, name in enumerate(batch.places)
+        if _does_the_same(yard, yard.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
+    )  # fmt: skip
+    one = replace(one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals)
+    x, covariance = settled(yard, y, (one,))
+    return Search(yard, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance)
+
+
+def _does_the_same(yard: Yardstick, signal: np.ndarray, one: Accepted, fits: bool) -> bool:
+    """Whether a factor of a signal does what a declared number does: it is read there, and nearly nowhere else.
+
+    signal (m,): its white response. Where it does not fit as it stands (fits), as derivatives hold near the description
+    only, it must do just what a source does, and be of the fitted size.
+    """
+    (j,) = freed(yard.study, one.hypothesis)
+    n = len(yard.study.bench.parameters)
+    own = yard.whiten(yard.fitter.surrogate.at(np.zeros(n))[1][:, j]) / yard.study.scale[j]
+    along, size = float(signal @ own), float(own @ own)
+    if abs(along) < (ALIKE if fits else SAME) * np.sqrt(size * float(signal @ signal)):
+        return False
+    if fits:
+        return True
+    heat = 1.0 + along / size  # times what the source emits
+    factor = float(one.amplitude[0])
+    sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), FORM * factor))
+    return one.hypothesis.batch.kind == "gain" and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
+
+
+def _stays(yard: Yardstick, fitted: Fitted, one: Accepted, others: Sequence[Hypothesis]) -> bool:
+    """Whether a declared number is as far out of its tolerance beside any of the others, to first order."""
+    (j,) = freed(yard.study, one.hypothesis)
+    white = yard.whiten(fitted.residual)
+    return all(
+        abs(yard.fitter.projector(fitted.J, WIDE * _unit(readings_columns(yard, h))).most_likely(white)[j]) > BEYOND
+        for h in others
+    )
+
+
+def _unit(columns: np.ndarray) -> np.ndarray:
+    """Columns (m, q) of length one."""
+    return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30))
+
+
+def _weak(yard: Yardstick, ranked: Sequence[Hypothesis], misfits: float = 0.0) -> bool:
+    """Whether nothing is strong enough to be named beside another cause."""
+    return all(h.statistic < max(LATER * yard.thresholds[h.family], misfits) for h in ranked)
+
+
+def strained(
+    yard: Yardstick, y: np.ndarray, fitted: Fitted, x0: np.ndarray, covariance: np.ndarray
+) -> tuple[Fitted, Accepted] | None:
+    """The declared source or film that calibration moves farthest, freed of its tolerance; None if all are within.
+
+    x0 (n,), covariance (n, n): settled. Where tolerances are right, x0 has the variance 1 - covariance.
+    """
+    variance = np.diag(covariance)
+    pulls = np.where(variance < TOLD, x0 / np.sqrt(np.maximum(1.0 - variance, 1.0 - TOLD)), 0.0)
+    strain = np.maximum(np.abs(pulls) / PULLED, np.abs(fitted.x) / BEYOND)
+    found = []
+    for batch in yard.columns.batches:
+        for i, name in enumerate(batch.places if batch.kind in ("gain", *CONDUCTS) else ()):
+            if (j := parameter_of(yard.study, name)) is None:
+                continue
+            always = next(h for h in batch.histories if not h.windows)
+            size = float(fitted.x[j] * yard.study.scale[j])
+            if batch.kind in CONDUCTS:
+                size = float(np.expm1(size))
+            likelihood = float((PULLED * strain[j]) ** 2)
+            found.append(Hypothesis(batch, i, always, likelihood, (size,), float(yard.study.scale[j] ** -2.0)))
+    top = max(found, key=lambda h: h.statistic, default=None)
+    if top is None or top.statistic < PULLED**2:
+        return None
+    units = units_of(yard.study, top)
+    one = Accepted(top, units, np.array(top.amplitude), np.eye(1), top.statistic, PULLED**2, ())
+    fitted, (one,) = refit(yard, y, beginning(fitted.x), [one])
+    change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
+    if not sigma > 0.0:  # it has run to where it changes nothing
+        return None
+    if top.batch.kind in CONDUCTS:  # as a logarithm: derivatives at many times a film say little of the film itself
+        change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
+    return fitted, replace(one, statistic=(change / sigma) ** 2)
