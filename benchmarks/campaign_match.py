@@ -86,10 +86,10 @@ def size_of(truth: Mapping[str, Any], cause: Mapping[str, Any], top: Top) -> flo
     """The size of a hidden thing in the words of the cause that was said; None where they cannot be compared.
 
     Compared are equal units and equal kinds of history (always, in windows, with one signal). Exact factors of signals
-    have no interval and are not compared.
+    and stuck sensors have no interval and are not compared.
     """
     family, history, size = truth["family"], str(cause["history"]), float(truth["size"])
-    if family == "signal" and history == "factor":
+    if (family == "signal" and history == "factor") or history == "stuck":
         return None
     if family == "sensor" or family == "measurement":
         if truth["history"] != history:

@@ -143,6 +143,10 @@ def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) 
         elif unit.kind == "heat":
             p = [q.name for q in bench.places].index(unit.place)
             slots.forcing[:, :, s] = fine[:, :, None] * bench.B[p]
+        elif unit.kind == "moved":  # all that the source emits, and not what it would as described
+            name = unit.place.removeprefix("sources.").split(">")[0]
+            vector = elements.vectors[k][elements.columns[unit.column].vector]
+            slots.B[s][:, [q.name for q in load.sources].index(name)] = vector
         else:  # a forcing that the bank knows: history of its column, or of its blocks, times its vector
             column = elements.columns[unit.column]
             vector, history = elements.vectors[k][column.vector], column.histories[k]

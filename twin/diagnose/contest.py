@@ -22,7 +22,7 @@ from twin.diagnose.growth import GROWTH
 from twin.diagnose.study import K
 from twin.diagnose.yardstick import Yardstick
 
-BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant")
+BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant", "moved")
 PASSES, WINDOW_PASSES, READ_PASSES = 3, 8, 6
 ENTRANTS = 5  # candidates that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted

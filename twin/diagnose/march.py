@@ -7,7 +7,8 @@ both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts a
 description lacks, each times an amplitude a_k that is differentiated like a parameter:
 
     (E + sum a_k E_k) x' = -(A(theta (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
-                           + ... + sum a_k (gate_k rise_k M_k + forcing_k),      T_air + sum a_k environment_k
+                           + (B + sum a_k B_k) P + ... + sum a_k (gate_k rise_k M_k + forcing_k),
+    T_air + sum a_k environment_k
 """
 
 from __future__ import annotations
@@ -60,6 +61,7 @@ class Slots:
     A: Array  # (K, r, r) per W/(m^2 K)
     M: Array  # (K, r)
     E: Array  # (K, r, r)
+    B: Array  # (K, r, n_sources) per W: where else the heat of sources goes
     gate: Array  # (n, K): of A and M
     rise: Array  # (n, m, K) K: medium of M above the reference temperature
     forcing: Array  # (n, m, K, r)
@@ -74,7 +76,8 @@ def no_slots(n: int, m: int, K: int, r: int, model: MachineModel) -> Slots:
     """Slots that do nothing, as numpy arrays to be filled."""
     load = model.load_model
     return Slots(
-        A=np.zeros((K, r, r)), M=np.zeros((K, r)), E=np.zeros((K, r, r)), gate=np.zeros((n, K)),
+        A=np.zeros((K, r, r)), M=np.zeros((K, r)), E=np.zeros((K, r, r)),
+        B=np.zeros((K, r, len(load.sources))), gate=np.zeros((n, K)),
         rise=np.zeros((n, m, K)), forcing=np.zeros((n, m, K, r)), film=np.zeros((n, K, len(load.films))),
         joint=np.zeros((n, K, len(load.joints))), contact=np.zeros((n, K, len(contact_names(model)))),
         environment=np.zeros((n, m, K, len(load.environments))), initial=np.zeros((K, r)),
@@ -84,7 +87,7 @@ def no_slots(n: int, m: int, K: int, r: int, model: MachineModel) -> Slots:
 def first_slots(slots: Slots, k: int) -> Slots:
     """The first k of them."""
     return Slots(
-        A=slots.A[:k], M=slots.M[:k], E=slots.E[:k], gate=slots.gate[:, :k], rise=slots.rise[:, :, :k],
+        A=slots.A[:k], M=slots.M[:k], E=slots.E[:k], B=slots.B[:k], gate=slots.gate[:, :k], rise=slots.rise[:, :, :k],
         forcing=slots.forcing[:, :, :k], film=slots.film[:, :k], joint=slots.joint[:, :k],
         contact=slots.contact[:, :k], environment=slots.environment[:, :, :k], initial=slots.initial[:k],
     )  # fmt: skip
@@ -182,6 +185,8 @@ class Operators:
     terms: jax.Array  # (q, r, r): of E: of the model's capacities, then of slots
     factors: jax.Array  # (q,) of these
     E: jax.Array  # (r, r), many: its derivatives left out
+    B: jax.Array  # (r, n_sources)
+    M: jax.Array  # (K, r) of slots
 
     @classmethod
     def of(
@@ -192,12 +197,13 @@ class Operators:
         terms = within(Q, jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)]))
         factors = jnp.concatenate([f.capacity - 1.0, a])
         E = jnp.eye(len(Q)) + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
-        return cls(A, terms, factors, E)
+        B = jnp.asarray(system.B) + jnp.tensordot(a, Q.T @ jnp.asarray(slots.B), 1)
+        return cls(A, terms, factors, E, B, jnp.asarray(slots.M) @ Q)
 
 
 def _step(
     layout: Layout, places: Places, many: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
-    fixed: Operators, M_slots: Array, z: jax.Array, now: tuple[Loads, Slots],
+    fixed: Operators, z: jax.Array, now: tuple[Loads, Slots],
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     """The state after one coarse step, and those after its fine ones (m, r)."""
     loads, slots = now
@@ -253,8 +259,8 @@ def _step(
         if len(losing):
             power = power.at[losing].set(read_table(jnp, tables[i], temperature_place(jnp, winding)))
         ports = jnp.tensordot(f.source[np.array(places.sources, dtype=int)], jnp.asarray(loads.contact_heat)[i], 1)
-        forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + system.B @ power + ports
-        forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ M_slots + a @ jnp.asarray(slots.forcing)[i]
+        forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + fixed.B @ power + ports
+        forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ fixed.M + a @ jnp.asarray(slots.forcing)[i]
         diagonal, neighbour, weight = (jnp.asarray(v)[i] for v in (loads.diagonal, loads.neighbour, loads.weight))
         contacts = R @ flows(places, diagonal, neighbour, weight, lax.stop_gradient(contact), R.T)
         now = factor(kept, contacts)
@@ -281,10 +287,11 @@ def trajectory(
     system = turned(system, Q)
     fixed = Operators.of(system, effects, slots, f, a, Q, many)
     loads = replace(loads, contact_heat=jnp.asarray(loads.contact_heat) @ Q)
-    slots = replace(slots, M=jnp.asarray(slots.M) @ Q, forcing=jnp.asarray(slots.forcing) @ Q)
-    steps = replace(slots, A=jnp.zeros(len(loads.rate)), M=jnp.zeros(len(loads.rate)), E=jnp.zeros(len(loads.rate)),
-                    initial=jnp.zeros(len(loads.rate)))  # fmt: skip
-    one = partial(_step, layout, places, many, system, effects, f, a, fixed, slots.M)
+    unused = jnp.zeros(len(loads.rate))
+    steps = replace(
+        slots, A=unused, M=unused, E=unused, B=unused, initial=unused, forcing=jnp.asarray(slots.forcing) @ Q
+    )
+    one = partial(_step, layout, places, many, system, effects, f, a, fixed)
     _, states = lax.scan(one, z0 @ Q, (loads, steps))
     return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0]) @ Q.T])
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, freed, parameter_of
+from twin.diagnose.accepted import Accepted, freed
 from twin.diagnose.acted import RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
@@ -55,10 +55,6 @@ def cause_of(a: Accepted, study: Study, x: np.ndarray) -> Cause:
     h = a.hypothesis
     kind, unit = h.batch.kind, h.batch.unit
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
-    if h.family == "misplaced_source":  # the share of what the source emits, not of what the description says
-        i = parameter_of(study, h.name.split(">")[0])
-        emitted = 1.0 if i is None else float(np.exp(study.scale[i] * x[i]))
-        value, variance = value / emitted, variance / emitted**2
     own = OWN.get(h.family, OWN.get(kind, OWN_OTHERS)) * value
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), own))
     low, high = value - 1.96 * sigma, value + 1.96 * sigma
