@@ -37,7 +37,7 @@ OWN = {
     "group_film": 0.12,
     "coolant": 0.12,
     "scale": 0.12,
-    "moved": 0.1,
+    "moved": 0.2,
     "capacity": 0.1,
     "slip": 0.12,
     "sun": 0.08,
