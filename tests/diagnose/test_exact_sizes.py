@@ -105,6 +105,19 @@ def test_a_film_many_times_as_strong_takes_its_parameter_along():
     assert found.x[j] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_contact_that_never_was_takes_its_parameter_along():
+    """A tenth of a joint's conductance: calibration alone bends everything else."""
+    study = small_case.study()
+    j = parameter_of(study, "contacts.front_outer")
+    x = np.zeros(len(study.bench.parameters))
+    x[j] = np.log(0.1) / study.scale[j]
+    verdict, causes = verdict_of(search(small_case.yardstick(), clean(x) + noise(9)), FAMILIES)
+    place = study.bench.parameters[j].path.removesuffix(".total")
+    assert (verdict, causes[0].family, causes[0].place) == ("out_of_tolerance", "joint", place)
+    low, high = causes[0].ci95
+    assert low < 0.1 < high
+
+
 @pytest.mark.parametrize(
     ("source", "factor", "verdict", "rival"),
     [

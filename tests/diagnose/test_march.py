@@ -100,6 +100,28 @@ def test_derivatives_by_amplitudes_alone_are_the_same():
     np.testing.assert_allclose(y, study.outputs(1, x, slots, a), rtol=1e-9)
     np.testing.assert_allclose(D, study.jacobian(1, x, slots, a)[:, len(x) :], rtol=1e-6, atol=1e-12)
     assert (np.abs(D).max(axis=0) > 0.0).all()
+    few, first = study.by_amplitudes(1, x, slots, a[:2])  # slots behind the told ones do nothing
+    np.testing.assert_allclose(few, study.outputs(1, x, slots, a[:2]), rtol=1e-9)
+    assert first.shape == (len(y), 2)
+
+
+@pytest.mark.parametrize("share", [0.4, 1.0])
+def test_a_misplaced_source_emits_what_it_emits_where_it_is(share):
+    """At another gain than declared, and heating another node: as if the machine were built so."""
+    study = small_case.study()
+    bench, load = study.bench, study.bench.base.load_model
+    j = next(i for i, source in enumerate(load.sources) if not source.contact)
+    B = np.asarray(bench.system.B)
+    there = bench.B[next(i for i, p in enumerate(bench.places) if not np.any(bench.B[i] * B[:, j]))] - B[:, j]
+    slots = study.slots(0)
+    slots.B[0][:, j] = there
+    x = np.zeros(len(bench.parameters))
+    x[[p.path for p in bench.parameters].index(f"sources.{load.sources[j].name}.gain")] = 0.5
+    moved = B.copy()
+    moved[:, j] += share * there
+    other = replace(study, bench=replace(bench, system=replace(bench.system, B=moved)))
+    np.testing.assert_allclose(study.outputs(0, x, slots, [share]), other.outputs(0, x), rtol=1e-9, atol=1e-12)
+    assert np.abs(study.outputs(0, x) - other.outputs(0, x)).max() > 1.0
 
 
 def test_read_is_what_outputs_say():

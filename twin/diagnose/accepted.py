@@ -15,6 +15,7 @@ from twin.diagnose.study import Study
 from twin.diagnose.yardstick import Yardstick
 
 CURVED = ("slip", "clock")  # kinds that act on what is read, and not in proportion to their size
+OWN = ("gain", "conductance", "total")  # how parameters of sources, films, contacts and joints are called there
 ASIDE = 0.1  # of a size, by which such a one is moved for its derivative
 
 
@@ -32,12 +33,12 @@ class Accepted:
 
 
 def parameter_of(study: Study, name: str) -> int | None:
-    """The parameter of this path, or the gain of this source or film, or the conductance of this contact.
+    """The parameter of this path, or the gain of this source or film, or the conductance of this contact or joint.
 
     None where `[[parameters]]` leaves it out.
     """
     paths = [p.path for p in study.bench.parameters]
-    return next((paths.index(p) for p in (name, f"{name}.gain", f"{name}.conductance") if p in paths), None)
+    return next((paths.index(p) for p in (name, *(f"{name}.{own}" for own in OWN)) if p in paths), None)
 
 
 def freed(study: Study, h: Hypothesis) -> list[int]:
@@ -51,23 +52,28 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
     return [] if j is None else [j]
 
 
-def jacobian(yard: Yardstick, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]]) -> np.ndarray:
+def jacobian(
+    yard: Yardstick, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]], before: np.ndarray | None = None
+) -> np.ndarray:
     """(m, n) derivatives by the parameters at x (n,), with causes of these amplitudes.
 
     The surrogate knows nothing of causes, and a film of nine times its size changes what every other parameter does:
-    those that take a parameter's place are put there. Beyond its bounds, where no surrogate holds, derivatives are made
-    anew. Its own column is left empty.
+    those that take a parameter's place are put there. Conductances beyond their bounds, where no surrogate holds, get
+    derivatives made anew, unless there are some from `before`. A number's own column is left empty.
     """
     study = yard.study
     low, high = bounds(study)
-    there, held = x.copy(), list[int]()
+    there, held, beyond = x.copy(), list[int](), False
     for h, amplitude in causes:
         for j in freed(study, h):
             size = amplitude if h.batch.kind == "gain" else float(np.log1p(amplitude))
             there[j] = size / study.scale[j]
             held.append(j)
-    if np.all((low <= there) & (there <= high)):
+            beyond |= h.batch.kind != "gain" and not low[j] <= there[j] <= high[j]
+    if not beyond:
         J = yard.fitter.surrogate.at(there)[1]
+    elif before is not None:
+        J = before
     else:
         J = np.vstack([study.jacobian(k, there)[:, : len(x)] for k in study.fitted])
     J[:, held] = 0.0

@@ -36,6 +36,8 @@ STILL, ALIKE = (
     0.1,
     0.5,
 )  # standard deviations of amplitudes, and likelihood-ratio units: a pass that changes less is the last
+ANEW = 5  # passes in which derivatives beyond all bounds are made anew
+RISES = 2  # passes in a row that make it worse, after which it runs away
 
 
 def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]) -> tuple[Fitted, list[Accepted]]:
@@ -58,10 +60,11 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
     x = x.copy()
     x[held] = 0.0
-    misfit = np.inf
-    for _ in range(REFITS):
+    misfit, rises = np.inf, 0
+    J = np.zeros((len(y), len(x)))
+    for i in range(REFITS):
         there = shifted(study, x, gains, amplitude)
-        J = jacobian(yard, x, _sizes(accepted, amplitude))
+        J = jacobian(yard, x, _sizes(accepted, amplitude), None if i < ANEW else J)
         first, bent = 0, np.zeros(len(y))
         for a in accepted:
             own = slice(first, first + len(a.amplitude))
@@ -75,8 +78,8 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
                 D[:, own] = 0.0
             elif not a.units:
                 D[:, own] = readings_columns(yard, a.hypothesis)
-        for i, j in gains:  # a parameter beyond its prior: its own column, per unit of the amplitude
-            D[:, i] = yard.whiten(fitter.surrogate.at(there)[1][:, [j]])[:, 0] / study.scale[j]
+        for q, j in gains:  # a parameter beyond its prior: its own column, per unit of the amplitude
+            D[:, q] = yard.whiten(fitter.surrogate.at(there)[1][:, [j]])[:, 0] / study.scale[j]
         if units:
             now = [*amplitude[stepped], *np.zeros(len(open_shapes))]
             parts = [study.by_amplitudes(k, there, slot, now) for k, slot in zip(study.fitted, slots, strict=True)]
@@ -89,8 +92,8 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
             exact = shapes = np.zeros((len(y), 0))
         residual = y - f + J @ x + exact @ amplitude[stepped] + bent
         white = yard.whiten(residual)
-        for i, _ in gains:
-            white = white + D[:, i] * amplitude[i]
+        for q, _ in gains:
+            white = white + D[:, q] * amplitude[q]
         errors = np.hstack([_own_errors(study, D, accepted, amplitude), yard.whiten(shapes)])
         projector = fitter.projector(J, errors)
         PD = projector(D)
@@ -102,7 +105,8 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         before, misfit = misfit, float(left @ projector(left))
         x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
         # parameters that the data hardly tell wander on for long, and nothing gets better
-        if step < STILL and misfit > before - ALIKE:
+        rises = rises + 1 if misfit > before + ALIKE else 0
+        if (step < STILL and misfit > before - ALIKE) or rises == RISES:
             break
     inverse = np.linalg.pinv(F)
     result, first = [], 0

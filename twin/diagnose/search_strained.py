@@ -29,6 +29,7 @@ NEAR = 10.0  # likelihood-ratio units within which another explanation is a riva
 ALIKE = 0.9  # cosine of what a signal's factor and a declared number do, from which the one may be the other
 SAME = 0.998  # cosine likewise of what is read nowhere else
 FORM = 0.1  # of the logarithm of a source's factor, that a wrong form of the model takes
+FAR = 2  # numbers that are freed, each alone: the farthest may be another one's doing
 OTHERS = 12  # other explanations that are looked at
 
 
@@ -105,9 +106,10 @@ def _weak(yard: Yardstick, ranked: Sequence[Hypothesis], misfits: float = 0.0) -
 def strained(
     yard: Yardstick, y: np.ndarray, fitted: Fitted, x0: np.ndarray, covariance: np.ndarray
 ) -> tuple[Fitted, Accepted] | None:
-    """The declared source or film that calibration moves farthest, freed of its tolerance; None if all are within.
+    """Of the declared numbers that calibration moves farthest the one that leaves least, freed of its tolerance.
 
-    x0 (n,), covariance (n, n): settled. Where tolerances are right, x0 has the variance 1 - covariance.
+    None if all are within. x0 (n,), covariance (n, n): settled. Where tolerances are right, x0 has the variance
+    1 - covariance.
     """
     variance = np.diag(covariance)
     pulls = np.where(variance < TOLD, x0 / np.sqrt(np.maximum(1.0 - variance, 1.0 - TOLD)), 0.0)
@@ -123,15 +125,18 @@ def strained(
                 size = float(np.expm1(size))
             likelihood = float((PULLED * strain[j]) ** 2)
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(yard.study.scale[j] ** -2.0)))
-    top = max(found, key=lambda h: h.statistic, default=None)
-    if top is None or top.statistic < PULLED**2:
-        return None
-    units = units_of(yard.study, top)
-    one = Accepted(top, units, np.array(top.amplitude), np.eye(1), top.statistic, PULLED**2, ())
+    far = sorted((h for h in found if h.statistic >= PULLED**2), key=lambda h: -h.statistic)
+    freed_ones = [made for h in far[:FAR] if (made := _freed(yard, y, fitted, h))]
+    return min(freed_ones, key=lambda made: misfit(yard, made[0]), default=None)
+
+
+def _freed(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
+    """The fit with a declared number at any value; None where it has run to where it changes nothing."""
+    one = Accepted(h, units_of(yard.study, h), np.array(h.amplitude), np.eye(1), h.statistic, PULLED**2, ())
     fitted, (one,) = refit(yard, y, beginning(fitted.x), [one])
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
-    if not sigma > 0.0:  # it has run to where it changes nothing
+    if not sigma > 0.0:
         return None
-    if top.batch.kind in CONDUCTS:  # as a logarithm: derivatives at many times a film say little of the film itself
+    if h.batch.kind in CONDUCTS:  # as a logarithm: derivatives at many times a film say little of the film itself
         change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
     return fitted, replace(one, statistic=(change / sigma) ** 2)

@@ -1,0 +1,39 @@
+"""Errors of form grow where channels get far hotter than described, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tests.diagnose import small_case
+from twin.diagnose.accepted import parameter_of
+from twin.diagnose.hotter import LEAST, MUCH, hotter
+
+
+def test_the_described_machine_keeps_its_yardstick():
+    yard = small_case.yardstick()
+    assert hotter(yard, np.zeros(len(yard.study.bench.parameters))) is yard
+
+
+def test_channels_of_a_stronger_source_are_wrong_by_as_much_more_as_they_rise():
+    yard = small_case.yardstick()
+    study = yard.study
+    x = np.zeros(len(study.bench.parameters))
+    j = parameter_of(study, "sources.motor")
+    x[j] = np.log(6.0) / study.scale[j]
+    after = hotter(yard, x)
+    size = np.linalg.norm(yard.fitter.others, axis=1)
+    times = np.where(size > 0.0, np.linalg.norm(after.fitter.others, axis=1) / np.maximum(size, 1e-30), 1.0)
+    (bins, sensors), _ = study.runs[0].shapes
+    f, f0 = (study.runs[0].split(v[: study.runs[0].size])[0] for v in (yard.fitter.surrogate.at(x)[0],
+                                                                      yard.fitter.surrogate.y0))  # fmt: skip
+    for s in range(sensors):
+        rise, described = (np.sqrt(np.mean((v[:, s] - v[0, s]) ** 2)) for v in (f, f0))
+        wanted = rise / max(described, LEAST[0])
+        measured = size[: bins * sensors].reshape(bins, sensors)[:, s] > 0.0
+        own = times[: bins * sensors].reshape(bins, sensors)[measured, s]
+        np.testing.assert_allclose(own, wanted if wanted > MUCH else 1.0, rtol=1e-6)
+    assert times.max() > MUCH
+    # what scores are made with follows
+    wanted = after.fitter.others.T @ after.columns.raw.astype(float)
+    np.testing.assert_allclose(after.columns.others, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())
+    assert after.thresholds == yard.thresholds
