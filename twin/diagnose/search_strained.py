@@ -28,6 +28,7 @@ COVERS = 0.9  # of the evidence for heat of any history that a name must explain
 NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
 ALIKE = 0.9  # cosine of what a signal's factor and a declared number do, from which the one may be the other
 SAME = 0.998  # cosine likewise of what is read nowhere else
+DISTANT = 1.0  # logarithm of a source's factor, beyond which derivatives of the described machine say little
 FORM = 0.1  # of the logarithm of a source's factor, that a wrong form of the model takes
 FAR = 2  # numbers that are freed, each alone: the farthest may be another one's doing
 OTHERS = 12  # other explanations that are looked at
@@ -66,8 +67,8 @@ def closed(
 def _does_the_same(yard: Yardstick, signal: np.ndarray, one: Accepted, fits: bool) -> bool:
     """Whether a factor of a signal does what a declared number does: it is read there, and nearly nowhere else.
 
-    signal (m,): its white response. Where it does not fit as it stands (fits), as derivatives hold near the description
-    only, it must do just what a source does, and be of the fitted size.
+    signal (m,): its white response. Where it does not fit as it stands (fits), it may do so far from the description:
+    derivatives made there say little. It must then do just what a source does, and be of the fitted size.
     """
     (j,) = freed(yard.study, one.hypothesis)
     n = len(yard.study.bench.parameters)
@@ -80,7 +81,8 @@ def _does_the_same(yard: Yardstick, signal: np.ndarray, one: Accepted, fits: boo
     heat = 1.0 + along / size  # times what the source emits
     factor = float(one.amplitude[0])
     sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), FORM * factor))
-    return one.hypothesis.batch.kind == "gain" and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
+    far = one.hypothesis.batch.kind == "gain" and abs(factor) > DISTANT
+    return far and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
 
 
 def _stays(yard: Yardstick, fitted: Fitted, one: Accepted, others: Sequence[Hypothesis]) -> bool:
