@@ -30,7 +30,7 @@ EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
 GONE = -0.7  # of a relative change, as a straight line
 WET = 40.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
 ENOUGH = 0.02  # of a size, that a pass moves it by when it has arrived
-ALIKE, SHARE = 1.0, 1e-3  # likelihood-ratio units and share of a statistic: a pass that changes less is the last
+LESS, SHARE = 1.0, 1e-3  # likelihood-ratio units and share of a statistic: a pass that changes less is the last
 HELD = 2  # passes in which its heat and edges are found for that film, before all are free
 BENDS = 2.5  # prior standard deviations that only something hidden moves a parameter by
 NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
@@ -124,7 +124,7 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
         projector = yard.fitter.projector(J, fitted.more)
         left = yard.whiten(y - fitted.beside - outputs + J @ now.x)
         removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
-        arrived = i > held and abs(removed - statistic) < max(ALIKE, SHARE * removed)
+        arrived = i > held and abs(removed - statistic) < max(LESS, SHARE * removed)
         if removed <= statistic:  # too far: back, then less; parameters may do without a step
             if arrived:
                 break

@@ -6,9 +6,9 @@ With P = Q [R; 0] (QR) a matrix of a fine step becomes
                               [c_fp                 c_ff]
 
 where only the first block follows the contacts. So c_ff and the Schur complement c_pp - c_pf c_ff^-1 c_fp are factored
-once for all fine steps of a coarse one, and every fine step factors a matrix of the size of the ports: on the five-axis
-machine 123 instead of 188. E = 1 stays, as Q is orthogonal. (The ports' temperatures as coordinates would leave Gamma
-as it is, but need R^-1, and ports that move together have none.)
+once for all fine steps of a coarse one, and every fine step factors a matrix of the size of the ports
+(Golub, Van Loan, Matrix Computations, 4th ed. 2013, chapters 3 to 5). E = 1 stays, as Q is orthogonal. (The ports'
+temperatures as coordinates would leave Gamma as it is, but need R^-1, and ports that move together have none.)
 """
 
 from __future__ import annotations

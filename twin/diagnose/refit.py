@@ -32,7 +32,7 @@ WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good a
 REFITS = 10  # passes
 GONE = -0.97  # of a relative change: what a score says beyond it would be an exchange the wrong way
 LONGEST = 0.7  # step of the logarithm of a factor
-STILL, ALIKE = (
+STILL, LESS = (
     0.1,
     0.5,
 )  # standard deviations of amplitudes, and likelihood-ratio units: a pass that changes less is the last
@@ -105,8 +105,8 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         before, misfit = misfit, float(left @ projector(left))
         x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
         # parameters that the data hardly tell wander on for long, and nothing gets better
-        rises = rises + 1 if misfit > before + ALIKE else 0
-        if (step < STILL and misfit > before - ALIKE) or rises == RISES:
+        rises = rises + 1 if misfit > before + LESS else 0
+        if (step < STILL and misfit > before - LESS) or rises == RISES:
             break
     inverse = np.linalg.pinv(F)
     result, first = [], 0

@@ -44,13 +44,14 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         fitted = yard.fitter(y)
     x0, covariance = settled(yard, y, ())
     declared = declared_candidates(yard, y, fitted)
+    glance = look(yard, fitted, declared)
     relaxed = strained(yard, y, fitted, x0, covariance)
-    if relaxed and (ended := closed(yard, y, fitted, declared, relaxed, x0)):
+    if relaxed and (ended := closed(yard, y, fitted, declared, glance, relaxed, x0)):
         return ended
     accepted, steps = list[Accepted](), list[Step]()
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
-        seen, ranked, step = look(yard, fitted, () if accepted or refused else declared)
+        seen, ranked, step = look(yard, fitted) if accepted or refused else glance
         if restless := _restless(yard, accepted, step.parts):
             imitated = True
             fitted, accepted = _without(yard, y, fitted, accepted, restless)

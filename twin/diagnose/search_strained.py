@@ -16,8 +16,9 @@ from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import beginning, misfit
 from twin.diagnose.fitter import Fitted
 from twin.diagnose.refit import WIDE, refit
-from twin.diagnose.search_look import Search, look
+from twin.diagnose.search_look import Search, Step, look
 from twin.diagnose.settled import settled
+from twin.diagnose.sight import Sight
 from twin.diagnose.yardstick import Yardstick
 
 PULLED = 2.5  # standard deviations, of what tolerances allow a settled parameter, beyond which it is out of tolerance
@@ -35,13 +36,13 @@ OTHERS = 12  # other explanations that are looked at
 
 
 def closed(
-    yard: Yardstick, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis], relaxed: tuple[Fitted, Accepted],
-    x0: np.ndarray,
+    yard: Yardstick, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis],
+    glance: tuple[Sight, list[Hypothesis], Step], relaxed: tuple[Fitted, Accepted], x0: np.ndarray,
 ) -> Search | None:  # fmt: skip
     """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
-    something else that was seen before explains more. Signals that explain as much are its rivals."""
+    something else that was seen before (glance) explains more. Signals that explain as much are its rivals."""
     fitted, one = relaxed
-    _, ranked, first = look(yard, before, declared)
+    _, ranked, first = glance
     seen, left, last = look(yard, fitted)
     misfits = (1.0 - COVERS) * one.statistic  # that it may leave
     room = max(yard.thresholds["unknown"], misfits)

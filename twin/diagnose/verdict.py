@@ -47,10 +47,10 @@ CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it
 PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
 
 
-def cause_of(a: Accepted, study: Study, x: np.ndarray) -> Cause:
+def cause_of(a: Accepted, study: Study) -> Cause:
     """A cause as reports and edits take it: factors as factors, differences as differences.
 
-    x (n,): parameters in prior standard deviations. The interval counts that the model's own form is wrong, see OWN.
+    The interval counts that the model's own form is wrong, see OWN.
     """
     h = a.hypothesis
     kind, unit = h.batch.kind, h.batch.unit
@@ -142,7 +142,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     # a declared number out of its tolerance had been fitted before, as far as its tolerance went
     relaxed = [a.statistic for a in found.accepted if freed(found.yardstick.study, a.hypothesis)]
     before = max([*found.steps[0].parts.values(), *relaxed], default=0.0)
-    causes = tuple(cause_of(a, found.yardstick.study, found.x) for a in found.accepted)
+    causes = tuple(cause_of(a, found.yardstick.study) for a in found.accepted)
     if left > thresholds["unknown"] and (not causes or left > REMAINDER * before):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
