@@ -56,6 +56,8 @@ bench: $(READY) ## what is claimed about speed, memory and accuracy, measured he
 
 .PHONY: campaign
 campaign: $(READY) ## hide effects in data by the hundred and look for them; MINUTES=60 stops earlier, and goes on next time
+	@$(BIN)/python -c 'import gmsh' 2>/dev/null || { echo "installing gmsh, for the other mesh of the trials"; \
+	    $(BIN)/python -m pip install -qq --disable-pip-version-check --no-build-isolation -e '.[mesh]'; }
 	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign $(MINUTES)
 
 .PHONY: demo
