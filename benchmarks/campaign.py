@@ -16,7 +16,8 @@ from benchmarks.campaign_match import place_of
 from benchmarks.campaign_stuck import emptied, without_stuck
 from benchmarks.campaign_table import write_tables
 from benchmarks.five_axis import FOLDER, machine
-from benchmarks.hidden_draw import Trial, draw
+from benchmarks.hidden_draw import FAMILIES as HIDDEN
+from benchmarks.hidden_draw import Trial, draw, part_of
 from benchmarks.hidden_parts import Hidden
 from twin.build.workers import each
 from twin.calibrate.measured import Measured, measured
@@ -27,7 +28,7 @@ from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
 from twin.diagnose.settled import settled
 from twin.diagnose.study import with_measured
-from twin.diagnose.verdict import limits_at, limits_of, unknown_of, verdict_of
+from twin.diagnose.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
 from twin.diagnose.yardstick import Yardstick
 from twin.progress import bar
@@ -46,14 +47,20 @@ Item = tuple[str, float, int]
 
 def items() -> list[Item]:
     """All trials, in an order in which an unfinished campaign is worth most."""
-    families = [f.name for f in FAMILIES if f.name != "coarse_model"]
+    families = [f.name for f in FAMILIES if f.name in HIDDEN]
     result: list[Item] = []
     for k in range(EACH):
         nulls = range(min(k * NULLS // FAST, NULLS), min((k + 1) * NULLS // FAST, NULLS))
-        result += [(family, size, FIRST + k) for size in SIZES for family in families]
+        sized = [(family, size, FIRST + k) for size in SIZES for family in families]
+        result += [item for item in sized if _differs(*item)]
         result += [(name, 1.0, FIRST + i) for name, n in MORE for i in range(k * n // EACH, (k + 1) * n // EACH)]
         result += [("null", 1.0, FIRST + i) for i in nulls]
     return result
+
+
+def _differs(family: str, size: float, seed: int) -> bool:
+    """Whether data of another size are others: a stuck sensor or a doubled signal is what it is."""
+    return size == 1.0 or part_of(family, size, seed).hidden != part_of(family, 1.0, seed).hidden
 
 
 @cache
@@ -91,9 +98,7 @@ def judged(yard: Yardstick, trial: Trial, bare: Trial) -> dict[str, Any]:
     own = emptied(yard, plans) if stuck else yard
     y = measured_of(with_measured(yard.study, plans))
     found = search(own, y)
-    verdict, causes = verdict_of(found, FAMILIES)
-    if stuck:
-        verdict, causes = "sensor" if verdict == "nothing" else verdict, (*stuck, *causes)
+    verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     unknown = unknown_of(found) if verdict == "unknown" else None
     seconds = time.perf_counter() - began
     return {
@@ -171,9 +176,10 @@ def _one(deadline: float, item: Item) -> None:
 
 
 def results() -> list[dict[str, Any]]:
-    """All trials that were made."""
+    """The trials that were made."""
+    wanted = set(items())
     lines = [line for path in sorted(OUT.glob("trials-*.jsonl")) for line in path.read_text("utf-8").splitlines()]
-    return [json.loads(line) for line in lines]
+    return [r for r in map(json.loads, lines) if (r["family"], r["factor"], r["seed"]) in wanted]
 
 
 def main(minutes: float = float("inf")) -> None:

@@ -62,7 +62,6 @@ FAMILIES: dict[str, Make] = {
     "slip": readings.slip,
     "capacity": exchange.capacity,
     "initial_state": exchange.initial_state,
-    "coarse_model": lambda _rng, _factor: Part((Hidden("coarse_model", "", "always", 1.0, "1"),), coarse=True),
     "measurement": readings.measurement,
     "misplaced_source": heat.misplaced_source,
     "not_thermal": readings.not_thermal,
@@ -86,7 +85,6 @@ class Trial:
     factor: float  # of the nominal size
     truth: tuple[Hidden, ...]  # nothing in a null
     runs: tuple[Run, ...]
-    coarse: bool  # the artefact under trial is to be a bad one
     parameters: dict[str, float]  # path -> value there [SI]
 
 
@@ -126,7 +124,7 @@ def draw(family: str, factor: float, seed: int, machine: Fast | None = None, hid
     for r, (logged, did) in enumerate(zip(runs(), clean, strict=True)):
         run = part.readings(r, _measured(known, logged, did), did)
         made.append(part.logs(r, _noisy(run, noise)))
-    return Trial(seed, family, factor, part.hidden, tuple(made), part.coarse, values)
+    return Trial(seed, family, factor, part.hidden, tuple(made), values)
 
 
 def _air(rng: np.random.Generator) -> Part:

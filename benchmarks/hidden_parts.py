@@ -61,7 +61,6 @@ class Part:
     factors: Mapping[str, float] = field(default_factory=dict)  # parameter -> factor on top of the draw's
     readings: Callable[[int, Run, Clean], Run] = lambda _run, run, _clean: run  # before noise is added
     logs: Callable[[int, Run], Run] = lambda _run, run: run  # after
-    coarse: bool = False
 
 
 def together(parts: Sequence[Part]) -> Part:
@@ -114,7 +113,7 @@ def together(parts: Sequence[Part]) -> Part:
         late={k: v for p in parts for k, v in p.effects.late.items()},
     )  # fmt: skip
     hidden = tuple(h for p in parts for h in p.hidden)
-    return Part(hidden, effects, factors, readings, logs, any(p.coarse for p in parts))
+    return Part(hidden, effects, factors, readings, logs)
 
 
 def heating(hidden: Hidden, watts: Sequence[np.ndarray]) -> Part:

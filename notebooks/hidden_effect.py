@@ -136,7 +136,7 @@ print(f"a day: {len(monday.temperatures.time)} rows of temperatures, {len(monday
 # ## The diagnosis
 #
 # First everything that can be calibrated is calibrated; a cause must explain what that leaves. How much chance and
-# errors of form explain is known from simulated measurements without any effect: 40 here, 210 by default. They set
+# errors of form explain is known from simulated measurements without any effect: 40 here, 200 by default. They set
 # the threshold that a cause must pass.
 
 # %%

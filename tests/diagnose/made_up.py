@@ -23,9 +23,10 @@ def heat(**changes: object) -> Cause:
     return replace(cause, **changes)
 
 
-SENSOR = Cause("sensor", "sensors.x_nut", "", 0.81 / 86400, (0.7 / 86400, 0.92 / 86400), "K/s", 312.0, 18.0, "drift")
+SENSOR = Cause("sensor", "sensors.x_nut", "", 0.81, (0.7, 0.92), "K/day", 312.0, 18.0, "drift")
 SIGNAL = Cause("signal", "signals.x_current", "signals.x_current.factor", 0.5, (0.48, 0.52), "1", 220.0, 19.0, "factor")
 SCALE = Cause("scale_expansion", "scales.x", "scales.found_1", 1.13e-5, (1.05e-5, 1.21e-5), "1/K", 90.0, 20.0)
+STRAINED = Cause("loss_law", "sources.x_motor", "", 1.62, (1.55, 1.7), "1", 158.0, 6.25)  # freed of its tolerance
 STEP = Cause(
     "not_thermal", "tcp.y", "", 12.4e-6, (11.9e-6, 12.9e-6), "m", 150.0, 22.0, "step",
     windows=(Window("run_1", 14400.0, 28800.0), Window("run_2", 0.0, 3600.0, 0.5)),
@@ -59,12 +60,12 @@ def series(run: str, rng: np.random.Generator, sensors: int = 6, bins: int = 60,
     )
 
 
-def gains(rng: np.random.Generator, sensors: int = 6) -> tuple[Gain, ...]:
+def made_gains(run: str = "sealed_run", sensors: int = 6) -> tuple[Gain, ...]:
     temperatures = tuple(
-        Gain(f"sensor_{k}", "K", 1.2 / (k + 1), 0.6 / (k + 1), 0.05, (0.5 / (k + 1) - 0.15, 0.7 / (k + 1)), k < 4)
+        Gain(run, f"sensor_{k}", "K", 1.2 / (k + 1), 0.6 / (k + 1), 0.05, (0.5 / (k + 1) - 0.15, 0.7 / (k + 1)), k < 4)
         for k in range(sensors)
     )
-    tcp = tuple(Gain(f"d{a}", "m", 9e-6, 4e-6, 1.1e-6, (2e-6, 4e-6), a != "z") for a in "xyz")
+    tcp = tuple(Gain(run, f"d{a}", "m", 9e-6, 4e-6, 1.1e-6, (2e-6, 4e-6), a != "z") for a in "xyz")
     return temperatures + tcp
 
 
@@ -73,7 +74,7 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
     causes: dict[str, tuple[Cause, ...]] = {
         "named": (heat(), SCALE),
         "ambiguous": (heat(),),
-        "out_of_tolerance": (),
+        "out_of_tolerance": (STRAINED,),
         "unknown": (),
         "sensor": (SENSOR,),
         "signal": (SIGNAL,),
@@ -86,7 +87,11 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
         for k in range(10)
     )
     cosine = np.corrcoef(rng.standard_normal((10, 30)))
-    quiet = verdict in ("nothing", "out_of_tolerance")
+    quiet = verdict == "nothing"
+    strained = (
+        Pull("films.bed.gain", 1.0, 3.0, 0.4, 4.6, "1"),
+        Pull("sources.x_motor.gain", 1.0, 1.62, 0.2, 2.2, "1", freed=True),
+    )
     return Diagnosis(
         machine="five_axis",
         verdict=verdict,
@@ -95,23 +100,24 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
         pulls=tuple(
             Pull(f"films.part_{k}.gain", 1.0, 1.0 + 0.1 * v, 0.4, v, "1") for k, v in enumerate(rng.standard_normal(18))
         )
-        + ((Pull("sources.x_motor.gain", 1.0, 1.62, 0.2, 4.1, "1"),) if verdict == "out_of_tolerance" else ()),
-        limits=(
+        + (strained if verdict == "out_of_tolerance" else ()),
+        detection_limits=(
             Limit("heat_source", "bed.left", 11.6, 4.2, 61.0, "W"),
             Limit("film_gain", "films.bed", 0.21, 0.1, 0.8, "1"),
             Limit("forced_convection", "films.bed", 3.4, 1.1, 12.0, "W/(m^2 K)"),
-            Limit("sensor", "sensors.bed", 0.31 / 86400, 0.1 / 86400, 0.9 / 86400, "K/s"),
+            Limit("sensor", "sensors.bed", 0.31, 0.1, 0.9, "K/day"),
             Limit("not_thermal", "tcp.x", 2.3e-6, 2e-6, 4e-6, "m"),
         ),
         unknown=Unknown(
             "column", "column.top", 96.0, 24.0,
             {"run_1": (tuple(t), tuple(power), tuple(np.full(20, 6.0)))}, (("hydraulics", 0.83), ("x_speed", -0.1)),
         ) if verdict == "unknown" else None,
-        gain=() if quiet else gains(rng),
+        gain=() if quiet else made_gains(),
         ranked=ranked,
         cosine=cosine,
         nulls={family: 8.0 + 2.5 * rng.gumbel(size=60) for family in (*FAMILIES, "unknown")},
-        thresholds=dict.fromkeys((*FAMILIES, "unknown"), 21.4),
+        thresholds=dict.fromkeys((*FAMILIES, "unknown"), 21.4) | {"loss_law": 36.0}
+        | {c.family: c.threshold for c in causes[verdict] if c is not STRAINED},
         observed={family: 5.0 + k for k, family in enumerate(FAMILIES)}
         | ({} if quiet else {"heat_source": 431.2, "film_gain": 120.0}),
         whiteness=tuple((f"sensor_{k}", 0.95 - 0.02 * k, 0.2 * rng.standard_normal()) for k in range(6)),

@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 import math
+import shlex
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from twin.diagnose.damage import DAMAGES, HEATING_TIME, damaged
+from tests.support.descriptions import MACHINES
+from twin.cli.main import run as twin
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.damage import DAMAGES, damaged
 from twin.diagnose.damage_access import Damage
-from twin.errors import LogError
+from twin.diagnose.hide import SETTINGS, UNITS, Hidden, hide
+from twin.diagnose.readings import _within_set
+from twin.errors import LogError, TwinError
+from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
+from twin.logs.write import write_run
+from twin.machine.load import load_machine
 
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "hiding.md").read_text(encoding="utf-8")
+MACHINE = {path.parent.name: path.parent for path in MACHINES}
 TIME = np.arange(0.0, 36000.0, 60.0)
 ROWS = np.arange(0.0, 36000.0, 1800.0)
+AT = np.tile([-0.2, 0.3], 10)  # m, of axis x
 
 
 def a_run() -> Run:
@@ -26,7 +41,7 @@ def a_run() -> Run:
     return Run(
         loads=Table(TIME, {"current": current, "air": air}, {"current": "A", "air": "degC"}),
         temperatures=Table(TIME, {"a": a, "b": b}, {"a": "degC", "b": "degC"}),
-        tcp=Tcp(ROWS, ("x",), np.zeros((len(ROWS), 1)), displacement),
+        tcp=Tcp(ROWS, ("x",), AT[:, None], displacement),
         initial_temperature=20.0,
     )
 
@@ -34,13 +49,14 @@ def a_run() -> Run:
 RUN = a_run()
 A, B = (RUN.temperatures.columns[n] for n in "ab")
 LATE, EARLY = TIME >= 14400.0, TIME < 14400.0
-SIZES = {"K": 0.6, "s": 1200.0, "1": 0.5, "": math.nan, "m": 4e-6, "rad": 0.1}
+SETS = replace(RUN, tcp=replace(RUN.tcp, time=(ROWS[::4, None] + [0.0, 60.0, 300.0, 960.0]).ravel()))  # of 4 rows
+SIZES = {"K": 0.6, "s": 1200.0, "1": 0.5, "": math.nan, "m": 4e-6}
 PLACES = {"sensor": "sensors.a", "signal": "signals.current", "initial_state": "run"}
 
 
 def of_kind(family: str, history: str, **more) -> Damage:
     unit = DAMAGES[family][history].unit
-    place = PLACES.get(family, "tcp.z" if history == "frame" else "tcp.dx")
+    place = PLACES.get(family, "tcp.dx:x" if history == "frame" else "tcp.dx")
     signal = {"detached": "air", "load": "current"}.get(history, "")
     other = "sensors.b" if history == "swapped" else ""
     return Damage(family, place, SIZES[unit], history, signal, other, **more)
@@ -52,11 +68,12 @@ def sensor(name: str, d: Damage) -> np.ndarray:
 
 @pytest.mark.parametrize(("family", "history"), [(f, h) for f, kinds in DAMAGES.items() for h in kinds])
 def test_one_table_changes_and_is_told_to_be_computed(family, history):
-    before = a_run()
-    after = damaged(RUN, of_kind(family, history))
+    given = SETS if history == "heating" else RUN
+    before = replace(a_run(), tcp=given.tcp)
+    after = damaged(given, of_kind(family, history))
     table = {"sensor": "temperatures", "signal": "loads", "initial_state": "initial_temperature"}.get(family, "tcp")
     for name in ("loads", "temperatures", "tcp"):
-        assert (getattr(after, name) is getattr(RUN, name)) == (name != table)
+        assert (getattr(after, name) is getattr(given, name)) == (name != table)
     assert after.synthetic == (() if family == "initial_state" else (table,))
     for name in ("a", "b"):  # pure: the run that is given stays
         assert np.array_equal(RUN.temperatures.columns[name], before.temperatures.columns[name])
@@ -121,6 +138,29 @@ def test_signals():
     assert set(late[:20]) == {8.0}
 
 
+@pytest.mark.parametrize("place", ["run", "runs.monday"])
+def test_the_clock_of_a_run_makes_all_that_is_measured_late(place):
+    run = replace(RUN, folder=Path("runs/monday"))
+    after = damaged(run, replace(of_kind("signal", "clock"), place=place))
+    assert after.loads is run.loads
+    assert after.temperatures.time - TIME == pytest.approx(1200.0)  # what was true then is stamped later: y(t - 1200 s)
+    assert after.tcp.time - ROWS == pytest.approx(1200.0)
+    assert np.array_equal(after.temperatures.columns["a"], A)
+    assert np.array_equal(after.tcp.displacement, run.tcp.displacement)
+    assert after.synthetic == ("temperatures", "tcp")
+    with pytest.raises(LogError, match="whole run"):
+        damaged(run, replace(of_kind("signal", "clock"), place=place, start=3600.0))
+    with pytest.raises(LogError, match="nothing is measured"):
+        damaged(replace(run, temperatures=None, tcp=None), replace(of_kind("signal", "clock"), place=place))
+
+
+def test_a_stuck_sensor_is_free_again_at_the_end_of_the_fault():
+    after = sensor("a", of_kind("sensor", "stuck", start=14400.0, end=15000.0))
+    stuck = LATE & (TIME < 15000.0)
+    assert set(after[stuck]) == {A[TIME == 14400.0][0]}
+    assert np.array_equal(after[~stuck], A[~stuck])
+
+
 def displacement(d: Damage, run: Run = RUN) -> np.ndarray:
     """um, what has been added."""
     return 1e6 * (damaged(run, d).tcp.displacement - run.tcp.displacement)
@@ -156,13 +196,19 @@ def test_rows_that_count_from_the_first_lose_what_that_one_has():
 
 def test_measuring_devices():
     assert displacement(of_kind("measurement", "drift"))[[0, -1], 0].tolist() == pytest.approx([0.0, 4.0])
-    warm = displacement(of_kind("measurement", "heating"))[:, 0]
-    assert warm[ROWS == HEATING_TIME] == pytest.approx(4.0 * (1.0 - math.exp(-1.0)))
-    turned = damaged(RUN, of_kind("measurement", "frame")).tcp.displacement
-    before = RUN.tcp.displacement
-    assert np.linalg.norm(turned, axis=1) == pytest.approx(np.linalg.norm(before, axis=1))
-    assert turned[:, 2] == pytest.approx(before[:, 2])
-    assert turned[:, 0] == pytest.approx(math.cos(0.1) * before[:, 0] - math.sin(0.1) * before[:, 1])
+    warm = displacement(of_kind("measurement", "heating"), SETS)
+    first = np.array([0.0, 1.0, 2.0, 0.0])  # the fourth row is more than 10 min behind the third: another measurement
+    assert warm[:, 0] == pytest.approx(np.tile(4.0 * first / 2.0, 5))
+    assert warm[:, 0] == pytest.approx(4.0 * _within_set(SETS.tcp.time))  # as it is searched
+    assert not warm[:, 1:].any()
+    with pytest.raises(LogError, match="every measurement is one row"):
+        damaged(RUN, of_kind("measurement", "heating"))
+    askew = displacement(replace(of_kind("measurement", "frame"), size=20e-6))
+    assert askew[:, 0] == pytest.approx(20.0 * AT)  # w + a position
+    assert not askew[:, 1:].any()
+    resting = replace(RUN, tcp=replace(RUN.tcp, position=np.full((len(ROWS), 1), 0.1)))
+    with pytest.raises(LogError, match="stands still"):
+        damaged(resting, of_kind("measurement", "frame"))
 
 
 def test_a_load_bends_where_it_acts():
@@ -174,6 +220,8 @@ def test_a_stated_temperature_is_off():
     assert damaged(RUN, of_kind("initial_state", "offset")).initial_temperature == pytest.approx(20.6)
     with pytest.raises(LogError, match="states no initial temperature"):
         damaged(replace(RUN, initial_temperature=None), of_kind("initial_state", "offset"))
+    with pytest.raises(LogError, match="whole run"):
+        damaged(RUN, of_kind("initial_state", "offset", end=3600.0))
 
 
 @pytest.mark.parametrize(
@@ -186,6 +234,9 @@ def test_a_stated_temperature_is_off():
         (Damage("sensor", "sensors.a", 0.5, "detached"), "needs a column"),
         (Damage("sensor", "sensors.a", 1.5, "detached", "air"), "share"),
         (Damage("slip", "tcp.dw", 1e-6), "tcp.dx"),
+        (Damage("measurement", "tcp.z", 1e-5, "frame"), "places are: tcp.dx:x, tcp.dy:x, tcp.dz:x"),
+        (Damage("initial_state", "bed", 1.0), "places are: run, runs."),
+        (Damage("signal", "runs.monday", 60.0, "clock"), "places are: run, runs."),
         (Damage("heat_source", "bed.top", 1.0), "no fault of a log"),
         (Damage("not_thermal", "tcp.dx", 1e-6, "load", "force"), "no column 'force'"),
     ],
@@ -199,3 +250,99 @@ def test_what_is_not_there_is_told(d, told):
 def test_faults_of_the_tool_need_its_measurements():
     with pytest.raises(LogError, match=r"no tcp\.csv"):
         damaged(replace(RUN, tcp=None), of_kind("slip", "play"))
+
+
+@pytest.fixture
+def measured(tmp_path) -> Path:
+    folder = tmp_path / "measured"
+    write_run(folder, SETS)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        (Hidden("sensor", "sensors.a", "1 K", start=7200.0, end=3600.0), "between --from and --to"),
+        (Hidden("sensor", "sensors.a", "1 K", start=3600.0, end=3600.0), "between --from and --to"),
+        (Hidden("sensor", "sensors.a", "1 K", start=36000.0), "within the run, 0 h .. 10 h"),
+        (Hidden("sensor", "sensors.a", "1 K", history="drift", end=-60.0), "within the run"),
+        (Hidden("not_thermal", "tcp.dx", "3 um", start=35000.0), "changes nothing"),  # after the last TCP row
+        (Hidden("sensor", "sensors.a", "0 K"), "changes nothing"),
+        (Hidden("signal", "signals.current", "1"), "changes nothing"),
+        (Hidden("sensor", "sensors.a", "1 K", signal="air"), "follows no column"),
+        (Hidden("measurement", "tcp.dx:x", "5 deg", history="frame"), "not a quantity in 1"),
+        (Hidden("initial_state", "sensors.a", "1 K"), "places are: run, runs.measured"),
+    ],
+)
+def test_a_copy_without_its_fault_is_not_written(asked, told, measured, tmp_path):
+    with pytest.raises(TwinError) as e:
+        hide(asked, measured, tmp_path / "copy")
+    assert told in str(e.value)
+    assert not (tmp_path / "copy").exists()
+
+
+@pytest.mark.parametrize(
+    ("machine", "asked", "told"),
+    [
+        ("slide", Hidden("zone", "films.floor", "2 K/m"), "name environment.floor, or give a size in K"),
+        ("slide", Hidden("heat_source", "bed.x_max", "2 W", settings={"temperature": "9 degC"}), "no setting"),
+        ("slide", Hidden("heat_source", "bed.x_max", "2 W", exponent=2.0), "--exponent"),
+        ("slide", Hidden("heat_source", "bed.x_max", "2 W", start=-7200.0, end=-3600.0), "between --from and --to"),
+        ("spindle", Hidden("forced_convection", "housing", "2 W/(m^2*K)", signal="spindle_speed"), "docs/hiding.md"),
+    ],
+)
+def test_what_a_machine_cannot_have_is_told(machine, asked, told, tmp_path):
+    with pytest.raises(TwinError) as e:
+        hide(asked, MACHINE[machine], tmp_path / "copy")
+    assert told in str(e.value)
+    assert not (tmp_path / "copy").exists()
+
+
+def test_a_late_clock_can_be_written_and_read(measured, tmp_path):
+    hide(Hidden("signal", "runs.measured", "6 min", history="clock"), measured, tmp_path / "copy")
+    assert read_run(tmp_path / "copy").temperatures.time - TIME == pytest.approx(360.0)
+
+
+def rows_of_the_page() -> dict[str, list[list[str]]]:
+    """The rows of the table of docs/hiding.md by family."""
+    found: dict[str, list[list[str]]] = {}
+    name = ""
+    for line in PAGE.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) == 7 and cells[0] not in ("#", "---"):
+            name = cells[1].strip("`") or name
+            found.setdefault(name, []).append(cells)
+    return found
+
+
+def test_the_page_has_every_family_with_its_units_kinds_and_settings():
+    rows = rows_of_the_page()
+    assert [(int(own[0][0]), name) for name, own in rows.items()] == [(f.number, f.name) for f in FAMILIES]
+    for name, kinds in DAMAGES.items():
+        assert rows[name][0][2] == "log"
+        for kind, entry in kinds.items():
+            own = [r for r in rows[name] if f"`--history {kind}`" in r[5]]
+            assert own, kind
+            assert all(f"[{entry.unit}]" in r[4] for r in own if entry.unit)
+    for name, units in UNITS.items():
+        assert rows[name][0][2] == "machine"
+        assert all(any(f"[{unit}]" in r[4] for r in rows[name]) for unit in units), name
+    for name, settings in SETTINGS.items():
+        assert all(any(f"`{setting}" in r[5] for r in rows[name]) for setting in settings), name
+
+
+def test_the_commands_of_the_page_work(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    calls = [shlex.split(line) for line in PAGE.splitlines() if line.startswith("    twin ")]
+    for call in calls:
+        assert twin([str(tmp_path / word) if word.startswith("out/") else word for word in call[1:]]) == 0, call
+    hidden = {call[2] for call in calls if call[1] == "hide"}
+    assert hidden == {f.name for f in FAMILIES} - {"coarse_model"}
+    assert "error" not in capsys.readouterr().err
+
+
+def test_the_wind_of_the_page_is_a_film():
+    wind = PAGE.split("```toml\n")[1].split("```")[0]
+    path = MACHINE["spindle"] / "machine.toml"
+    machine = load_machine(path, path.read_text(encoding="utf-8") + "\n" + wind)
+    assert machine.films["spindle_wind"].signals == tomllib.loads(wind)["films"]["spindle_wind"]["signals"]

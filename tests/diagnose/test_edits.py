@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.support.descriptions import MACHINES
+from twin.cli.main import run as command
 from twin.diagnose.diagnosis import Cause, Window
 from twin.diagnose.edits import EDITS, extended_description, loads_with
 from twin.errors import DescriptionError
@@ -307,6 +309,27 @@ def test_windows_become_columns_of_their_runs():
     assert out.loads.columns["found_2"].tolist() == [1.0, 1.0, 1.0, 1.0]
     assert (out.loads.units["found_1"], out.loads.columns["air"].tolist()) == ("1", [20.0] * 4)
     assert "found_1" not in run.loads.columns
+    assert loads_with(run, {"found_1": windows}, "b").loads.columns["found_1"].tolist() == [1.0] * 4
+    assert loads_with(run, {"found_1": windows}, "a-2").loads.columns["found_1"].tolist() == [0.0] * 4
+
+
+def test_a_run_that_is_here_has_the_name_of_its_folder(tmp_path, monkeypatch):
+    (tmp_path / "day").mkdir()
+    monkeypatch.chdir(tmp_path / "day")
+    loads = Table(np.array([0.0, 10.0]), {}, {})
+    out = loads_with(Run(loads, folder=Path(".")), {"found_1": (Window("day", 0.0, 20.0),)})
+    assert out.loads.columns["found_1"].tolist() == [1.0, 1.0]
+
+
+def test_hidden_in_runs_whose_folders_have_one_name(tmp_path, capsys):
+    folder = FILES["spindle"].parent
+    arguments = ["hide", "heat_source", "housing", "9 W", str(folder), "-o", str(tmp_path / "out"), "--from", "1 min"]
+    runs = [tmp_path / week / "day" for week in "ab"]
+    for day in runs:
+        shutil.copytree(folder / "runs" / "warm_up", day)
+    assert command([*arguments, "--run", str(runs[0]), "--run", str(runs[1])]) == 2
+    assert "two runs are called 'day'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_one_film_may_have_air_of_its_own():

@@ -2,21 +2,41 @@
 
 import json
 import re
+import tomllib
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.diagnose.made_up import SENSOR, STEP, diagnosis, heat, series
-from twin.diagnose.diagnosis import VERDICTS, Diagnosis, Gain, Limit, Rival
+from tests.calibrate import lumped_case
+from tests.diagnose import small_case
+from tests.diagnose.made_up import SENSOR, SIGNAL, STEP, STRAINED, diagnosis, heat, made_gains, series
+from twin.diagnose.accepted import Accepted
+from twin.diagnose.batch import Hypothesis
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.diagnose import Result
+from twin.diagnose.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Limit, Rival, Window
+from twin.diagnose.extension import write_extension
+from twin.diagnose.gain import gains
 from twin.diagnose.report_evidence import candidates_picture, cosine_picture, nulls_picture
 from twin.diagnose.report_gain import broken
 from twin.diagnose.report_numbers import customary, number, quantity, size_words
 from twin.diagnose.report_page import page, plain, summary_lines, write_report
 from twin.diagnose.report_residuals import load_rows, loudest, on_masks, residual_map, with_gaps
-from twin.diagnose.report_tables import table, when
-from twin.diagnose.report_text import chance, evidence_sentence, near_interval, verdict_sentence
+from twin.diagnose.report_tables import gain_table, table, when
+from twin.diagnose.report_text import (
+    cause_evidence,
+    chance,
+    evidence_sentence,
+    gain_sentences,
+    near_interval,
+    pull_of,
+    verdict_sentence,
+)
+from twin.diagnose.search import search
+from twin.diagnose.verdict import pulls_of, verdict_of
 from twin.errors import TwinError
 
 SECTIONS = {"evidence", "gain", "residuals", "decision", "pulls", "unknown", "limits", "notes"}
@@ -90,7 +110,8 @@ SAID = {  # what the reader of each verdict must find
     "ambiguous": ("either heat that", "; or a loss that follows", "71.0 W", "What would tell them apart",
                   "a sensor on bed.x_motor"),
     "unknown": ("part column, mostly at column.top", "its peak is 40 W (95 % interval 28 to 52 W)", "hydraulics"),
-    "out_of_tolerance": ("Declared values cannot hold: sources.x_motor.gain is 1.62 instead of 1.00 (+4.1",),
+    "out_of_tolerance": ("Declared values cannot hold: sources.x_motor.gain is 1.620 (95 % interval 1.550 to 1.700) "
+                         "instead of 1.00 (+2.2 standard deviations", "sources.x_motor.gain (free of its tolerance)"),
     "sensor": ("sensor x_nut is at fault: drift, 0.81 K/day (95 % interval 0.70 to 0.92 K/day)",
                "The model of the machine is left as it is"),
     "signal": ("signal x_current is at fault: factor, 0.500", "0.480 to 0.520"),
@@ -113,7 +134,7 @@ def test_the_page_of_every_verdict_says_it_first_and_has_every_section(written, 
                     "sealed_run: measured and simulated"):  # fmt: skip
         assert picture in reader.text, picture
     assert ("Heat into column that nothing explains" in reader.text) == (verdict == "unknown")
-    assert ("Gain per channel" in reader.text) == (verdict not in ("nothing", "out_of_tolerance"))
+    assert ("Gain per channel" in reader.text) == (verdict != "nothing")
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
@@ -128,6 +149,33 @@ def test_report_json_is_the_diagnosis(written, verdict):
     assert sorted(p.name for p in folder.iterdir()) == ["index.html", "report.json"]
 
 
+def test_report_json_has_the_keys_that_its_page_explains(written):
+    """docs/diagnosis_report.md has a row per key; those of what a list or a table holds are told as key.inner."""
+    with open(written("unknown") / "report.json", encoding="utf-8") as f:
+        found = json.load(f)
+    found["causes"] = plain(diagnosis("named").to_json())["causes"]
+    found["causes"][0]["windows"] = plain(replace(diagnosis("named"), causes=(STEP,)).to_json())["causes"][0]["windows"]
+    assert {"place", "part", "surface", "history", "correlated_signals"} < found["unknown"].keys()
+    assert found["unknown"]["place"] == "column.top"
+    assert found["unknown"]["correlated_signals"][0] == ["hydraulics", 0.83]
+    assert [limit["family"] for limit in found["detection_limits"]][:1] == ["heat_source"]
+    page = (Path(__file__).parents[2] / "docs" / "diagnosis_report.md").read_text("utf-8")
+    told = {key for row in re.findall(r"^\| (`[^|]*) \|", page, re.MULTILINE) for key in re.findall(r"`([^`]*)`", row)}
+    free = {"nulls", "thresholds", "observed", "provenance", "unknown.history", "causes.settings"}  # keys are names
+    assert told == set(keys(found, free))
+
+
+def keys(value, free, path=""):
+    """Paths of all keys of what JSON knows; what is `free` has names for keys."""
+    if isinstance(value, list):
+        for v in value:
+            yield from keys(v, free, path)
+    elif isinstance(value, dict) and path not in free:
+        for key, v in value.items():
+            yield (own := f"{path}.{key}".removeprefix("."))
+            yield from keys(v, free, own)
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_a_terminal_gets_at_most_ten_lines_with_the_verdict(verdict):
     lines = summary_lines(diagnosis(verdict))
@@ -135,7 +183,8 @@ def test_a_terminal_gets_at_most_ten_lines_with_the_verdict(verdict):
     assert all(line and "\n" not in line for line in lines)
     assert verdict_sentence(diagnosis(verdict)) == lines[1]
     assert any("would have shown at least" in line for line in lines) == (verdict == "nothing")
-    assert any("left as it is" in line for line in lines) == (verdict in ("sensor", "signal"))
+    assert any("left as it is" in line for line in lines) == (verdict == "sensor")
+    assert any("corrects the declaration" in line for line in lines) == (verdict == "signal")
 
 
 def test_equal_diagnoses_give_equal_pages(written):
@@ -162,14 +211,17 @@ def odd() -> Diagnosis:
     d = diagnosis("ambiguous")
     rival = Rival(EVIL, EVIL, EVIL, np.nan, EVIL, np.nan, np.nan, EVIL)
     cause = heat(place=EVIL, parameter=EVIL, history=EVIL, amplitude=np.nan, ci95=(np.nan, np.inf), rivals=(rival,))
-    gain = (Gain(EVIL, "K", 1.0, np.nan, 0.3, (np.nan, np.nan), True), Gain("a", "K", 1.0, 0.5, 0.3, (0.1, 0.3), True))
+    gain = (
+        Gain(EVIL, EVIL, "K", 1.0, np.nan, 0.3, (np.nan, np.nan), True),
+        Gain(EVIL, "a", "K", 1.0, 0.5, 0.3, (0.1, 0.3), True),
+    )
     return replace(
         d,
         machine=EVIL,
         summary=(EVIL,),
         causes=(cause,),
         pulls=(replace(d.pulls[0], path=EVIL, pull=np.nan, sigma=np.nan), replace(d.pulls[1], path=EVIL, pull=6.0)),
-        limits=(Limit(EVIL, EVIL, np.inf, np.nan, np.inf, "W"),),
+        detection_limits=(Limit(EVIL, EVIL, np.inf, np.nan, np.inf, "W"),),
         gain=gain,
         ranked=(*d.ranked[:3], rival),
         cosine=np.full((4, 4), np.nan),
@@ -199,8 +251,8 @@ def test_odd_names_and_missing_values_neither_break_the_page_nor_leave_it(tmp_pa
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_a_diagnosis_that_holds_nothing_but_its_verdict_is_a_page(verdict):
     empty = replace(
-        diagnosis(verdict), summary=(), causes=(), pulls=(), limits=(), unknown=None, gain=(), ranked=(), nulls={},
-        cosine=np.zeros((0, 0)), thresholds={}, observed={}, whiteness=(), series=(), notes=(), provenance={},
+        diagnosis(verdict), summary=(), causes=(), pulls=(), detection_limits=(), unknown=None, gain=(), ranked=(),
+        nulls={}, cosine=np.zeros((0, 0)), thresholds={}, observed={}, whiteness=(), series=(), notes=(), provenance={},
     )  # fmt: skip
     reader = read(page(empty))
     assert set(reader.sections) == SECTIONS
@@ -256,6 +308,109 @@ def test_chance_counts_what_data_without_an_effect_gave():
         "These data give a statistic of 431; 95.0 is needed."
     )
     assert "once in 20" in evidence_sentence(d, "heat_source", 431.2, 95.0)
+
+
+def test_what_is_out_of_tolerance_leads_whatever_else_is_pulled():
+    d = diagnosis("out_of_tolerance")
+    assert max(d.pulls, key=lambda p: abs(p.pull)).path == "films.bed.gain"
+    for text in (verdict_sentence(d), *summary_lines(d)):
+        assert "films.bed" not in text
+    text = read(page(replace(d, series=(), whiteness=(), ranked=(), gain=()))).text
+    assert "12.6 standard deviations of its fit" in text
+    assert text.index("sources.x_motor.gain lies +2.2") < text.index("films.bed.gain lies +4.6")
+    assert "Declared values cannot hold: films.bed.gain is 3.00 instead of 1.00 (+4.6" in verdict_sentence(
+        replace(d, causes=())
+    )
+
+
+def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
+    """As `twin diagnose` finds it: in the fit it stands at its declared value, and the size of the cause is told."""
+    yard = small_case.yardstick()
+    study = yard.study
+    parameters = study.bench.parameters
+    source = next(i for i, p in enumerate(parameters) if p.kind == "source")
+    x = np.zeros(len(parameters))
+    x[source] = 4.5
+    y = np.concatenate([study.outputs(k, x) for k in study.fitted])
+    found = search(yard, y + 0.1 * yard.whiten.colour(np.random.default_rng(1).standard_normal(len(y))))
+    verdict, causes = verdict_of(found, FAMILIES)
+    assert verdict == "out_of_tolerance"
+    d = replace(diagnosis("out_of_tolerance"), causes=causes, pulls=pulls_of(found))
+    pull, path = pull_of(d, causes[0]), parameters[source].path
+    assert (pull.path, pull.freed) == (path, True)
+    assert pull.pull == pytest.approx(4.5, abs=0.5)
+    assert pull.value == pytest.approx(pull.nominal * causes[0].amplitude)
+    assert 0.0 < pull.sigma < 1.0
+    assert verdict_sentence(d).startswith(f"Declared values cannot hold: {path} is {pull.value / pull.nominal:.1f}")
+    told = gains(found, 2, study.runs[2].measured, 1, (np.ones(3), np.ones(3)))
+    assert {g.run for g in told} == {study.runs[2].run.name}
+    result = Result(replace(d, series=()), found, causes)
+    write_extension(result, lumped_case.artefact(), small_case.machine(), (), tmp_path, build=False)
+    written = tomllib.loads((tmp_path / "machine.toml").read_text("utf-8"))
+    assert written["sources"][path.split(".")[1]]["gain"] == pytest.approx(pull.value)
+
+    # a conductance is a relative change, and may lie beyond its bounds
+    batch = next(b for b in yard.columns.batches if b.kind == "contact")
+    contact = next(p for p in parameters if p.path.startswith(f"{batch.places[0]}."))
+    h = Hypothesis(batch, 0, next(w for w in batch.histories if not w.windows), 50.0, (-0.9,), 1.0)
+    lost = Accepted(h, (), np.array([-0.9]), np.array([[1e-4]]), 50.0, 36.0, ())
+    pull = next(p for p in pulls_of(replace(found, accepted=(lost,))) if p.path == contact.path)
+    assert pull.value == pytest.approx(0.1 * contact.nominal)
+    assert pull.value < contact.low
+    assert pull.pull == pytest.approx(np.log(0.1) / contact.sigma)
+    assert pull.sigma == pytest.approx(0.1 / contact.sigma)
+
+
+def test_chance_is_told_of_what_was_held_against_synthetic_measurements_alone():
+    d = diagnosis("named")
+    assert "simulated data sets" in cause_evidence(d, d.causes[0])
+    stuck = Cause("sensor", "sensors.a", "", np.nan, (np.nan, np.nan), "K", np.inf, 0.0, "stuck",
+                  windows=(Window("run_1", 0.0, 9000.0),))  # fmt: skip
+    coarse = Cause("coarse_model", "artefact", "", 3.2, (3.2, 3.2), "1", 3.2, 1.0, "differs")
+    calibrated = replace(STRAINED, statistic=9.0, history="by calibration")
+    for cause, told in (
+        (stuck, "stood still for 2.50 h"),
+        (coarse, "3.20 times the noise of one reading (root mean square)"),
+        (STRAINED, "12.6 standard deviations of its fit from what was declared; 2.50 are needed"),
+        (calibrated, "3.00 standard deviations of its tolerance from what was declared; 2.50 are needed"),
+    ):
+        one = replace(diagnosis("out_of_tolerance"), causes=(cause,), series=(), whiteness=(), ranked=(), gain=())
+        assert told in cause_evidence(one, cause)
+        assert told in "".join(summary_lines(one))
+        for word in ("simulated", "once in", "statistic of"):
+            assert word not in cause_evidence(one, cause)
+
+
+def test_a_sensor_beside_does_not_lead_what_is_ambiguous_or_out_of_tolerance():
+    for verdict, told in (("ambiguous", "what: either heat that"), ("out_of_tolerance", "hold: sources.x_motor.gain")):
+        d = diagnosis(verdict)
+        text = verdict_sentence(replace(d, causes=(SENSOR, *d.causes)))
+        assert told in text
+        assert "; besides: sensor x_nut is at fault" in text
+
+
+def test_a_clock_that_is_off_changes_no_description():
+    clock = replace(SIGNAL, place="runs.run_1", parameter="", history="clock", amplitude=120.0, unit="s")
+    lines = summary_lines(replace(diagnosis("signal"), causes=(clock,)))
+    assert "The model of the machine is left as it is." in lines
+
+
+def test_every_sealed_run_is_told_apart():
+    d = replace(diagnosis("named"), ranked=(), whiteness=(), pulls=(), nulls={})
+    assert "sealed run</th>" not in gain_table(d)
+    assert all(text.startswith(("4 temp", "2 TCP", "2 temp", "1 TCP")) for text in gain_sentences(d))
+    rng = np.random.default_rng(3)
+    d = replace(d, gain=(*d.gain, *made_gains("other_run")), series=(*d.series, series("other_run", rng, sealed=True)))
+    assert gain_table(d).count("<td>other_run</td>") == gain_table(d).count("<td>sealed_run</td>") == 9
+    d = replace(d, series=d.series[1:])
+    text = read(page(d)).text
+    assert "Runs sealed_run, other_run were opened once" in text
+    for run in ("sealed_run", "other_run"):
+        assert f"Gain per channel on the sealed run {run}" in text
+        assert f"{run}: measured and simulated" in text
+        assert f"{run}: 4 temperatures that the causes move" in text
+    assert any(line.startswith("Sealed run sealed_run: 4 temperatures") for line in summary_lines(d))
+    assert {g["run"] for g in d.to_json()["gain"]} == {"sealed_run", "other_run"}
 
 
 def test_windows_are_told():

@@ -6,20 +6,25 @@ import fcntl
 from dataclasses import dataclass, replace
 from functools import cache
 
+import numpy as np
+
 from tests.hidden.load import MODEL
-from tests.hidden.trials import trial
+from tests.hidden.trials import TRIALS, trial
 from twin.build.cache import folder
+from twin.build.project import orthonormalise, project
 from twin.calibrate.measured import measured
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.coarse import coarse_model
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.diagnosis import Cause, Verdict
 from twin.diagnose.search import search
 from twin.diagnose.study import with_measured
-from twin.diagnose.verdict import unknown_of, verdict_of
+from twin.diagnose.verdict import unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
 from twin.diagnose.yardstick import Yardstick
 from twin.machine.load import load_machine
+from twin.rom.model import MachineModel
 
 SETTINGS = Settings(temperature_sigma=0.08)  # as the campaign: they share a yardstick
 QUICK = replace(SETTINGS, form=16, nulls=40)  # thresholds from few synthetic measurements: most are the floor anyway
@@ -61,8 +66,19 @@ def said(settings: Settings, name: str) -> Said:
         for run, p in zip([*usable, runs[2]], study.runs, strict=True)
     ]
     found = search(yard, measured_of(with_measured(study, plans)))
-    verdict, causes = verdict_of(found, FAMILIES)
+    verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
+    if states := TRIALS[name].states:
+        blamed = coarse_model(_few(yard, states), study, settings.temperature_sigma, settings.tcp_sigma)
+        verdict, causes = with_faults(verdict, causes, [] if blamed is None else [blamed], "named")
     unknown = unknown_of(found)
-    if stuck:
-        verdict, causes = "sensor" if verdict == "nothing" else verdict, (*stuck, *causes)
     return Said(verdict, causes, "" if unknown is None else unknown.part)
+
+
+def _few(yard: Yardstick, states: int) -> MachineModel:
+    """A model of few states: the leading directions of what the described machine does in the runs."""
+    study = yard.study
+    (body,) = study.bench.base.bodies
+    shown = np.vstack([study.states(k, np.zeros(len(study.bench.parameters))) for k in study.fitted])
+    V = np.linalg.svd(shown, full_matrices=False)[2][: states - 1].T
+    small = project(body, orthonormalise(np.column_stack([body.one, V]), body.E))
+    return replace(study.bench.base, bodies=(small,))

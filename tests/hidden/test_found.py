@@ -13,9 +13,8 @@ ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few
 LONG = ("outside", "pair", "sun", "two", *OWN)  # minutes long, or for minutes at a yardstick of their own
 # Not said as it should be: `make hidden` shows it, with the long ones.
 MISSED = ("coolant", "film_gain", "joint", "capacity", "initial_state", "slip")
-NAMES = [name for name in TRIALS if name != "coarse_model"]
 PARAMETERS = [
-    pytest.param(name, marks=[pytest.mark.slow] if name in (*MISSED, *LONG, *ROUGH) else []) for name in NAMES
+    pytest.param(name, marks=[pytest.mark.slow] if name in (*MISSED, *LONG, *ROUGH) else []) for name in TRIALS
 ]
 
 
@@ -29,7 +28,7 @@ def settings(request):
 def everything(request, settings) -> dict[str, Said]:
     """All trials that were asked for, two at a time."""
     asked = {item.callspec.params["name"] for item in request.session.items if "everything" in item.fixturenames}
-    names = [name for name in NAMES if name in asked]
+    names = [name for name in TRIALS if name in asked]
     yardstick(settings)
     return dict(zip(names, each(said, settings, names, long=0.0), strict=True))
 

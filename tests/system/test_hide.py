@@ -35,7 +35,7 @@ def measured(tmp_path):
         replace(
             log,
             temperatures=Table(time, columns, dict.fromkeys(columns, "degC")),
-            tcp=Tcp(rows, ("x",), np.zeros((len(rows), 1)), growth),
+            tcp=Tcp(rows, ("x",), np.linspace(-0.1, 0.1, len(rows))[:, None], growth),
             synthetic=(),
         ),
     )
@@ -138,7 +138,7 @@ def test_meshes_and_geometry_come_along(tmp_path):
         ["signal", "signals.x_motor_current", "2"],
         ["slip", "tcp.dx", "5 um"],
         ["initial_state", "run", "1 K"],
-        ["measurement", "tcp.z", "5 deg", "--history", "frame"],
+        ["measurement", "tcp.dx:x", "20 um/m", "--history", "frame"],
         ["not_thermal", "tcp.dy", "3 um", "--from", "10 min"],
     ],
     ids=lambda call: call[0],

@@ -17,12 +17,12 @@ import click
 @click.option("--noise", default="0.1 K", show_default=True, help="standard deviation of one temperature reading")
 @click.option("--tcp-noise", default="1 um", show_default=True, help="of a TCP deviation, where tcp.csv has no sigma")
 @click.option("--exclude", multiple=True, help="sensor to leave out; repeatable")
-@click.option("--nulls", default=210, show_default=True, type=click.IntRange(20),
-              help="synthetic runs without a cause that thresholds come from; 90 more show errors of form")  # fmt: skip
+@click.option("--nulls", default=200, show_default=True, type=click.IntRange(20),
+              help="synthetic runs without a cause that thresholds come from; 60 more show errors of form")  # fmt: skip
 @click.option("--catalogue", type=click.Path(), help="Python file with entries of your own (FAMILIES)")
 @click.option("--machine", type=click.Path(), help="description with its meshes, where it has moved since the build")
 @click.option("--no-build", is_flag=True, help="write the extended description, but do not build its artefact")
-@click.option("--seed", default=1, show_default=True, help="of the bootstrap")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(0), help="of the bootstrap")
 @click.option("--explain", metavar="FAMILY", help="print an entry of the catalogue, or 'all'")
 def command(
     artefact: str | None, runs: tuple[str, ...], sealed: tuple[str, ...], output: str | None, noise: str,
@@ -32,8 +32,10 @@ def command(
     """Say what ARTEFACT gets wrong about the measured RUNS, and what it gains to know.
 
     Writes OUTPUT/index.html (readable as it is), OUTPUT/report.json, and, where a cause belongs into the description,
-    OUTPUT/machine.toml with the effect added and OUTPUT/extended.h5 built from it. The artefact stays untouched.
+    OUTPUT/machine.toml with the effect added and OUTPUT/extended.h5 built from it. What a former diagnosis left in
+    OUTPUT is replaced. The artefact stays untouched.
     """
+    from dataclasses import replace
     from pathlib import Path
 
     from twin.diagnose.catalogue import FAMILIES, explained, family, with_own
@@ -52,8 +54,8 @@ def command(
     from twin.atomic import check_folder
     from twin.cli.quantity import positive
     from twin.diagnose.diagnose import Settings, diagnose, machine_of
-    from twin.diagnose.extension import write_extension
-    from twin.diagnose.report_page import summary_lines, write_report
+    from twin.diagnose.extension import build_extension, refuse_target, write_extension
+    from twin.diagnose.report_page import summary_lines
     from twin.logs.read import read_run
     from twin.progress import bar
     from twin.rom.artefact import read_artefact
@@ -78,11 +80,12 @@ def command(
         seed=seed,
     )
     described = machine_of(loaded, Path(artefact), Path(machine) if machine else None)
-    looked_at, closed = [read_run(Path(r)) for r in runs], [read_run(Path(r)) for r in sealed]
-    result = diagnose(loaded, described, looked_at, closed, settings, bar)
-    target.mkdir(parents=True, exist_ok=True)
-    diagnosis, said = write_extension(result, loaded, described, [*looked_at, *closed], target, not no_build, bar)
-    write_report(diagnosis, target)
+    read = [replace(read_run(path), folder=path.resolve()) for path in every]  # "." has a name, too
+    refuse_target(target, Path(artefact), described, read)
+    result = diagnose(loaded, described, read[: len(runs)], read[len(runs) :], settings, bar)
+    diagnosis, said = write_extension(result, loaded, described, read, target, build=False)
     for line in [*summary_lines(diagnosis), *said]:
         click.echo(line)
+    if diagnosis.provenance["files"] and not no_build:  # minutes, in which all else is there already
+        click.echo(build_extension(target, bar))
     return 0

@@ -53,5 +53,8 @@ def command(
         end=None if end is None else option("--to", end, "s"),
         settings=settings,
     )
+    names = [Path(run).resolve().name for run in runs]
+    if twice := sorted({n for n in names if names.count(n) > 1}):
+        raise TwinError(f"two runs are called '{twice[0]}'", "--run", "rename a folder: copies keep these names")
     for line in hide(asked, Path(target), Path(output), [Path(run) for run in runs]):
         click.echo(line)

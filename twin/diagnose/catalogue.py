@@ -8,7 +8,7 @@ entries of their own: a Python file with `FAMILIES = (Family(...), ...)`, given 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from twin.diagnose import hypotheses as of
@@ -35,6 +35,7 @@ class Family:
     searched: str  # places and histories
     group: str  # "machine", "sensor", "signal", "reading": which verdict and which edit
     batches: Callable[[Context], list[Batch]]
+    file: str = ""  # text of the user's file that it is from: what was made with another text is made again
 
 
 FAMILIES: tuple[Family, ...] = (
@@ -44,7 +45,8 @@ FAMILIES: tuple[Family, ...] = (
         "eta (-A_f x + M_f (T_air - T_ref))",
         "residual goes with surface minus air, changes sign when the machine is colder than the air; time constants "
         "move",
-        "1 W/(m^2 K) on a surface, 20 % of a film", "either", "every film and every named surface, always", "machine",
+        "1 W/(m^2 K) on a surface, 20 % of a film", "either", "every film and every surface with one, always",
+        "machine",
         of.film_gain,
     ),
     Family(
@@ -77,7 +79,8 @@ FAMILIES: tuple[Family, ...] = (
         6, "zone", "One air temperature is not enough",
         "The air differs from where it is measured: warmer above, warmer in a zone, a door, a draught.",
         "a h_f M_f z, or g(t) h_f M_f dT", "goes with height, or with a door's hours; many sensors of one zone alike",
-        "0.3 K, 0.3 K/m", "either", "every environment, film and gradient; always and every window", "machine", of.zone,
+        "0.3 K (0.5 K at one film), 0.3 K/m", "either", "every environment, film and gradient; always and every window",
+        "machine", of.zone,
     ),
     Family(
         7, "sun", "Sun or a hot neighbour on one side",
@@ -89,7 +92,7 @@ FAMILIES: tuple[Family, ...] = (
         8, "coolant", "Coolant or chips on a surface",
         "A liquid of its own temperature wets a surface while a valve is open.",
         "g(t) h (-A_p x + M_p (T_medium - T_ref))", "sharp onset and end; pulls the surface to one temperature",
-        "5 W/(m^2 K)", "positive", "every surface; every window of hours", "machine", of.coolant,
+        "5 W/(m^2 K)", "positive", "every surface with a film; every window of hours", "machine", of.coolant,
     ),
     Family(
         9, "sensor", "A temperature sensor is at fault",
@@ -138,8 +141,8 @@ FAMILIES: tuple[Family, ...] = (
         16, "coarse_model", "Reduced model or time step too coarse",
         "The artefact does not follow its own full model on this input.",
         "none: more states, a shorter step", "the artefact differs from the full model; the full model fits",
-        "half a sensor's noise", "-", "the artefact's runtime against the rich model on these loads", "reading",
-        of.none,
+        "the noise of one reading (rms)", "-", "the artefact's runtime against the larger model of the diagnosis",
+        "reading", of.none,
     ),
     Family(
         17, "measurement", "The measurement itself",
@@ -178,7 +181,8 @@ def with_own(path: Path) -> tuple[Family, ...]:
     """
     scope: dict[str, object] = {"__name__": "own_catalogue", "__file__": str(path)}
     try:
-        exec(compile(path.read_text("utf-8"), str(path), "exec"), scope)
+        text = path.read_text("utf-8")
+        exec(compile(text, str(path), "exec"), scope)
     except OSError as e:
         raise TwinError("cannot be read", str(path), "give a Python file that defines FAMILIES") from e
     except Exception as e:
@@ -189,7 +193,7 @@ def with_own(path: Path) -> tuple[Family, ...]:
     if not isinstance(own, tuple) or not all(isinstance(f, Family) for f in own):
         raise TwinError("defines no tuple FAMILIES of Family", str(path), "see the example in docs/diagnosis.md")
     names = {f.name for f in own}
-    return (*own, *(f for f in FAMILIES if f.name not in names))
+    return (*(replace(f, file=text) for f in own), *(f for f in FAMILIES if f.name not in names))
 
 
 def explained(entry: Family) -> str:

@@ -13,26 +13,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.damage_access import (
-    COMPONENTS,
     Damage,
     acts,
     column_at,
     component,
+    component_and_axis,
+    expect_whole,
     grown,
     load_of,
     marked,
     sensor_of,
+    set_of,
     tcp_time,
     with_load,
     with_sensors,
     with_tcp,
 )  # fmt: skip
-from twin.diagnose.readings import SET_GAP
 from twin.errors import LogError
 from twin.logs.run import Run
 from twin.nearest import did_you_mean
-
-HEATING_TIME = 3600.0  # s: in which a measuring device warms up to 63 %
 
 
 @dataclass(frozen=True)
@@ -42,6 +41,7 @@ class Kind:
     damaged: Callable[[Run, Damage], Run]
     unit: str  # of the size; "" where it is a name
     meaning: str
+    follows: bool = False  # a column: --signal
 
 
 def damaged(run: Run, damage: Damage) -> Run:
@@ -99,7 +99,7 @@ def _stuck(run: Run, d: Damage) -> Run:
     table, name = sensor_of(run, d.place)
     values = np.array(table.columns[name], dtype=float)
     first = table.time[0] if d.start == -math.inf else d.start
-    kept = (table.time >= first) & (table.time < first + d.size)
+    kept = (table.time >= first) & (table.time < min(first + d.size, d.end))
     if kept.any():
         values[kept] = values[np.flatnonzero(kept)[0]]
     return with_sensors(run, {name: values})
@@ -124,7 +124,10 @@ def _factor(run: Run, d: Damage) -> Run:
 
 
 def _averaged(run: Run, d: Damage) -> Run:
-    """Logged as means over the size [s], weighted by the time until the next row: squares of it become too small."""
+    """Logged as means over the size [s], weighted by the time until the next row: squares of it become too small.
+
+    Not searched: `twin diagnose` knows factors of signals and clocks of runs.
+    """
     name = load_of(run, d.place)
     time, values = run.loads.time, np.array(run.loads.columns[name], dtype=float)
     weight = np.append(np.diff(time), 0.0)
@@ -138,11 +141,29 @@ def _averaged(run: Run, d: Damage) -> Run:
 
 
 def _clock(run: Run, d: Damage) -> Run:
-    """Stamped too late by the size [s]; values are held before the first row."""
+    """Stamped too late by the size [s]: all that was measured in a run, or one column of its loads.
+
+    A diagnosis searches the clock of a run: rows of temperatures and TCP keep their values and get later times. A
+    column alone is not searched; its values are held before the first row.
+    """
+    if not d.place.startswith("signals."):
+        expect_whole(run, d)
+        return _measured_late(run, d.size)
     name = load_of(run, d.place)
     time, values = run.loads.time, run.loads.columns[name]
     late = values[np.clip(np.searchsorted(time, time - d.size, side="right") - 1, 0, len(time) - 1)]
     return with_load(run, name, np.where(acts(time, d), late, values))
+
+
+def _measured_late(run: Run, seconds: float) -> Run:
+    temperatures, tcp = run.temperatures, run.tcp
+    if temperatures is not None:
+        run = marked(replace(run, temperatures=replace(temperatures, time=temperatures.time + seconds)), "temperatures")
+    if tcp is not None:
+        run = marked(replace(run, tcp=replace(tcp, time=tcp.time + seconds)), "tcp")
+    if temperatures is None and tcp is None:
+        raise LogError("nothing is measured", str(run.folder), "take a run with temperatures.csv or tcp.csv")
+    return run
 
 
 def _step(run: Run, d: Damage) -> Run:
@@ -154,12 +175,11 @@ def _step(run: Run, d: Damage) -> Run:
 def _slip(run: Run, d: Damage) -> Run:
     """A support with play: the tool stays behind until the displacement has moved on by the size.
 
-    The play is that of the mean of every measurement (rows that follow each other within `SET_GAP`): rows of one differ
-    by their positions, not by what the machine did.
+    The play is that of the mean of every measurement: its rows differ by their positions, not by what the machine did.
     """
-    time, c = tcp_time(run), component(d.place, COMPONENTS)
+    time, c = tcp_time(run), component(d.place)
     assert run.tcp is not None
-    group = np.concatenate([[0], np.cumsum(np.diff(time) > SET_GAP)])
+    group = set_of(time)
     level = np.bincount(group, run.tcp.displacement[:, c]) / np.bincount(group)
     half, behind = abs(d.size) / 2, np.zeros(len(level))
     held = level[np.isfinite(level)][0] if np.isfinite(level).any() else 0.0
@@ -176,23 +196,24 @@ def _measured_drift(run: Run, d: Damage) -> Run:
 
 
 def _heating(run: Run, d: Damage) -> Run:
-    """The measuring device warms up: 63 % of the size after `HEATING_TIME`."""
+    """Measuring heats the machine: the size more from the first to the last row of every measurement."""
     time = tcp_time(run)
-    since = np.clip(time - max(d.start, time[0]), 0.0, None)
-    return with_tcp(run, d, -np.expm1(-since / HEATING_TIME))
+    group = set_of(time)
+    row, rows = np.arange(len(time)) - np.searchsorted(group, group), np.bincount(group)[group]
+    if rows.max() == 1:
+        remedy = "take a run that measures several places one after the other, less than 10 min apart"
+        raise LogError("every measurement is one row", str(run.folder / "tcp.csv"), remedy)
+    return with_tcp(run, d, row / np.maximum(rows - 1, 1) * acts(time, d))
 
 
 def _frame(run: Run, d: Damage) -> Run:
-    """The measuring device stands turned about a machine axis by the size [rad]: components mix."""
+    """The measuring frame stands askew by the size [m/m]: a component reads more in proportion to an axis position."""
     time = tcp_time(run)
-    axis = component(d.place, ("x", "y", "z"))
-    assert run.tcp is not None
-    c, s = math.cos(d.size), math.sin(d.size)
-    turn = np.eye(3)
-    a, b = (axis + 1) % 3, (axis + 2) % 3
-    turn[a, a], turn[a, b], turn[b, a], turn[b, b] = c, -s, s, c
-    turned = np.where(acts(time, d)[:, None], run.tcp.displacement @ turn.T, run.tcp.displacement)
-    return marked(replace(run, tcp=replace(run.tcp, displacement=turned)), "tcp")
+    place, position = component_and_axis(run, d.place)
+    if np.ptp(position) < 1e-6:
+        remedy = "take a run that measures the TCP at several positions, or name another axis"
+        raise LogError(f"the axis of '{d.place}' stands still", str(run.folder / "tcp.csv"), remedy)
+    return with_tcp(run, replace(d, place=place), position * acts(time, d))
 
 
 def _load(run: Run, d: Damage) -> Run:
@@ -206,7 +227,8 @@ def _load(run: Run, d: Damage) -> Run:
 
 
 def _initial_state(run: Run, d: Damage) -> Run:
-    """The stated temperature at the start is off."""
+    """The stated temperature at the start is off: of the whole machine, a log states no other."""
+    expect_whole(run, d)
     if run.initial_temperature is None:
         remedy = 'write initial_temperature = "20 degC" there'
         raise LogError("states no initial temperature", str(run.folder / "run.toml"), remedy)
@@ -218,7 +240,7 @@ DAMAGES: dict[str, dict[str, Kind]] = {
         "offset": Kind(_offset, "K", "reads too much by a constant"),
         "drift": Kind(_drift, "K", "drifts in a straight line, in all by this"),
         "lag": Kind(_lag, "s", "follows with this time constant"),
-        "detached": Kind(_detached, "1", "shows its surroundings (--signal) by this share"),
+        "detached": Kind(_detached, "1", "shows its surroundings (--signal) by this share", True),
         "stuck": Kind(_stuck, "s", "keeps its value for this time"),
         "swapped": Kind(_swapped, "", "has the name of this sensor, which has its name"),
     },
@@ -231,11 +253,11 @@ DAMAGES: dict[str, dict[str, Kind]] = {
     "initial_state": {"offset": Kind(_initial_state, "K", "the stated temperature is too high by this")},
     "measurement": {
         "drift": Kind(_measured_drift, "m", "the device drifts in a straight line, in all by this"),
-        "frame": Kind(_frame, "rad", "the device stands turned by this"),
-        "heating": Kind(_heating, "m", "the device warms up"),
+        "frame": Kind(_frame, "1", "reads more in proportion to the axis position, by this per metre"),
+        "heating": Kind(_heating, "m", "grows by this from the first to the last row of every measurement"),
     },
     "not_thermal": {
         "step": Kind(_step, "m", "something moves"),
-        "load": Kind(_load, "m", "something bends with a load (--signal), at its largest by this"),
+        "load": Kind(_load, "m", "something bends with a load (--signal), at its largest by this", True),
     },
 }

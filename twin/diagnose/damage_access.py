@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twin.diagnose.readings import SET_GAP
 from twin.errors import LogError
 from twin.logs.run import Run, Table
 from twin.nearest import did_you_mean
@@ -20,7 +21,7 @@ class Damage:
     """One fault of a log."""
 
     family: str
-    place: str  # "sensors.x_nut", "signals.x_current" (a column of loads.csv), "tcp.dx", "tcp.z" (an axis), "run"
+    place: str  # "sensors.x_nut", "signals.x_current" (a column of loads.csv), "tcp.dx", "tcp.dx:z" (an axis), "run"
     size: float  # SI
     history: str = ""  # the kind; "" for the family's first
     signal: str = ""  # a column that it follows
@@ -38,6 +39,15 @@ def grown(time: np.ndarray, d: Damage) -> np.ndarray:
     """(n,) from 0 at the start of a fault to 1 at its end; by default over all of the table."""
     first, last = max(d.start, float(time[0])), min(d.end, float(time[-1]))
     return np.clip((time - first) / max(last - first, 1e-9), 0.0, 1.0)
+
+
+def expect_whole(run: Run, d: Damage) -> None:
+    """Raise LogError unless a fault is one of a run as a whole, from its start to its end: "run", "runs.FOLDER"."""
+    known = ["run", f"runs.{run.folder.resolve().name}"]
+    if d.place not in known:
+        raise LogError(f"no such place: '{d.place}'", d.place, did_you_mean(d.place, known, "places"))
+    if (d.start, d.end) != (-math.inf, math.inf):
+        raise LogError("is a fault of a whole run", "--from, --to", "leave them out")
 
 
 def sensor_of(run: Run, place: str) -> tuple[Table, str]:
@@ -79,13 +89,26 @@ def tcp_time(run: Run) -> np.ndarray:
     return run.tcp.time
 
 
-def component(place: str, known: tuple[str, ...]) -> int:
-    """Which of the known components a place like "tcp.dx" is. Raises LogError for others."""
-    name = place.removeprefix("tcp.")
-    if name not in known:
-        remedy = did_you_mean(place, [f"tcp.{k}" for k in known], "places")
-        raise LogError(f"no such place: '{place}'", place, remedy)
-    return known.index(name)
+def component(place: str) -> int:
+    """Which of COMPONENTS a place like "tcp.dx" is. Raises LogError for others."""
+    known = [f"tcp.{c}" for c in COMPONENTS]
+    if place not in known:
+        raise LogError(f"no such place: '{place}'", place, did_you_mean(place, known, "places"))
+    return known.index(place)
+
+
+def component_and_axis(run: Run, place: str) -> tuple[str, np.ndarray]:
+    """Of a place like "tcp.dx:z": "tcp.dx" and the positions (m,) [m] of axis z. Raises LogError for others."""
+    known = [f"tcp.{c}:{a}" for c in COMPONENTS for a in (run.tcp.axes if run.tcp is not None else ())]
+    if place not in known or run.tcp is None:
+        raise LogError(f"no such place: '{place}'", place, did_you_mean(place, known, "places"))
+    name, _, axis = place.partition(":")
+    return name, np.nan_to_num(run.tcp.position[:, run.tcp.axes.index(axis)])
+
+
+def set_of(time: np.ndarray) -> np.ndarray:
+    """(m,) the number of the measurement that each TCP row belongs to: rows that follow within `SET_GAP` are one."""
+    return np.concatenate([[0], np.cumsum(np.diff(time) > SET_GAP)])
 
 
 def with_sensors(run: Run, columns: Mapping[str, np.ndarray]) -> Run:
@@ -106,7 +129,7 @@ def with_tcp(run: Run, d: Damage, shape: np.ndarray) -> Run:
     assert run.tcp is not None
     displacement = np.array(run.tcp.displacement, dtype=float)
     from_first = shape - shape[0] if run.tcp_reference == "first" else shape
-    displacement[:, component(d.place, COMPONENTS)] += d.size * from_first
+    displacement[:, component(d.place)] += d.size * from_first
     return marked(replace(run, tcp=replace(run.tcp, displacement=displacement)), "tcp")
 
 

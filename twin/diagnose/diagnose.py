@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,17 +13,17 @@ from twin import __version__
 from twin.build.cache import cached, machine_hash
 from twin.calibrate.measured import Measured, measured
 from twin.calibrate.problem import run_names
-from twin.calibrate.training import states_at
 from twin.diagnose.bench import Bench, make_bench
 from twin.diagnose.catalogue import FAMILIES, VERSION, Family
 from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.coarse import coarse_model
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
 from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
 from twin.diagnose.study import Study, make_study
-from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of
+from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
 from twin.diagnose.yardstick import FORM, NULLS, Yardstick, instruments_of, make_yardstick
 from twin.errors import ArtefactError, LogError
@@ -35,7 +35,6 @@ from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 
 LEAST = 24  # means of a sensor over 5 min, and TCP rows
-COARSE = 1.0  # of a sensor's or the probe's noise: the artefact may differ by this (rms) from the rich model
 
 
 @dataclass(frozen=True)
@@ -61,12 +60,21 @@ class Result:
 def machine_of(artefact: Artefact, path: Path, machine: Path | None = None) -> Machine:
     """The description inside an artefact, with the meshes of where it was built.
 
-    Raises ArtefactError where the meshes are gone.
+    Raises ArtefactError where the meshes are gone, or others than they were (as `twin verify` does; a calibrated
+    artefact has a description of its own, with which its hash cannot be compared).
     """
     origin = Path(machine or artefact.provenance.get("machine", ""))
     if not origin.exists():
         raise ArtefactError(f"its machine description is not at {origin}", str(path), "name it with --machine")
-    return load_machine(origin, artefact.description)
+    described = load_machine(origin, artefact.description)
+    calibrated = "calibrated_from" in artefact.provenance
+    if not calibrated and machine_hash(described) != artefact.provenance.get("machine_hash"):
+        raise ArtefactError(
+            f"{origin} is not the machine this artefact was built from (description or meshes differ)",
+            str(path),
+            "build again, or name the right description with --machine",
+        )
+    return described
 
 
 def prepare(
@@ -97,7 +105,7 @@ def prepare(
                      np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, planned.run.drive.power,
                      planned.run.drive.environment, planned.run.drive.theta):  # fmt: skip
             key.update(np.ascontiguousarray(part).tobytes())
-    names = tuple((f.name, f.number) for f in settings.families)
+    names = tuple((f.name, f.number, f.file) for f in settings.families)
     tolerance = tuple((p.path, p.nominal, p.sigma) for p in known)
     yard = cached(
         "yardstick",
@@ -116,17 +124,19 @@ def _closed(m: Measured) -> Measured:
 
 
 AFTER = (  # modules that only use a yardstick
-    "accepted", "acted", "channels", "contest", "damage", "diagnose", "diagnosis", "edges", "edit", "extension", "gain",
-    "growth", "hide", "hotter", "refit", "report", "search", "settled", "site", "sizes", "verdict",
+    "accepted", "channels", "coarse", "contest", "damage", "diagnose", "diagnosis", "edges", "edit", "extension",
+    "gain", "growth", "hide", "hotter", "refit", "report", "search", "settled", "site", "sizes", "verdict",
 )  # fmt: skip
 
 
 def _code() -> str:
-    """Hash of the code that makes yardsticks."""
+    """Hash of the code that makes yardsticks, beside that of builds."""
+    own = Path(__file__).parent
+    files = [path for path in own.glob("*.py") if not path.name.startswith(AFTER)]
+    files += [path for layer in ("calibrate", "run") for path in (own.parent / layer).glob("*.py")]
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        if not path.name.startswith(AFTER):
-            digest.update(path.read_bytes())
+    for path in sorted(files):
+        digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
@@ -137,14 +147,14 @@ def diagnose(
     sealed: Sequence[Run] = (),
     settings: Settings = Settings(),
     progress: Progress = silent,
-    told: Callable[[str], None] = lambda _: None,
 ) -> Result:
     """The diagnosis of measured runs. Sealed runs are opened after everything else is decided.
 
     Raises LogError and TwinError for runs and descriptions that cannot be used.
     """
     names = run_names([*runs, *sealed])
-    usable, faults = stuck_sensors(runs, artefact.model.sensors, names[: len(runs)])
+    sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
+    usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
     _, study, yard, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     found = search(yard, measured_of(study))
     verdict, causes = verdict_of(found, settings.families)
@@ -152,13 +162,10 @@ def diagnose(
     if verdict == "unknown" and not causes:  # what is told and judged then is the calibration, not what was tried
         shown = replace(found, accepted=(), x=found.x0)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
-    coarse = _coarse(artefact, study, settings)
-    if coarse is not None:
-        causes, verdict = (coarse, *causes), "named"
+    coarse = coarse_model(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma)
+    verdict, causes = with_faults(verdict, causes, () if coarse is None else (coarse,), alone="named")
+    verdict, causes = with_faults(verdict, causes, faults)
     notes += [f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED]
-    if faults:
-        causes = (*faults, *causes)
-        verdict = "sensor" if verdict == "nothing" else verdict
     groups = {f.name: f.group for f in settings.families}
     extension = (
         tuple(c for c in causes if groups.get(c.family) == "machine" and c.history != CALIBRATED)
@@ -185,7 +192,7 @@ def diagnose(
         summary=_summary(verdict, causes, shown),
         causes=causes,
         pulls=pulls_of(shown),
-        limits=limits_of(yard),
+        detection_limits=limits_of(yard),
         unknown=unknown_of(found) if verdict == "unknown" else None,
         gain=table,
         ranked=tuple(rival_of(h, float(first.cosine[0, i])) for i, h in enumerate(first.ranked)),
@@ -218,42 +225,6 @@ def _floors(yard: Yardstick, m: Measured) -> tuple[np.ndarray, np.ndarray]:
     own = yard.study.runs[0].measured.sensors
     known = dict(zip(own, sensors.sigma, strict=True))
     return np.array([known.get(s, float(np.median(sensors.sigma)) if len(own) else 0.1) for s in m.sensors]), tcp.sigma
-
-
-def _coarse(artefact: Artefact, study: Study, settings: Settings) -> Cause | None:
-    """Family 16: the artefact's own runtime against the bench on these loads, both nominal."""
-    model = artefact.model
-    worst = 0.0
-    if model.n == study.bench.base.n and study.bench.reduction == (0.0, 0.0):
-        return None  # a lumped machine with all its states: what is left are the bench's own time steps
-    for k in study.fitted:
-        planned = study.runs[k]
-        if tuple(model.sensors) != tuple(study.bench.base.sensors):
-            return None
-        one = np.concatenate([b.one for b in model.bodies])
-        start = (planned.run.start - model.reference_temperature) * one
-        states = states_at(model, (), {}, planned.run.drive, start, 4)
-        T = np.full((len(states), len(model.sensors)), model.reference_temperature)
-        first = 0
-        m = planned.measured
-        w = np.zeros((len(m.tcp), 3))
-        for body in model.bodies:
-            own = states[:, first : first + body.n]
-            T[:, list(body.sensors)] += own @ body.C.T
-            at = own[m.tcp_step] + m.tcp_share[:, None] * (own[m.tcp_step + 1] - own[m.tcp_step])
-            w += np.einsum("kp,pcn,kn->kc", m.pose, body.G, at)
-            first += body.n
-        w = w - w[0] if m.from_first else w
-        here, tcp = planned.split(study.outputs(k, np.zeros(len(study.bench.parameters))))
-        error = np.sqrt(np.mean((m.mean_of @ T[:, m.column] - here) ** 2, axis=0)).max(initial=0.0)
-        moved = np.sqrt(np.mean((w - tcp) ** 2, axis=0)).max(initial=0.0) if len(w) else 0.0
-        worst = max(worst, float(error) / settings.temperature_sigma, float(moved) / settings.tcp_sigma)
-    if worst <= COARSE:
-        return None
-    return Cause(
-        "coarse_model", "artefact", "", worst, (worst, worst), "1", worst, COARSE,
-        history=f"differs from the rich model by {worst:.1f} times the noise of a reading",
-    )  # fmt: skip
 
 
 def _summary(verdict: Verdict, causes: Sequence[Cause], found: Search) -> tuple[str, ...]:

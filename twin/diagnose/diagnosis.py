@@ -1,5 +1,5 @@
-"""What a diagnosis says: verdict, causes with their evidence, limits, gain. Plain numbers, SI; times in s since a run's
-start."""
+"""What a diagnosis says: verdict, causes with their evidence, limits, gain. Plain numbers, SI but for what has a unit
+beside it (a sensor drifts by K/day); times in s since a run's start."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Rival:
     family: str
     place: str
     history: str
-    amplitude: float  # SI
+    amplitude: float  # in `unit`
     unit: str
     statistic: float  # log-likelihood ratio, twice: as that of the cause it rivals
     cosine: float  # with that cause, after everything that can be calibrated is projected out
@@ -46,8 +46,8 @@ class Cause:
     family: str  # name in the catalogue: "heat_source"
     place: str  # "bed.x_motor", "films.bed", "contacts.x_guide", "sensors.x_nut", "signals.x_current", "runs.NAME"
     parameter: str  # dotted path in the extended description; "" where none changes
-    amplitude: float  # SI
-    ci95: tuple[float, float]  # SI
+    amplitude: float  # in `unit`
+    ci95: tuple[float, float]  # likewise
     unit: str
     statistic: float
     threshold: float
@@ -69,6 +69,7 @@ class Pull:
     sigma: float  # posterior standard deviation, of the coordinate: in prior standard deviations
     pull: float  # posterior shift in prior standard deviations
     unit: str
+    freed: bool = False  # of its tolerance: it is the size of a cause, not what calibration made of it
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Limit:
 
     family: str
     place: str  # the place with the median limit of the family
-    size: float  # median over places, SI
+    size: float  # median over places, in `unit`
     smallest: float
     largest: float
     unit: str
@@ -91,14 +92,15 @@ class Unknown:
     surface: str  # the surface of the part that takes most of it
     statistic: float
     threshold: float
-    histories: Mapping[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]]  # per run: s, W, sigma W
-    signals: tuple[tuple[str, float], ...]  # logged signals with their correlation, best first
+    history: Mapping[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]]  # per run: s, W, sigma W
+    correlated_signals: tuple[tuple[str, float], ...]  # logged signals with their correlation, best first
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Root mean square of what a model leaves of one channel of the sealed run, noise included."""
+    """Root mean square of what a model leaves of one channel of a sealed run, noise included."""
 
+    run: str
     channel: str  # a sensor, or "dx", "dy", "dz"
     unit: str  # K or m
     delivered: float
@@ -137,7 +139,7 @@ class Diagnosis:
     summary: tuple[str, ...]  # sentences for an engineer
     causes: tuple[Cause, ...]
     pulls: tuple[Pull, ...]
-    limits: tuple[Limit, ...]
+    detection_limits: tuple[Limit, ...]
     unknown: Unknown | None
     gain: tuple[Gain, ...]
     ranked: tuple[Rival, ...]  # the best candidates of the first step, cosines with the first
@@ -156,6 +158,8 @@ class Diagnosis:
         """What report.json holds: everything but the series."""
         d = asdict(self)
         del d["series"]
+        if self.unknown:
+            d["unknown"] = {"place": self.unknown.surface, **d["unknown"]}  # as a cause says where it is
         d["cosine"] = self.cosine.tolist()
         d["nulls"] = {family: np.round(np.sort(values), 3).tolist() for family, values in self.nulls.items()}
         return d

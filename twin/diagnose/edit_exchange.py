@@ -35,6 +35,10 @@ def film_gain(site: Site, cause: Cause) -> Change:
 def forced_convection(site: Site, cause: Cause) -> Change:
     """A surface has wind that follows a speed."""
     name, unit = signal_of(site, cause)
+    if unit == "1/s":  # rotating_cylinder reads such speeds, but its coefficient and exponent are fixed by a diameter
+        what = f"no film law has a coefficient of its own that follows a speed of rotation, and '{name}' is in 1/s"
+        remedy = "log pi D n as a signal in m/s and name that, or write a film of law rotating_cylinder by hand"
+        raise DescriptionError(what, cause.place, f"{remedy}: docs/hiding.md")
     if unit != "m/s":
         raise DescriptionError(f"signal '{name}' is in {unit}", cause.place, "name a speed in m/s")
     parameters = {
@@ -95,6 +99,9 @@ def zone(site: Site, cause: Cause) -> Change:
 def _own_air(site: Site, cause: Cause) -> Change:
     """One film has air of its own: a copy of its environment, warmer or colder."""
     _, name = named(site, cause.place, "films")
+    if cause.unit == "K/m":
+        remedy = f"name environment.{site.machine.films[name].environment}, or give a size in K"
+        raise DescriptionError("a gradient belongs to an environment, not to one film", cause.place, remedy)
     entry = dict(site.data["environment"][site.machine.films[name].environment])
     switch, change = switch_of(site, cause)
     if switch:

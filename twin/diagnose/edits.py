@@ -80,21 +80,23 @@ def extended_description(text: str, causes: Sequence[Cause], prefix: str = "foun
     return Edit(text, signals, tuple(parameters))
 
 
-def loads_with(run: Run, signals: Mapping[str, Sequence[Window]]) -> Run:
+def loads_with(run: Run, signals: Mapping[str, Sequence[Window]], name: str = "") -> Run:
     """The run with a column of loads per signal: the level of its windows, in shares of the time until the next row.
 
-    A window belongs to the run whose folder has its name, with an empty name to every run. Zero outside of windows.
+    A window belongs to the run of its name, with an empty name to every run. Zero outside of windows.
+    name: of the run, that of its folder by default (`run_names` tells apart runs whose folders have one name).
     """
+    own = name or run.folder.resolve().name
     time = run.loads.time
     columns, units = dict(run.loads.columns), dict(run.loads.units)
     until = np.append(time[1:], time[-1:] + (np.median(np.diff(time)) if len(time) > 1 else 1.0))
-    for name, windows in signals.items():
+    for signal, windows in signals.items():
         column = np.zeros(len(time))
         for w in windows:
-            if w.run in ("", run.folder.name, str(run.folder)):
+            if w.run in ("", own):
                 inside = np.minimum(until, w.end) - np.maximum(time, w.start)
                 column += w.level * np.clip(inside, 0.0, None) / (until - time)
-        columns[name], units[name] = column, "1"
+        columns[signal], units[signal] = column, "1"
     return replace(run, loads=replace(run.loads, columns=columns, units=units))
 
 

@@ -74,20 +74,22 @@ def gains(
     for i, name in enumerate(sealed.sensors):
         errors = [sealed.temperature[:, i] - T[:, i] for T, _ in models]
         moved = float(np.sqrt(np.mean((models[2][0][:, i] - models[1][0][:, i]) ** 2)))
-        result.append(_gain(name, "K", errors, sealed.bin_time, moved > NOTICED * floors[0][i], rng))
+        result.append(_gain(sealed.name, name, "K", errors, sealed.bin_time, moved > NOTICED * floors[0][i], rng))
     for c in range(3 if len(sealed.tcp) else 0):
         errors = [sealed.tcp[:, c] - w[:, c] for _, w in models]
         moved = float(np.sqrt(np.mean((models[2][1][:, c] - models[1][1][:, c]) ** 2)))
-        result.append(_gain(("dx", "dy", "dz")[c], "m", errors, sealed.tcp_time, moved > NOTICED * floors[1][c], rng))
+        axis = ("dx", "dy", "dz")[c]
+        affected = moved > NOTICED * floors[1][c]
+        result.append(_gain(sealed.name, axis, "m", errors, sealed.tcp_time, affected, rng))
     return tuple(result)
 
 
 def _gain(
-    name: str, unit: str, errors: list[np.ndarray], time: np.ndarray, affected: bool, rng: np.random.Generator
+    run: str, name: str, unit: str, errors: list[np.ndarray], time: np.ndarray, affected: bool, rng: np.random.Generator
 ) -> Gain:
     good = np.all(np.isfinite(errors), axis=0)
     if not good.any():
-        return Gain(name, unit, np.nan, np.nan, np.nan, (np.nan, np.nan), False)
+        return Gain(run, name, unit, np.nan, np.nan, np.nan, (np.nan, np.nan), False)
     own = [e[good] for e in errors]
     rms = [float(np.sqrt(np.mean(e**2))) for e in own]
     block = ((time[good] - time[good][0]) // BLOCK).astype(int)
@@ -97,4 +99,4 @@ def _gain(
         chosen = np.concatenate([members[b] for b in rng.integers(len(members), size=len(members))])
         draws.append(np.sqrt(np.mean(own[1][chosen] ** 2)) - np.sqrt(np.mean(own[2][chosen] ** 2)))
     low, high = np.quantile(draws, [0.025, 0.975])
-    return Gain(name, unit, rms[0], rms[1], rms[2], (float(low), float(high)), affected)
+    return Gain(run, name, unit, rms[0], rms[1], rms[2], (float(low), float(high)), affected)

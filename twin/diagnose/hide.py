@@ -1,7 +1,8 @@
 """A truth with something in it that the description does not know: a machine or a log, changed and written anew.
 
-What `twin diagnose` finds and what is hidden here become text by the same table (`twin.diagnose.edits`), so a hidden
-effect is exactly one that can be found. Beside the copy lies hidden.json, which says what was hidden.
+What `twin diagnose` finds and what is hidden here in a machine become text by the same table (`twin.diagnose.edits`);
+faults of logs are those of `twin.diagnose.damage`. Most have the form that a diagnosis searches, some have not, such as
+loads logged as means: docs/hiding.md says it family by family. Beside the copy lies hidden.json: what was hidden.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from twin.atomic import atomic_folder, check_folder
 from twin.build.mesh import load_part_mesh
@@ -38,12 +41,12 @@ UNITS: dict[str, tuple[str, ...]] = {  # of the size, by family; the first that 
     "loss_law": ("1", "W"), "joint": ("1",), "zone": ("K", "K/m"), "sun": ("W",), "coolant": ("W/(m^2*K)",),
     "scale_expansion": ("1/K",), "expansion": ("1",), "capacity": ("J/K",), "misplaced_source": (),
 }  # fmt: skip
-SETTINGS = {
-    "temperature": "degC", "reference": "", "conductance": "W/K", "gain": "1", "height": "m", "fixed_at": "m",
-    "surface": None, "axis": None,
+SETTINGS: dict[str, dict[str, str | None]] = {  # by family: name and unit; "": that of the signal, None: a name
+    "heat_source": {"reference": ""}, "loss_law": {"reference": "", "gain": "1"}, "zone": {"height": "m"},
+    "coolant": {"temperature": "degC"}, "capacity": {"conductance": "W/K"},
+    "scale_expansion": {"fixed_at": "m", "surface": None, "axis": None},
 }  # fmt: skip
-
-
+FOLLOWING = ("forced_convection", "heat_source", "loss_law", "sun")  # a power of their signal
 STEADY = ("expansion", "scale_expansion", "capacity", "misplaced_source")
 
 
@@ -74,6 +77,9 @@ def hide(asked: Hidden, target: Path, out: Path, runs: Sequence[Path] = ()) -> l
         raise TwinError("is a property of an artefact, not of a machine or a log", asked.family, remedy)
     if asked.family not in EDITS:
         raise TwinError(f"unknown family '{asked.family}'", "FAMILY", did_you_mean(asked.family, EDITS, "families"))
+    if asked.exponent != 1.0 and not (asked.signal and asked.family in FOLLOWING):
+        remedy = f"leave it out; with --signal it is for {', '.join(FOLLOWING)}"
+        raise TwinError("there is nothing that it is the exponent of", "--exponent", remedy)
     is_run = (target / "run.toml").exists()
     if asked.family in DAMAGES:
         if not is_run:
@@ -97,7 +103,7 @@ def _hide_in_machine(asked: Hidden, target: Path, out: Path, runs: Sequence[Path
     path = target / "machine.toml" if target.is_dir() else target
     machine = load_machine(path)
     text = path.read_bytes().decode("utf-8-sig")
-    if asked.signal and (asked.family in STEADY or asked.place.startswith("films.")):
+    if asked.signal and (asked.family in STEADY or (asked.family, asked.place[:6]) == ("film_gain", "films.")):
         raise TwinError(f"'{asked.family}' acts always", "--signal", "leave it out")
     logs = {folder: read_run(folder) for folder in runs}
     cause = cause_of(asked, machine, _windows(asked, list(logs.values())))
@@ -128,6 +134,8 @@ def _hide_in_log(asked: Hidden, target: Path, out: Path) -> list[str]:
     kind = kind_of(asked.family, asked.history)
     if asked.settings:
         raise TwinError("is for machines", "--setting", f"a fault of a log has a size only, which {kind.meaning}")
+    if asked.signal and not kind.follows:
+        raise TwinError(f"'{asked.family}' of this kind follows no column", "--signal", "leave it out")
     damage = Damage(
         family=asked.family,
         place=asked.place,
@@ -140,8 +148,12 @@ def _hide_in_log(asked: Hidden, target: Path, out: Path) -> list[str]:
     )
     if kind.unit == "s" and not damage.size > 0.0:
         raise TwinError(f"a time of {asked.size}", "SIZE", "give a positive one, for example '10 min'")
+    _expect_some(damage.start, damage.end, run)
     told = f"twin hide: {asked.family} {asked.history} at {asked.place}, {asked.size}".replace("  ", " ")
     result = damaged(run, damage)
+    if all(np.array_equal(a, b, equal_nan=True) for a, b in zip(_numbers(run), _numbers(result), strict=True)):
+        remedy = "give another size, or times in which there are rows that it changes"
+        raise LogError("the copy would be the same: the fault changes nothing", asked.place, remedy)
     result = replace(
         result, provenance=f"{run.provenance}; {told}" if run.provenance else told, machine=_moved(run, out)
     )
@@ -196,9 +208,11 @@ def _size(text: str, unit: str) -> float:
 
 
 def _setting(name: str, text: str, asked: Hidden, machine: Machine) -> float | str:
-    if name not in SETTINGS:
-        raise TwinError(f"unknown setting '{name}'", "--setting", did_you_mean(name, SETTINGS, "settings"))
-    unit = SETTINGS[name]
+    known = SETTINGS.get(asked.family, {})
+    if name not in known:
+        remedy = did_you_mean(name, known, f"settings of '{asked.family}'")
+        raise TwinError(f"'{asked.family}' has no setting '{name}'", "--setting", remedy)
+    unit = known[name]
     if unit is None:
         return text
     if name == "reference":  # of the signal
@@ -222,10 +236,8 @@ def _windows(asked: Hidden, logs: Sequence[Run]) -> tuple[Window, ...]:
     runs: list[Run | None] = [*logs] if logs else [None]
     for log in runs:
         start = asked.start or 0.0
-        last = math.inf if log is None else float(log.loads.time[-1] + usual_step(log.loads))  # its row is held so long
-        end = last if asked.end is None else asked.end
-        if not start < min(end, last):
-            raise TwinError("nothing is left between --from and --to", "--from", "give times within the run")
+        end = _span(log)[1] if asked.end is None else asked.end
+        _expect_some(start, end, log)
         name = "" if log is None else log.folder.resolve().name
         if asked.family != "sun":
             found.append(Window(name, start, end))
@@ -238,6 +250,29 @@ def _windows(asked: Hidden, logs: Sequence[Run]) -> tuple[Window, ...]:
             for k in range(PROFILE)
         ]
     return tuple(found)
+
+
+def _span(log: Run | None) -> tuple[float, float]:
+    """Start and end [s] of a run: its last row is held as long as the others. Without an end where none is given."""
+    if log is None:
+        return 0.0, math.inf
+    return float(log.loads.time[0]), float(log.loads.time[-1] + usual_step(log.loads))
+
+
+def _expect_some(start: float, end: float, log: Run | None) -> None:
+    """Raise TwinError where nothing of a run lies between two times [s]."""
+    first, last = _span(log)
+    if not max(start, first) < min(end, last):
+        within = "" if log is None else f" within the run, {first / 3600.0:g} h .. {last / 3600.0:g} h"
+        raise TwinError("nothing is left between --from and --to", "--from", f"give times{within}, --from before --to")
+
+
+def _numbers(run: Run) -> list[np.ndarray]:
+    """All that a fault of a log may change."""
+    tcp = () if run.tcp is None else (run.tcp.time, run.tcp.displacement)
+    tables = [t for t in (run.loads, run.temperatures) if t is not None]
+    found = [np.array([np.nan if run.initial_temperature is None else run.initial_temperature]), *tcp]
+    return found + [values for t in tables for values in (t.time, *t.columns.values())]
 
 
 def _told_windows(asked: Hidden) -> str:

@@ -17,14 +17,11 @@ from twin.pictures.style import INK, figure
 CHANNELS = 30
 
 
-def sealed_series(d: Diagnosis) -> Series | None:
-    return next((s for s in d.series if s.sealed), None)
-
-
-def gain_picture(d: Diagnosis) -> Picture | None:
-    """Root mean square per channel at the three stages, temperatures and TCP beside each other."""
+def gain_picture(d: Diagnosis, run: str) -> Picture | None:
+    """Root mean square per channel of a sealed run at the three stages, temperatures and TCP beside each other."""
+    own = [g for g in d.gain if g.run == run]
     groups = [
-        (label, scale, _largest([g for g in d.gain if g.unit == unit]))
+        (label, scale, _largest([g for g in own if g.unit == unit]))
         for unit, scale, label in (("K", 1.0, "K"), ("m", 1e6, "µm"))
     ]
     groups = [group for group in groups if group[2]]
@@ -47,9 +44,9 @@ def gain_picture(d: Diagnosis) -> Picture | None:
             axes.set_xlim(left=0.0)
             axes.set_xlabel(f"root mean square of measured - simulated in {label}")
         fig.legend(loc="outside upper center", ncols=3)
-    left_out = len(d.gain) - sum(len(gains) for _, _, gains in groups)
+    left_out = len(own) - sum(len(gains) for _, _, gains in groups)
     return Picture(
-        "Gain per channel on the sealed run",
+        f"Gain per channel on the sealed run {run}",
         "What each model leaves of a channel, noise included, further left is better; * marks the channels that the "
         "causes move" + (f" ({left_out} quieter channels are left out)." if left_out else "."),
         fig,
@@ -71,7 +68,8 @@ class _Channel:
 
 
 def _channels(s: Series, d: Diagnosis, sensors: int = 4) -> list[_Channel]:
-    better = {g.channel: g.delivered - g.extended for g in d.gain if math.isfinite(g.delivered - g.extended)}
+    own = [g for g in d.gain if g.run == s.run]
+    better = {g.channel: g.delivered - g.extended for g in own if math.isfinite(g.delivered - g.extended)}
     order = sorted(range(len(s.sensors)), key=lambda i: -better.get(s.sensors[i], -math.inf)) if better else loudest(s)
     result = [
         _Channel(
@@ -102,11 +100,10 @@ def broken(hours: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.insert(hours, gaps, np.nan), np.insert(np.asarray(values, dtype=float), gaps, np.nan)
 
 
-def overlay_picture(d: Diagnosis) -> Picture | None:
-    """Measured and simulated on the sealed run: sensors that gain most, the TCP; residuals where that is all."""
-    s = sealed_series(d)
-    channels = _channels(s, d) if s else []
-    if not s or not channels:
+def overlay_picture(d: Diagnosis, s: Series) -> Picture | None:
+    """Measured and simulated on a sealed run: sensors that gain most, the TCP; residuals where that is all."""
+    channels = _channels(s, d)
+    if not channels:
         return None
     columns = 2 if len(channels) > 1 else 1
     rows = -(-len(channels) // columns)
@@ -141,7 +138,7 @@ def unknown_picture(d: Diagnosis) -> Picture | None:
     """The unexplained heat over time with its 95 % band, a panel per run."""
     if d.unknown is None:
         return None
-    runs = [(name, np.array(h, dtype=float)) for name, h in d.unknown.histories.items() if len(h[0])]
+    runs = [(name, np.array(h, dtype=float)) for name, h in d.unknown.history.items() if len(h[0])]
     if not runs:
         return None
     with matplotlib.rc_context(PAGE_RC):

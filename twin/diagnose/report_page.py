@@ -14,7 +14,7 @@ import numpy as np
 from twin.atomic import atomic_path, check_folder
 from twin.diagnose.diagnosis import Diagnosis
 from twin.diagnose.report_evidence import candidates_picture, cosine_picture, nulls_picture, pulls_picture
-from twin.diagnose.report_gain import gain_picture, overlay_picture, sealed_series, unknown_picture
+from twin.diagnose.report_gain import gain_picture, overlay_picture, unknown_picture
 from twin.diagnose.report_pictures import Picture, inline_svg, rms
 from twin.diagnose.report_residuals import RUNS, by_load_state, residual_map, whiteness_picture
 from twin.diagnose.report_style import STYLE
@@ -29,11 +29,14 @@ from twin.diagnose.report_tables import (
 )
 from twin.diagnose.report_text import (
     beyond,
+    cause_evidence,
     evidence_sentence,
     gain_sentences,
     limit_words,
     place_words,
+    pull_of,
     remedies,
+    sealed_runs,
     summary_lines,
     verdict_sentence,
     what,
@@ -150,12 +153,7 @@ def _evidence(d: Diagnosis) -> str:
     parts = []
     if d.causes:
         parts.append(causes_table(d.causes))
-        parts.append(
-            _items(
-                f"{place_words(c.place)}, {what(c.family)}: {evidence_sentence(d, c.family, c.statistic, c.threshold)}"
-                for c in d.causes
-            )
-        )
+        parts.append(_items(f"{place_words(c.place)}, {what(c.family)}: {cause_evidence(d, c)}" for c in d.causes))
     if d.unknown:
         parts.append(_items([evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold)]))
     if d.verdict == "out_of_tolerance":
@@ -172,10 +170,12 @@ def _evidence(d: Diagnosis) -> str:
 
 
 def _pull_sentences(d: Diagnosis) -> list[str]:
+    """What is out of tolerance first, whatever else is pulled farther."""
+    causes = [p for p in (pull_of(d, c) for c in d.causes) if p]
     return [
         f"{p.path} lies {p.pull:+.1f} standard deviations from what was declared; a right declaration does so "
         f"once in {_once(abs(p.pull))}."
-        for p in beyond(d.pulls, 2.0)[:5]
+        for p in [*causes, *(p for p in beyond(d.pulls, 2.0) if p not in causes)][:5]
     ]
 
 
@@ -198,12 +198,14 @@ def _rivals(d: Diagnosis) -> str:
 
 
 def _gain(d: Diagnosis, show: Any) -> str:
+    pictures = show(*(p for s in d.series if s.sealed for p in (gain_picture(d, s.run), overlay_picture(d, s))))
     if not d.gain:
         why = "nothing was added to the model" if not d.causes else "no run was kept aside"
-        return f"<p>There is no gain to report: {why}.</p>" + show(overlay_picture(d))
-    sealed = sealed_series(d)
-    head = f"<p>{escape(f'Run {sealed.run} was opened once, after everything was decided.')}</p>" if sealed else ""
-    return head + _items(gain_sentences(d)) + show(gain_picture(d), overlay_picture(d)) + gain_table(d)
+        return f"<p>There is no gain to report: {why}.</p>" + pictures
+    runs = sealed_runs(d)
+    told = f"Run {runs[0]} was" if len(runs) == 1 else f"Runs {', '.join(runs)} were"
+    head = f"<p>{escape(f'{told} opened once, after everything was decided.')}</p>"
+    return head + _items(gain_sentences(d)) + pictures + gain_table(d)
 
 
 def _residuals(d: Diagnosis, show: Any) -> str:
@@ -231,7 +233,7 @@ def _decision(d: Diagnosis, show: Any) -> str:
 def _pulls(d: Diagnosis, show: Any) -> str:
     if not d.pulls:
         return "<p>No declared parameter was fitted.</p>"
-    if not beyond(d.pulls, 2.0):
+    if not beyond(d.pulls, 2.0) and not any(p.freed for p in d.pulls):
         return "<p>No declared parameter was pulled by more than 2 standard deviations.</p>" + show(pulls_picture(d))
     return show(pulls_picture(d)) + pulls_table(d)
 
@@ -239,17 +241,18 @@ def _pulls(d: Diagnosis, show: Any) -> str:
 def _unknown(d: Diagnosis, show: Any) -> str:
     if d.unknown is None:
         return "<p>No heat was left over that the catalogue does not explain.</p>"
-    rows = [[name, f"{correlation:+.2f}"] for name, correlation in d.unknown.signals]
+    rows = [[name, f"{correlation:+.2f}"] for name, correlation in d.unknown.correlated_signals]
     follows = table(["logged signal", "correlation with this heat"], rows, (1,)) if rows else ""
     return show(unknown_picture(d)) + follows
 
 
 def _limits(d: Diagnosis) -> str:
-    if not d.limits:
+    if not d.detection_limits:
         return "<p>Detection limits were not determined.</p>"
     lead = ""
     if d.verdict == "nothing":
-        lead = "<p><strong>These data would have shown at least:</strong></p>" + _items(map(limit_words, d.limits))
+        sizes = _items(map(limit_words, d.detection_limits))
+        lead = f"<p><strong>These data would have shown at least:</strong></p>{sizes}"
     text = (
         "The smallest size of each effect that would have been named in these data; smaller ones may be there unseen."
     )

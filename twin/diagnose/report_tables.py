@@ -80,7 +80,7 @@ def rivals_table(rivals: Sequence[Rival], thresholds: bool, d: Diagnosis) -> str
 
 def limits_table(d: Diagnosis) -> str:
     rows = []
-    for x in d.limits:
+    for x in d.detection_limits:
         largest = max((abs(v) for v in (x.size, x.smallest, x.largest) if math.isfinite(v)), default=math.nan)
         factor, unit = customary(x.unit, largest)
         sizes = [f"{number(factor * v)} {unit}".rstrip() for v in (x.size, x.smallest, x.largest)]
@@ -90,7 +90,8 @@ def limits_table(d: Diagnosis) -> str:
 
 
 def gain_table(d: Diagnosis) -> str:
-    rows = []
+    """Per channel and sealed run; the run is told where there are several."""
+    rows, several = [], len({g.run for g in d.gain}) > 1
     for g in d.gain:
         low, high = g.ci95
         _, a, b, unit = interval_and_unit(low, low, high, g.unit)
@@ -100,8 +101,10 @@ def gain_table(d: Diagnosis) -> str:
         elif low > 0 or high < 0:
             sure = "better" if low > 0 else "worse"
         sizes = [quantity(v, g.unit) for v in (g.delivered, g.recalibrated, g.extended)]
-        rows.append([g.channel, *sizes, interval, sure, "yes" if g.affected else "no"])
+        run = [g.run] if several else []
+        rows.append([*run, g.channel, *sizes, interval, sure, "yes" if g.affected else "no"])
     head = [
+        *(["sealed run"] if several else []),
         "channel",
         "as delivered",
         "recalibrated",
@@ -110,15 +113,16 @@ def gain_table(d: Diagnosis) -> str:
         "",
         "causes move it",
     ]
-    return table(head, rows, (1, 2, 3, 4))
+    return table(head, rows, tuple(k + several for k in (1, 2, 3, 4)))
 
 
 def pulls_table(d: Diagnosis) -> str:
-    """Parameters beyond two standard deviations."""
+    """Parameters beyond two standard deviations, and those that were freed of their tolerance."""
     rows = [
-        [p.path, quantity(p.nominal, p.unit), quantity(p.value, p.unit), f"{p.pull:+.1f}", f"{p.sigma:.2f}"]
-        for p in beyond(d.pulls, 2.0)
-    ]
+        [p.path + (" (free of its tolerance)" if p.freed else ""), quantity(p.nominal, p.unit),
+         quantity(p.value, p.unit), f"{p.pull:+.1f}", f"{p.sigma:.2f}"]
+        for p in beyond(d.pulls, 0.0) if p.freed or abs(p.pull) > 2.0
+    ]  # fmt: skip
     return table(["parameter", "declared", "fitted", "pull", "posterior sigma"], rows, (1, 2, 3, 4))
 
 

@@ -101,25 +101,35 @@ def beyond(pulls: Sequence[Pull], sigmas: float) -> list[Pull]:
     return sorted((p for p in pulls if abs(p.pull) > sigmas), key=lambda p: -abs(p.pull))
 
 
-def pull_words(pull: Pull) -> str:
+def pull_words(pull: Pull, factors: tuple[float, float] = (math.nan, math.nan)) -> str:
+    """`factors`: 95 % interval of value over nominal, where it is known."""
+    low, high = sorted(pull.nominal * f for f in factors)
     return (
-        f"{pull.path} is {quantity(pull.value, pull.unit)} instead of {quantity(pull.nominal, pull.unit)} "
-        f"({pull.pull:+.1f} standard deviations of what was declared)"
+        f"{pull.path} is {size_words(pull.value, (low, high), pull.unit)} instead of "
+        f"{quantity(pull.nominal, pull.unit)} ({pull.pull:+.1f} standard deviations of what was declared)"
     )
+
+
+def pull_of(d: Diagnosis, cause: Cause) -> Pull | None:
+    """The pull of the declared number that a cause is; None of other causes."""
+    return next((p for p in d.pulls if p.path == cause.parameter or (p.freed and _of(cause.place, p.path))), None)
+
+
+def _of(place: str, path: str) -> bool:
+    return path == place or path.startswith(f"{place}.")
 
 
 def verdict_sentence(d: Diagnosis) -> str:
     """The verdict in one sentence: what, where, how much, how sure."""
     causes = joined([cause_words(c) for c in d.causes])
     if d.verdict == "nothing":
-        seen = f"; {limit_words(d.limits[0])}, would have been seen" if d.limits else ""
+        limits = d.detection_limits
+        seen = f"; {limit_words(limits[0])}, would have been seen" if limits else ""
         return f"Nothing is missing that these data could show: within their noise the description explains them{seen}."
     if d.verdict == "unknown":
         return _sentence(_unknown_words(d) + (f"; named besides: {causes}" if causes else ""))
     if d.verdict == "out_of_tolerance":
-        far = [pull_words(p) for p in beyond(d.pulls, 3.0)[:3]] or [pull_words(p) for p in beyond(d.pulls, 0.0)[:1]]
-        named = f"; with it: {causes}" if causes and far else ""
-        return _sentence(f"Declared values cannot hold: {joined(far) or causes or 'see the pulls'}{named}")
+        return _sentence(f"Declared values cannot hold: {_strained_words(d)}")
     if d.verdict == "ambiguous":
         return _sentence(_ambiguous_words(d))
     if not causes:
@@ -136,13 +146,21 @@ def verdict_sentence(d: Diagnosis) -> str:
     return _sentence(f"{len(d.causes)} causes act together: {causes}")
 
 
+def _strained_words(d: Diagnosis) -> str:
+    numbers = {c.place: pull_words(p, c.ci95) for c in d.causes if (p := pull_of(d, c))}
+    besides = [cause_words(c) for c in d.causes if c.place not in numbers]
+    if not numbers:
+        return joined(besides or [pull_words(p) for p in beyond(d.pulls, 3.0)[:3]]) or "see the pulls"
+    return joined([*numbers.values()]) + (f"; besides: {joined(besides)}" if besides else "")
+
+
 def _unknown_words(d: Diagnosis) -> str:
     if d.unknown is None:
         return "the residuals hold an effect that nothing in the catalogue explains"
     part, surface = d.unknown.part, d.unknown.surface
     text = f"heat enters part {part}, mostly at {surface}, and nothing in the catalogue explains it"
     largest, sigma, at, run = 0.0, math.nan, math.nan, ""
-    for name, (time, heat, spread) in d.unknown.histories.items():
+    for name, (time, heat, spread) in d.unknown.history.items():
         for t, q, s in zip(time, heat, spread, strict=False):
             if abs(q) > abs(largest):
                 largest, sigma, at, run = q, s, t, name
@@ -155,8 +173,14 @@ def _unknown_words(d: Diagnosis) -> str:
 def alternatives(d: Diagnosis) -> list[Cause | Rival]:
     """What an ambiguous verdict leaves open, the likeliest first."""
     if d.causes:
-        return [d.causes[0], *d.causes[0].rivals]
+        first = _rivalled(d)
+        return [first, *first.rivals]
     return list(d.ranked[:2])
+
+
+def _rivalled(d: Diagnosis) -> Cause:
+    """The first cause that has rivals: a stuck sensor before it has none."""
+    return next((c for c in d.causes if c.rivals), d.causes[0])
 
 
 def _ambiguous_words(d: Diagnosis) -> str:
@@ -165,7 +189,7 @@ def _ambiguous_words(d: Diagnosis) -> str:
         return "something is missing, and these data do not tell what"
     ways = "; or ".join(cause_words(c) for c in these[:3])
     more = f"; or {len(these) - 3} more" if len(these) > 3 else ""
-    besides = joined([cause_words(c) for c in d.causes[1:]])
+    besides = joined([cause_words(c) for c in d.causes if c is not _rivalled(d)])
     return f"something is missing, and these data do not tell what: either {ways}{more}" + (
         f"; besides: {besides}" if besides else ""
     )
@@ -203,6 +227,29 @@ def evidence_sentence(d: Diagnosis, family: str, statistic: float, threshold: fl
     return f"{text} {chance(d.nulls.get(family), threshold)}".strip()
 
 
+def cause_evidence(d: Diagnosis, c: Cause) -> str:
+    """What speaks for a cause; a rate of chance only where it was judged by what synthetic measurements gave."""
+    if c.history == "stuck":  # seen before anything was fitted
+        longest = max((w.end - w.start for w in c.windows), default=math.nan)
+        return f"Its reading stood still for {number(longest / 3600.0)} h; no statistic is needed to see that."
+    if c.family == "coarse_model":
+        return (
+            f"On these loads the artefact differs by {number(c.statistic)} times the noise of one reading (root mean "
+            f"square) from a larger model of the same description; {number(c.threshold)} times is allowed."
+        )
+    if c.threshold == d.thresholds.get(c.family, c.threshold):
+        return evidence_sentence(d, c.family, c.statistic, c.threshold)
+    # a declared number: both are squares of standard deviations, of the fit where it was freed of its tolerance
+    far, needed = (number(math.sqrt(max(v, 0.0))) for v in (c.statistic, c.threshold))
+    whose = "of its fit" if c.history == "always" else "of its tolerance"
+    return f"It lies {far} standard deviations {whose} from what was declared; {needed} are needed."
+
+
+def sealed_runs(d: Diagnosis) -> list[str]:
+    """The runs on which the gain was measured."""
+    return list(dict.fromkeys(g.run for g in d.gain))
+
+
 def rms_of(gains: Sequence[Gain]) -> tuple[float, float, float]:
     """Root mean square over channels of one unit: as delivered, recalibrated, extended; NaN of none."""
     rows = np.array([[g.delivered, g.recalibrated, g.extended] for g in gains], dtype=float).reshape(-1, 3)
@@ -214,13 +261,16 @@ def rms_of(gains: Sequence[Gain]) -> tuple[float, float, float]:
 
 
 def gain_sentences(d: Diagnosis) -> list[str]:
-    """What the extended model brings on the sealed run: the channels that the causes move, then the others."""
-    if not d.gain:
-        return []
+    """What the extended model brings on each sealed run: the channels that the causes move, then the others."""
+    return [text for run in sealed_runs(d) for text in _gain_sentences(d, run)]
+
+
+def _gain_sentences(d: Diagnosis, run: str) -> list[str]:
     result = []
+    head = f"{run}: " if len(sealed_runs(d)) > 1 else ""
     for affected, which in ((True, "that the causes move"), (False, "that they do not move")):
         for unit, name in (("K", "temperature"), ("m", "TCP direction")):
-            these = [g for g in d.gain if g.affected == affected and g.unit == unit]
+            these = [g for g in d.gain if g.run == run and g.affected == affected and g.unit == unit]
             a, b, c = (quantity(v, unit) for v in rms_of(these))
             if not these:
                 continue
@@ -228,7 +278,7 @@ def gain_sentences(d: Diagnosis) -> list[str]:
             better = sum(g.ci95[0] > 0 for g in these)
             worse = sum(g.ci95[1] < 0 for g in these)
             result.append(
-                f"{counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
+                f"{head}{counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
                 f"noise included); better beyond chance in {better}, worse in {worse}."
             )
     return result
@@ -239,25 +289,25 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     d = diagnosis
     lines = [f"{d.machine}: {d.verdict.replace('_', ' ')}", verdict_sentence(d)]
     several = len(d.causes) > 1
-    lines += [
-        (f"{c.place}: " if several else "") + evidence_sentence(d, c.family, c.statistic, c.threshold)
-        for c in d.causes[:2]
-    ]
+    lines += [(f"{c.place}: " if several else "") + cause_evidence(d, c) for c in d.causes[:2]]
     if d.unknown and not d.causes:
         lines.append(evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold))
-    if d.verdict in ("sensor", "signal"):
+    if d.verdict == "signal" and any(c.parameter for c in d.causes):
+        lines.append("No cause is added to the machine: machine.toml corrects the declaration of the signal.")
+    elif d.verdict in ("sensor", "signal"):
         lines.append("The model of the machine is left as it is.")
     if d.verdict in ("ambiguous", "named") and remedies(d):
         lines.append(f"To tell rivals apart: {remedies(d)[0]}")
-    if d.unknown and d.unknown.signals:
-        name, correlation = d.unknown.signals[0]
+    if d.unknown and d.unknown.correlated_signals:
+        name, correlation = d.unknown.correlated_signals[0]
         lines.append(f"The unexplained heat follows {name} best (correlation {correlation:+.2f}).")
-    lines += [f"Sealed run: {text}" for text in gain_sentences(d)[:2]]
+    lines += [f"Sealed run{' ' if len(sealed_runs(d)) > 1 else ': '}{text}" for text in gain_sentences(d)[:2]]
     far = beyond(d.pulls, 2.0)
     if far and d.verdict != "out_of_tolerance":
         lines.append(f"Worth a look: {joined([pull_words(p) for p in far[:2]])}.")
-    if d.limits and d.verdict == "nothing":
-        lines.append(f"These data would have shown at least: {joined([limit_words(x) for x in d.limits[:5]])}.")
+    if d.detection_limits and d.verdict == "nothing":
+        shown = joined([limit_words(x) for x in d.detection_limits[:5]])
+        lines.append(f"These data would have shown at least: {shown}.")
     before, after = (np.array([w[k] for w in d.whiteness], dtype=float) for k in (1, 2))
     if np.isfinite(before).any() and np.isfinite(after).any():
         lines.append(

@@ -134,7 +134,10 @@ def strained(
 
 
 def _freed(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
-    """The fit with a declared number at any value; None where it has run to where it changes nothing."""
+    """The fit with a declared number at any value.
+
+    None where it has run to where it changes nothing, or where the data alone leave it within its tolerance.
+    """
     one = Accepted(h, units_of(yard.study, h), np.array(h.amplitude), np.eye(1), h.statistic, PULLED**2, ())
     fitted, (one,) = refit(yard, y, beginning(fitted.x), [one])
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
@@ -142,4 +145,5 @@ def _freed(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tup
         return None
     if h.batch.kind in CONDUCTS:  # as a logarithm: derivatives at many times a film say little of the film itself
         change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
-    return fitted, replace(one, statistic=(change / sigma) ** 2)
+    statistic = (change / sigma) ** 2
+    return (fitted, replace(one, statistic=statistic)) if statistic >= one.threshold else None

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnose.accepted import Accepted, freed
-from twin.diagnose.acted import RELATIVE
+from twin.diagnose.acted import CONDUCTS, RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
 from twin.diagnose.contest import AMPLITUDE
@@ -24,7 +24,7 @@ from twin.diagnose.yardstick import Yardstick
 APART = 10.0  # likelihood-ratio units that LR (1 - cos^2) must exceed for two causes to be told apart
 CLOSE = 6.0  # within which a rival of another family, or another part, makes a verdict ambiguous
 POWER = 1.645  # one-sided 95 %
-REMAINDER = 0.35  # of the evidence for unknown heat that a name must explain to stand
+REMAINDER = 0.35  # of the evidence for unknown heat before all names: the share that may be left beside them
 KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
 STRAINED = 2.5  # prior standard deviations, beyond which a declared parameter is out of its tolerance
 STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint": "joint", "expansion": "expansion"}
@@ -150,7 +150,6 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         strained = strained_of(found)
         return ("out_of_tolerance", strained) if strained else ("nothing", ())
     lead, chosen = causes[0], found.accepted[0]
-    group = groups.get(lead.family, "machine")
     for other, cosine in chosen.rivals:
         more = AMPLITUDE * (other.batch.q - chosen.hypothesis.batch.q)
         near = other.statistic - more > chosen.hypothesis.statistic - CLOSE
@@ -160,8 +159,13 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
             same = False
         if near and not apart and not same and other.statistic > thresholds[other.family]:
             return "ambiguous", causes
-    if group in ("sensor", "signal"):
-        return ("sensor", causes) if group == "sensor" else ("signal", causes)
+    # a sensor at fault does not keep what is beside it out of the description
+    others = [c for c in causes if groups.get(c.family) != "sensor"]
+    if not others:
+        return "sensor", causes
+    lead = others[0]
+    if groups.get(lead.family) == "signal":
+        return "signal", causes
     declared = lead.family in PLAIN and not lead.windows and not lead.signal
     whole = lead.place.split(".")[0] in ("films", "contacts", "sources", "materials")
     return ("out_of_tolerance" if declared and whole else "named"), causes
@@ -215,13 +219,32 @@ def unknown_of(found: Search) -> Unknown | None:
 
 
 def pulls_of(found: Search) -> tuple[Pull, ...]:
-    """How far the last fit moved every declared parameter."""
-    low, high = bounds(found.yardstick.study)
+    """How far the last fit moved every declared parameter, and the causes those whose place they take."""
+    study = found.yardstick.study
+    low, high = bounds(study)
     sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
-    return tuple(
+    pulls = [
         Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit)
-        for p, c, s in zip(found.yardstick.study.bench.parameters, np.clip(found.x, low, high), sigma, strict=True)
-    )
+        for p, c, s in zip(study.bench.parameters, np.clip(found.x, low, high), sigma, strict=True)
+    ]
+    for a in found.accepted:
+        change, spread = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
+        if a.hypothesis.batch.kind in CONDUCTS:
+            change, spread = float(np.log1p(change)), spread / (1.0 + change)
+        for j in freed(study, a.hypothesis):  # held at its declared value in x
+            p, pull = study.bench.parameters[j], change / float(study.scale[j])
+            pulls[j] = Pull(p.path, p.nominal, p.value(pull), spread / float(study.scale[j]), pull, p.unit, freed=True)
+    return tuple(pulls)
+
+
+def with_faults(
+    verdict: Verdict, causes: tuple[Cause, ...], faults: Sequence[Cause], alone: Verdict = "sensor"
+) -> tuple[Verdict, tuple[Cause, ...]]:  # fmt: skip
+    """The verdict with what was found without a search: sensors that stand still, or an artefact too coarse.
+
+    alone: the verdict where there is nothing else.
+    """
+    return alone if faults and verdict == "nothing" else verdict, (*faults, *causes)
 
 
 def limits_at(yard: Yardstick) -> dict[tuple[str, str, str, bool], float]:

@@ -1,0 +1,40 @@
+"""An artefact that does not follow its own full model on the loads of a run is blamed itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tests.calibrate import lumped_case
+from tests.diagnose import small_case
+from twin.build.project import orthonormalise, project
+from twin.diagnose.coarse import COARSE, coarse_model
+from twin.rom.model import MachineModel
+
+NOISE = small_case.NOISE, small_case.TCP_NOISE
+
+
+def with_states(model: MachineModel, n: int) -> MachineModel:
+    """The model with n states a body, of random directions and the uniform one."""
+    rng = np.random.default_rng(0)
+    bodies = tuple(
+        project(b, orthonormalise(np.column_stack([b.one, rng.standard_normal((b.n, min(n, b.n) - 1))]), b.E))
+        for b in model.bodies
+    )
+    return replace(model, bodies=bodies)
+
+
+def test_an_artefact_of_too_few_states_is_named():
+    cause = coarse_model(with_states(lumped_case.artefact().model, 2), small_case.study(), *NOISE)
+    assert cause is not None
+    assert (cause.family, cause.place, cause.threshold) == ("coarse_model", "artefact", COARSE)
+    # all its states in other coordinates: what is left are steps in time, at bearings of some seconds
+    study = small_case.study()
+    looked_at = replace(study, bench=replace(study.bench, reduction=(1e-9, 1e-15)))
+    whole = coarse_model(with_states(lumped_case.artefact().model, 1000), looked_at, *NOISE)
+    assert cause.statistic > 10.0 * (0.0 if whole is None else whole.statistic)
+
+
+def test_one_of_all_states_is_not():
+    assert coarse_model(lumped_case.artefact().model, small_case.study(), *NOISE) is None
