@@ -33,6 +33,7 @@ FEW = 2  # windows likewise that a cause may have and still leave heat where it 
 SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
 NAMED = 0.7  # share of its own threshold that a name needs where another one passes
+MISFIT = 0.003  # of what a cause in the machine explains: a response that is wrong by a twentieth leaves so much
 STANDS = 0.5  # share of its threshold that a cause must explain beside the others
 
 
@@ -59,7 +60,8 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         steps.append(step)
         parts = step.parts
         used = sum((len(a.units) for a in accepted), 0)
-        limits = {name: (LATER if accepted else 1.0) * value for name, value in yard.thresholds.items()}
+        misfits = MISFIT * max((a.statistic for a in accepted if a.units), default=0.0)
+        limits = {name: max((LATER if accepted else 1.0) * value, misfits) for name, value in yard.thresholds.items()}
         alarm = any(h.statistic > limits[h.family] and (h.family, h.name) not in refused for h in ranked)
         passing = [
             h for h in ranked
@@ -140,11 +142,12 @@ def _differ(a: Hypothesis, b: Hypothesis) -> bool:
 
 
 def _restless(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
-    """Causes that come and go more than FEW times and leave heat at their part: a history that no name tells."""
+    """Causes that come and go more than FEW times and leave heat anywhere: a history that no name tells."""
+    if max(parts.values(), default=0.0) <= yard.thresholds["unknown"]:
+        return []
     return [
         a for a in accepted
         if len(a.hypothesis.when.windows) > FEW and a.hypothesis.when.bell is None and a.units
-        and any(parts.get(p, 0.0) > LATER * yard.thresholds["unknown"] for p in _parts(yard.study, a.hypothesis.name))
     ]  # fmt: skip
 
 

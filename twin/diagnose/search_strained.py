@@ -50,7 +50,7 @@ def closed(
         return None
     removed = misfit(yard, before) - misfit(yard, fitted)
     more = [h for h in ranked if h.statistic - NEAR * any(h is d for d in declared) > removed]
-    if not _weak(yard, more) and not _stays(yard, before, one, more[:OTHERS]):
+    if any(h.statistic > yard.thresholds[h.family] for h in more) and not _stays(yard, before, one, more[:OTHERS]):
         return None
     # both begin at the declared number: what either explains is the same but for what is left
     fits = {h.name for h in declared if h.statistic > removed - NEAR}
@@ -101,7 +101,7 @@ def _unit(columns: np.ndarray) -> np.ndarray:
     return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30))
 
 
-def _weak(yard: Yardstick, ranked: Sequence[Hypothesis], misfits: float = 0.0) -> bool:
+def _weak(yard: Yardstick, ranked: Sequence[Hypothesis], misfits: float) -> bool:
     """Whether nothing is strong enough to be named beside another cause."""
     return all(h.statistic < max(LATER * yard.thresholds[h.family], misfits) for h in ranked)
 
