@@ -40,7 +40,8 @@ OWN = {
     "moved": 0.2,
     "capacity": 0.1,
     "slip": 0.12,
-    "sun": 0.08,
+    "sun": 0.12,
+    "zone": 0.1,
 }
 OWN_OTHERS = 0.05
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
