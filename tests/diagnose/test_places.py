@@ -58,7 +58,7 @@ def test_pruned_of_all_places_it_is_the_model(placed):
         np.testing.assert_array_equal(a.M, b.M)
         assert (a.theta, a.sources) == (b.theta, b.sources)
     for a, b in zip(stepped(plain, drive), stepped(full.thermal, drive), strict=True):
-        np.testing.assert_array_equal(a, b)
+        np.testing.assert_allclose(a, b, rtol=1e-13)  # other shapes of memory, other roundings
 
 
 def test_pruned_keeps_what_is_wanted(placed):

@@ -10,9 +10,9 @@ from twin.build.workers import each
 from twin.diagnose.verdict import limits_of
 
 ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few of CI
-LONG = ("outside", "pair", "sun", "two", *OWN)  # minutes long, or for minutes at a yardstick of their own
+LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a yardstick of their own
 # Not said as it should be: `make hidden` shows it, with the long ones.
-MISSED = ("coolant", "film_gain", "joint", "capacity", "initial_state", "slip")
+MISSED = ("coolant", "film_gain", "joint", "capacity", "initial_state")
 PARAMETERS = [
     pytest.param(name, marks=[pytest.mark.slow] if name in (*MISSED, *LONG, *ROUGH) else []) for name in TRIALS
 ]

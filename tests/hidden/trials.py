@@ -261,7 +261,8 @@ _LOG = (
     ),
     _in_log("measurement", Damage("measurement", "tcp.dz", 8e-6, "drift"), "m", "named"),
     Trial(
-        "coarse_model", Expected(("named",), "coarse_model", "", math.nan, "", "always"), truth="null_0", states=12,
+        "coarse_model", Expected(("named",), "coarse_model", "artefact", math.nan, "", "always"), truth="null_0",
+        states=12,
     ),
     Trial(
         "effect_and_sensor",
