@@ -34,11 +34,11 @@ def main() -> None:
         built = twin([*asked, "-o", str(report)], folder)
         verify = twin(["verify", str(report / "extended.h5")], folder)
         found = json.loads((report / "report.json").read_text(encoding="utf-8"))
-    print(f"   {found['verdict']}:", end="")
+    print(f"   {found['verdict']}")
     for c in found["causes"]:
         low, high = c["ci95"]
         print(
-            f" {c['family']} at {c['place']}, {c['history']}: {c['amplitude']:.1f} [{low:.1f}, {high:.1f}] {c['unit']}"
+            f"   {c['family']} at {c['place']}, {c['history']}: {c['amplitude']:.1f} [{low:.1f}, {high:.1f}] {c['unit']}"
         )
     helped = [g for g in found["gain"] if g["ci95"][0] > 0.0]
     best = max(found["gain"], key=lambda g: g["recalibrated"] / g["extended"])
