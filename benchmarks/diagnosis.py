@@ -37,9 +37,8 @@ def main() -> None:
     print(f"   {found['verdict']}")
     for c in found["causes"]:
         low, high = c["ci95"]
-        print(
-            f"   {c['family']} at {c['place']}, {c['history']}: {c['amplitude']:.1f} [{low:.1f}, {high:.1f}] {c['unit']}"
-        )
+        size = f"{c['amplitude']:.1f} [{low:.1f}, {high:.1f}] {c['unit']}"
+        print(f"   {c['family']} at {c['place']}, {c['history']}: {size}")
     helped = [g for g in found["gain"] if g["ci95"][0] > 0.0]
     best = max(found["gain"], key=lambda g: g["recalibrated"] / g["extended"])
     print(f"   sealed run: {len(helped)} of {len(found['gain'])} channels better beyond chance; ", end="")
