@@ -176,10 +176,10 @@ def _one(deadline: float, item: Item) -> None:
 
 
 def results() -> list[dict[str, Any]]:
-    """The trials that were made."""
-    wanted = set(items())
+    """The trials that were made; of one that is in several files, the last file's by name."""
     lines = [line for path in sorted(OUT.glob("trials-*.jsonl")) for line in path.read_text("utf-8").splitlines()]
-    return [r for r in map(json.loads, lines) if (r["family"], r["factor"], r["seed"]) in wanted]
+    found = {(r["family"], r["factor"], r["seed"]): r for r in map(json.loads, lines)}
+    return [found[item] for item in items() if item in found]
 
 
 def main(minutes: float = float("inf")) -> None:
