@@ -8,7 +8,7 @@ import pytest
 from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.bells import Bell, by_blocks, name
 from twin.diagnose.diagnosis import Window
-from twin.diagnose.growth import GROWTH, SHARE, grown
+from twin.diagnose.growth import GROWTH, SHARE, chilled, grown
 
 BLOCKS = 6
 
@@ -64,3 +64,32 @@ def test_a_bell_finds_its_hour_in_every_run():
     assert found.when.bell.centres == (3 * 3600.0, 6 * 3600.0)
     assert found.amplitude == pytest.approx((50.0, 30.0), rel=1e-6)
     assert found.statistic > 1.2 * start.statistic
+
+
+def coolant(kind: str = "coolant") -> tuple[Batch, np.ndarray]:
+    """A film and its heat in the first hour, in the last three, or in all four; what they explain (8, 8)."""
+    hours = [(0, 1), (1, 4), (0, 4)]
+    windows = [History(f"{a} to {b} h", np.kron(np.eye(2), (np.arange(4) >= a) & (np.arange(4) < b)),
+                       windows=(Window("a", 3600.0 * a, 3600.0 * b),)) for a, b in hours]  # fmt: skip
+    return Batch("coolant", kind, "W/(m^2*K)", ("p",), np.arange(8)[None], tuple(windows), 1, smallest=5.0), np.eye(8)
+
+
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_a_coolant_begins_where_cold_does_most(first):
+    """Cold of the first hour; a film that suits all hours."""
+    batch, block = coolant()
+    g = np.concatenate([[10.0, 10.0, 10.0, 10.0], [-9.0, -1.0, 1.0, -0.5]])
+    found = chilled(Hypothesis(batch, 0, batch.histories[first], 1.0, (10.0, -2.0), 1.0), g, block)
+    if first == 0:
+        assert found is None  # it has begun there already
+    else:
+        assert found is not None
+        assert (found.when, found.amplitude) == (batch.histories[0], pytest.approx((10.0, -9.0)))
+
+
+def test_no_cold_and_no_coolant_begin_nowhere_else():
+    batch, block = coolant()
+    warm = np.concatenate([np.zeros(4), [9.0, 1.0, 1.0, 1.0]])
+    assert chilled(Hypothesis(batch, 0, batch.histories[1], 1.0, (10.0, 2.0), 1.0), warm, block) is None
+    heat, block = coolant("heat")
+    assert chilled(Hypothesis(heat, 0, heat.histories[1], 1.0, (10.0, 2.0), 1.0), -warm, block) is None

@@ -14,12 +14,14 @@ from tests.diagnose.test_search import measured
 from twin.diagnose.accepted import Accepted
 from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.diagnosis import Window
-from twin.diagnose.search import FEW, _restless, search
+from twin.diagnose.search import FEW, LEAVES, LEFT, _leaking, _restless, search
 from twin.diagnose.search_declared import declared_candidates
 from twin.diagnose.search_look import look
 from twin.diagnose.search_strained import LATER, closed, strained
 from twin.diagnose.settled import settled
+from twin.diagnose.verdict import verdict_of
 
 
 def in_windows(n: int) -> Accepted:
@@ -37,6 +39,35 @@ def test_what_comes_and_goes_often_must_leave_nothing_anywhere(windows, left, re
     yard = small_case.yardstick()
     accepted = [in_windows(windows)]
     assert len(_restless(yard, accepted, {"elsewhere": left * yard.thresholds["unknown"]})) == restless
+
+
+@pytest.mark.parametrize(
+    ("statistic", "left", "leaking"),
+    [
+        (100.0, 1.1 * LEFT * 36.0, 1),
+        (100.0, 0.9 * LEFT * 36.0, 0),
+        (1e5, 1.1 * LEAVES * 1e5, 1),
+        (1e5, 0.9 * LEAVES * 1e5, 0),
+    ],
+)
+def test_one_window_may_leave_no_heat_but_a_strong_ones_misfits(statistic, left, leaking):
+    yard = small_case.yardstick()
+    yard = replace(yard, thresholds={**yard.thresholds, "unknown": 36.0})
+    one = replace(in_windows(1), statistic=statistic)
+    assert len(_leaking(yard, [one], {"elsewhere": left})) == leaking
+    always = replace(one, hypothesis=replace(one.hypothesis, when=replace(one.hypothesis.when, windows=())))
+    assert not _leaking(yard, [always], {"elsewhere": left})
+
+
+@pytest.mark.parametrize("leave", [True, False])
+@pytest.mark.parametrize(("watts", "levels"), [(60.0, (0.0, 1.0, 0.3, 0.3)), (300.0, (0.0, 1.0, 0.3, 0.3))])
+def test_heat_that_goes_down_by_steps_is_no_window(watts, levels, leave, monkeypatch):
+    """It is named as one only where windows may leave what they like."""
+    if leave:
+        monkeypatch.setattr(sys.modules[search.__module__], "LEFT", 1e9)
+    found = search(small_case.yardstick(), measured("heat", "housing", watts, 3, levels))
+    assert bool(found.accepted) == leave
+    assert (verdict_of(found, FAMILIES)[0] == "unknown") != leave
 
 
 def test_a_second_cause_explains_more_than_the_first_ones_misfits(monkeypatch):

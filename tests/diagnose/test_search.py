@@ -16,13 +16,14 @@ from twin.diagnose.search import search
 from twin.diagnose.verdict import limits_of, pulls_of, verdict_of
 
 
-def measured(kind="", place="", size=0.0, seed=0):
-    """(m,) what the machine shows with noise, and a cause that always acts."""
+def measured(kind="", place="", size=0.0, seed=0, levels=(1.0,)):
+    """(m,) what the machine shows with noise, and a cause: in every run its size times levels, each as long."""
     study = small_case.study()
     rng = np.random.default_rng(seed)
     x = 0.5 * rng.standard_normal(len(study.bench.parameters))
-    always = tuple(np.ones(p.run.drive.n_steps) for p in study.runs)
-    units = [Unit(kind, place, -1, always)] if kind else []
+    steps = [p.run.drive.n_steps for p in study.runs]
+    shapes = tuple(np.array(levels)[np.arange(n) * len(levels) // n] for n in steps)
+    units = [Unit(kind, place, -1, shapes)] if kind else []
     parts = []
     for k in study.fitted:
         slots = slots_with(study, small_case.elements(), units, k)

@@ -60,13 +60,15 @@ def proof(yard: Yardstick, h: Hypothesis) -> float:
 
 
 def judged(
-    yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]
+    yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Candidates, most worthy first: those whose statistics are exact, and the others.
 
-    Those that are bent or have edges are refitted, until one leads all others by a share of BEHIND.
+    Those that are bent or have edges are refitted, until one leads all others by a share of BEHIND. A candidate may
+    have several starts, of which the first has its score: it is the worthiest that they end at.
     """
-    waiting = sorted(candidates, key=worth, reverse=True)
+    starts = {id(first): (first, *more) for first, *more in candidates}
+    waiting = sorted((c[0] for c in candidates), key=worth, reverse=True)
     done: list[Hypothesis] = []
     left: list[Hypothesis] = []
     count = 0
@@ -77,7 +79,7 @@ def judged(
             left.append(h)
             continue
         count += bent
-        done.append(exact(yard, y, fitted, h) if bent else h)
+        done.append(max((exact(yard, y, fitted, s) for s in starts[id(h)]), key=worth) if bent else h)
     straight = [h for h in left if not _bent(yard, h)]
     return sorted([*done, *straight], key=worth, reverse=True), [h for h in left if _bent(yard, h)]
 

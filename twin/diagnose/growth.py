@@ -54,6 +54,24 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
     return current
 
 
+def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis | None:
+    """A coolant in the window that plain cold likes best; None where it has that one, or cold explains nothing.
+
+    A score takes a film for a straight line, in which cold and film cancel over hours that have neither: a window that
+    is far too long can then lead. What a coolant takes away is cold, whatever its film.
+    """
+    if h.batch.kind != "coolant" or len(h.when.windows) == 0:
+        return None
+    own = g[h.batch.columns[h.place]]
+    W = np.stack([w.weights[1] for w in h.batch.histories])  # (h, L): its heat
+    num, F = W @ own, np.einsum("hl,lm,hm->h", W, block, W, optimize=True)
+    statistic = np.where(num < 0.0, num**2 / (F + F.max(initial=0.0) * RIDGE + 1e-12), 0.0)
+    k = int(np.argmax(statistic))
+    if statistic[k] <= 0.0 or h.batch.histories[k].windows == h.when.windows:
+        return None
+    return replace(h, when=h.batch.histories[k], amplitude=(h.amplitude[0], float(num[k] / F[k])))
+
+
 def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
     """A bell with its best hour in every run: runs may start at other hours of the day. Greedy, run by run."""
     own, current = g[h.batch.columns[h.place]], h

@@ -15,7 +15,7 @@ from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import beginning, judged, proof
 from twin.diagnose.fitter import Fitted
-from twin.diagnose.growth import grown
+from twin.diagnose.growth import chilled, grown
 from twin.diagnose.hotter import hotter
 from twin.diagnose.refit import refit
 from twin.diagnose.search_declared import declared_candidates
@@ -30,6 +30,7 @@ MOST = 3  # causes
 TRIES = 3  # rounds of candidates that the exact model refuses
 WINDOWS = 4  # in which a cause comes and goes at one place; what does so more often has a history that no name tells
 FEW = 2  # windows likewise that a cause may have and still leave heat where it is
+LEFT, LEAVES = 0.5, 0.005  # of the threshold of heat of any history, of its statistic: what windows may leave of it
 SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
 NAMED = 0.7  # share of its own threshold that a name needs where another one passes
@@ -71,7 +72,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         if not passing or len(accepted) >= most or fruitless >= TRIES or imitated:
             break
         proved, others = judged(
-            yard, exchanged(yard.study, y, accepted), fitted, [_with_more_windows(seen, h) for h in passing[:AHEAD]]
+            yard, exchanged(yard.study, y, accepted), fitted, [_starts(seen, h) for h in passing[:AHEAD]]
         )
         standing = [h for h in proved if proof(yard, h) > NAMED * limits[h.family]]
         if not any(proof(yard, h) > limits[h.family] for h in standing):
@@ -102,6 +103,10 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         if in_turn := _in_turn(yard.study, accepted):
             imitated = True
             fitted, accepted = _without(yard, y, fitted, accepted, in_turn)
+    if not imitated and (leaking := _leaking(yard, accepted, steps[-1].parts)):
+        fitted, accepted = _without(yard, y, fitted, accepted, leaking)
+        seen, _, step = look(yard, fitted)
+        steps.append(step)
     if accepted:  # which may have been all that made it seem hotter
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     else:
@@ -117,9 +122,12 @@ def _without(
     return refit(yard, y, fitted.x, left) if left else (yard.fitter(y), left)
 
 
-def _with_more_windows(seen: Sight, h: Hypothesis) -> Hypothesis:
+def _starts(seen: Sight, h: Hypothesis) -> list[Hypothesis]:
+    """A hypothesis in the windows that it likes best, and a coolant in the one that cold likes best, too."""
     k = next(i for i, own in enumerate(seen.ready) if own.batch is h.batch)
-    return grown(h, seen.g, seen.blocks[k][h.place])
+    block = seen.blocks[k][h.place]
+    cold = chilled(h, seen.g, block)
+    return [grown(h, seen.g, block), *([] if cold is None else [cold])]
 
 
 def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
@@ -151,6 +159,17 @@ def _restless(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, fl
     ]  # fmt: skip
 
 
+def _leaking(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
+    """Causes in windows that leave heat when nothing more can be named. Windows whose edges are fitted are so free
+    that one of them tells most of nearly any history: what else it leaves tells that it was another one."""
+    left = max(parts.values(), default=0.0)
+    return [
+        a for a in accepted
+        if a.hypothesis.when.windows and a.hypothesis.when.bell is None and a.units and a.hypothesis.family != "joint"
+        and left > max(LEFT * yard.thresholds["unknown"], LEAVES * a.statistic)
+    ]  # fmt: skip
+
+
 def _parts(study: Study, name: str) -> set[str]:
     """The parts that a surface or a film belongs to."""
     head, _, rest = name.partition(".")
@@ -177,9 +196,10 @@ def _rivals(
 ) -> tuple[tuple[Hypothesis, float], ...]:
     """Other explanations nearly as likely, with their cosines."""
     others, seen = [], {(chosen.family, chosen.name, chosen.batch.kind)}
+    near = max(NEAR, MISFIT * chosen.statistic)
     for h in sorted(ranked, key=lambda h: -h.statistic):
         key = (h.family, h.name, h.batch.kind)
-        if key not in seen and h.statistic > max(chosen.statistic - NEAR, 0.5 * yard.thresholds[h.family]):
+        if key not in seen and h.statistic > max(chosen.statistic - near, 0.5 * yard.thresholds[h.family]):
             seen.add(key)
             others.append(h)
     others = others[:8]
