@@ -5,6 +5,7 @@ Results are the dictionaries that `benchmarks.campaign.judged` makes, truths the
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -124,8 +125,11 @@ def covered(truth: Mapping[str, Any], cause: Mapping[str, Any], top: Top) -> boo
 
 
 def effect(truth: Mapping[str, Any], top: Top) -> float:
-    """A size as detection limits count it: factors by their distance from one, signals at their top."""
+    """A size as `limits_at` counts it: factors by their distance from one, of losses by their logarithm, signals at
+    their top."""
     size = float(truth["size"])
+    if truth["family"] == "loss_law" and truth["unit"] == "1":
+        return abs(math.log(size))
     if truth["family"] in FACTORS and truth["unit"] == "1":
         return abs(size - 1.0)
     if truth["signal"] and truth["family"] in ("heat_source", "forced_convection"):

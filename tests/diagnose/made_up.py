@@ -83,7 +83,16 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
     t = 1800.0 * np.arange(20)
     power = 40.0 * np.sin(t / 9000) ** 2
     ranked = tuple(
-        Rival(FAMILIES[k % len(FAMILIES)], f"bed.face_{k}", "x_speed", 90 / (k + 1), "W", 430 / (k + 1) ** 2, 0.98**k)
+        Rival(
+            FAMILIES[k % len(FAMILIES)],
+            f"bed.face_{k}",
+            "x_speed",
+            90 / (k + 1),
+            "W",
+            430 / (k + 1) ** 2,
+            0.98**k,
+            ci95=(90 / (k + 1) - 8.507, 90 / (k + 1) + 8.507),
+        )
         for k in range(10)
     )
     cosine = np.corrcoef(rng.standard_normal((10, 30)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from scipy.stats import binom
 
@@ -184,6 +186,7 @@ def test_sizes_are_compared_in_one_unit_or_not_at_all():
     assert size_of(hidden("signal", "signals.a", 0.5, "1", "factor"),
                    cause("signal", "signals.a", 0.5, "1", history="factor"), top) is None  # fmt: skip
     assert effect(hidden("joint", "contacts.a", 0.15, "1"), top) == pytest.approx(0.85)
+    assert effect(hidden("loss_law", "sources.a", 0.5, "1"), top) == pytest.approx(math.log(2.0))
 
 
 def test_mistakes_are_listed_with_what_was_said():

@@ -96,6 +96,7 @@ def test_heat_is_named_at_its_node_and_helps_on_another_day(made: Path) -> None:
     gain = {g["channel"]: g for g in found["gain"]}
     assert gain["column"]["extended"] < 0.5 * gain["column"]["recalibrated"]
     extended = read_artefact(made / "diagnosis_heat" / "extended.h5")
+    twin("verify", made / "diagnosis_heat" / "extended.h5")
     (source,) = (s for s in extended.model.load_model.sources if s.name == "found_1")
     assert source.use.parameters["power"] == pytest.approx(cause["amplitude"], rel=1e-4)
 

@@ -28,10 +28,10 @@ from twin.diagnose.report_residuals import load_rows, loudest, on_masks, residua
 from twin.diagnose.report_tables import gain_table, table, when
 from twin.diagnose.report_text import (
     cause_evidence,
+    cause_words,
     chance,
     evidence_sentence,
     gain_sentences,
-    near_interval,
     pull_of,
     verdict_sentence,
 )
@@ -107,7 +107,7 @@ def written(tmp_path_factory):
 
 SAID = {  # what the reader of each verdict must find
     "named": ("cause named", "85.0 W (95 % interval 80.2 to 89.7 W), following x_current²", "scale x: 11.30 µm/(m·K)"),
-    "ambiguous": ("either heat that", "; or a loss that follows", "71.0 W", "What would tell them apart",
+    "ambiguous": ("either heat that", "; or a loss other than declared", "71.0 W", "What would tell them apart",
                   "a sensor on bed.x_motor"),
     "unknown": ("part column, mostly at column.top", "its peak is 40 W (95 % interval 28 to 52 W)", "hydraulics"),
     "out_of_tolerance": ("Declared values cannot hold: sources.x_motor.gain is 1.620 (95 % interval 1.550 to 1.700) "
@@ -115,7 +115,7 @@ SAID = {  # what the reader of each verdict must find
     "sensor": ("sensor x_nut is at fault: drift, 0.81 K/day (95 % interval 0.70 to 0.92 K/day)",
                "The model of the machine is left as it is"),
     "signal": ("signal x_current is at fault: factor, 0.500", "0.480 to 0.520"),
-    "nothing": ("Nothing is missing that these data could show", "These data would have shown at least:", "11.6 W",
+    "nothing": ("Nothing is missing that these data could show", "would have shown, in 95 of 100 cases:", "11.6 W",
                 "3.40 W/(m²·K)", "0.310 K/day", "2.30 µm", "No family of causes passes its threshold"),
 }  # fmt: skip
 
@@ -182,7 +182,7 @@ def test_a_terminal_gets_at_most_ten_lines_with_the_verdict(verdict):
     assert len(lines) <= 10
     assert all(line and "\n" not in line for line in lines)
     assert verdict_sentence(diagnosis(verdict)) == lines[1]
-    assert any("would have shown at least" in line for line in lines) == (verdict == "nothing")
+    assert any("would have shown, in 95" in line for line in lines) == (verdict == "nothing")
     assert any("left as it is" in line for line in lines) == (verdict == "sensor")
     assert any("corrects the declaration" in line for line in lines) == (verdict == "signal")
 
@@ -291,9 +291,19 @@ def test_decimals_follow_the_interval():
     assert number(np.inf) == "∞"
 
 
-def test_an_interval_from_a_statistic_is_that_of_a_linear_amplitude():
-    low, high = near_interval(Rival("heat_source", "a", "", 10.0, "W", 25.0, 0.0))  # sigma is 10 / 5
-    assert (low, high) == (pytest.approx(10 - 1.96 * 2), pytest.approx(10 + 1.96 * 2))
+@pytest.mark.parametrize(
+    ("family", "unit", "settings", "wanted"),
+    [
+        ("loss_law", "1", {}, "1.62 times the declared"),
+        ("misplaced_source", "1", {"surface": "bed.left"}, "1.62 times what it emits, which enters at bed.left"),
+        ("coolant", "W/(m^2*K)", {"temperature_difference": -6.04}, "1.62 W/(m²·K), 6.04 K colder than the air there"),
+        ("scale_expansion", "1/K", {"part": "bed"}, "1620000 µm/(m·K), with the temperature of bed"),
+        ("heat_source", "W", {"reference": 8.0}, "1.62 W, where x_current is 8.00 in SI units"),
+    ],
+)
+def test_a_size_says_what_it_holds_for(family, unit, settings, wanted):
+    cause = heat(family=family, unit=unit, settings=settings, amplitude=1.62, ci95=(np.nan, np.nan), rivals=())
+    assert wanted in cause_words(cause)
 
 
 def test_chance_counts_what_data_without_an_effect_gave():
@@ -467,6 +477,16 @@ def test_pictures_show_the_numbers_they_are_made_of():
     assert sorted(float(m.get_xdata()[0]) for m in marks) == pytest.approx(
         sorted(v / 21.4 for v in d.observed.values())
     )
+
+
+@pytest.mark.parametrize("verdict", ["nothing", "named"])
+def test_no_gain_is_told_with_its_reason(verdict):
+    d = replace(diagnosis(verdict), gain=())
+    open_only = tuple(s for s in d.series if not s.sealed)
+    assert len(open_only) < len(d.series)
+    assert "no gain to report: no run was kept aside." in read(page(replace(d, series=open_only))).text
+    bare = tuple(replace(s, sealed=True) for s in open_only)
+    assert "no gain to report: nothing was measured in the run kept aside." in read(page(replace(d, series=bare))).text
 
 
 def test_long_tables_are_cut_and_say_so():

@@ -10,10 +10,44 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.accepted import parameter_of
+from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.search import search
 from twin.diagnose.search_strained import PULLED, strained
-from twin.diagnose.verdict import CALIBRATED, STRAINED, strained_of, verdict_of
+from twin.diagnose.verdict import CALIBRATED, STRAINED, limits_at, limits_of, rival_of, strained_of, told, verdict_of
+
+
+@pytest.mark.parametrize(
+    ("kind", "wanted", "low", "high"),
+    [  # amplitude 0.5, of which one standard deviation is 0.1
+        ("heat", 0.5, 0.304, 0.696),
+        ("contact", 1.5, 1.304, 1.696),
+        ("gain", np.exp(0.5), np.exp(0.304), np.exp(0.696)),
+    ],
+)
+def test_candidates_and_causes_have_their_sizes_in_the_same_words(kind, wanted, low, high):
+    batch = Batch("family", kind, "1", ("p",), np.zeros((1, 1), dtype=int), (History("always", np.ones((1, 1))),))
+    found = rival_of(Hypothesis(batch, 0, batch.histories[0], 25.0, (0.5,), 100.0), 1.0)
+    assert (found.amplitude, found.ci95) == (pytest.approx(wanted), pytest.approx((low, high)))
+
+
+def test_an_exact_factor_is_told_as_a_factor_without_an_interval():
+    always = (History("factor", np.ones((1, 1))),)
+    batch = Batch(
+        "signal", "signal", "1", ("signals.x_current*0.707",), np.zeros((1, 1), dtype=int), always, fixed=True
+    )
+    found = rival_of(Hypothesis(batch, 0, batch.histories[0], 25.0, (1.0,), 100.0), 1.0)
+    assert (found.place, found.amplitude) == ("signals.x_current", 0.707)
+    assert np.isnan(found.ci95).all()
+
+
+def test_limits_of_factors_are_factors():
+    yard = small_case.yardstick()
+    gain = next(b for b in yard.columns.batches if b.kind == "gain")
+    at = sorted(size for (family, unit, _, _), size in limits_at(yard).items() if (family, unit) == (gain.family, "1"))
+    (limit,) = (x for x in limits_of(yard) if (x.family, x.unit) == (gain.family, "1"))
+    assert limit.smallest == pytest.approx(told("gain", at[0])) == pytest.approx(np.exp(at[0]))
+    assert limit.largest == pytest.approx(np.exp(at[-1]))
 
 
 @pytest.mark.parametrize(("pull", "wanted"), [(0.8, "nothing"), (4.5, "out_of_tolerance")])

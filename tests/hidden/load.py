@@ -2,7 +2,7 @@
 
 tests/hidden/truth/NAME.npz holds the runs for diagnosis of one machine: temperatures at every row of the log in steps
 of RESOLUTION, as differences along time (compressed to a few bits each), TCP rows in steps of TCP_RESOLUTION. Written
-by `benchmarks.hidden_truth.store`, which needs gmsh and minutes; read with numpy alone.
+by `benchmarks.hidden_store`, which needs gmsh and minutes; read with numpy alone.
 """
 
 from __future__ import annotations

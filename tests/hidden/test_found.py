@@ -13,9 +13,12 @@ ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few
 LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a yardstick of their own
 # Not said as it should be: `make hidden` shows it, with the long ones.
 MISSED = ("coolant", "film_gain", "joint", "capacity", "initial_state")
+SLOW = pytest.mark.slow
 PARAMETERS = [
-    pytest.param(name, marks=[pytest.mark.slow] if name in (*MISSED, *LONG, *ROUGH) else []) for name in TRIALS
-]
+    pytest.param(name, marks=[SLOW, pytest.mark.xfail(strict=True)] if name in MISSED else
+                 [SLOW] if name in (*LONG, *ROUGH) else [])
+    for name in TRIALS
+]  # fmt: skip
 
 
 @pytest.fixture(scope="session")
@@ -59,6 +62,8 @@ def test_what_was_hidden_is_said(everything, name):
             and any(_same(place, wanted) for wanted in (expected.place, *expected.places))
             for family, place in named
         ), named
+        for family, place in expected.further:
+            assert any(said_family == family and _same(said_place, place) for said_family, said_place in named), named
 
 
 def test_what_is_too_small_is_below_its_limit(settings):

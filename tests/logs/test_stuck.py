@@ -56,6 +56,17 @@ def test_frozen_sensor():
     assert found.where.endswith("(lines 302 .. 601)")
 
 
+def test_frozen_is_what_was_read_and_not_what_is_missing():
+    columns = temperatures()
+    columns["c"][300:] = np.nan
+    assert not [p for p in told(columns) if "stands still" in p.what]
+    columns = temperatures()
+    columns["b"][300:] = columns["b"][300]
+    columns["b"][::3] = np.nan
+    (found,) = [p for p in told(columns) if "stands still" in p.what]
+    assert found.where.endswith("(lines 303 .. 601)")
+
+
 def test_coarse_sensors_in_slow_air_are_not_frozen():
     assert told({k: np.round(v, 1) for k, v in temperatures().items()}) == []
     shared = np.round(20.0 + 3.0 * (1.0 - np.exp(-np.arange(600) / 60.0)), 1)  # all come to rest together

@@ -10,6 +10,7 @@ import pytest
 
 from tests.support.descriptions import MACHINES, SLIDE
 from twin.cli.main import run
+from twin.diagnose.hide import with_files
 from twin.logs.read import read_run
 from twin.logs.run import Table, Tcp
 from twin.logs.write import write_run
@@ -128,6 +129,19 @@ def test_meshes_and_geometry_come_along(tmp_path):
     for name in ("geometry.py", "mesh/bed.msh", "mesh/table.msh"):
         assert (out / name).read_bytes() == (FIVE_AXIS / name).read_bytes()
     assert load_machine(out).sources["hidden_1"].surface == "bed.x_motor"
+
+
+def test_a_mesh_that_lies_elsewhere_says_who_moved_it(tmp_path):
+    text = (FIVE_AXIS / "machine.toml").read_text(encoding="utf-8")
+    mesh = (FIVE_AXIS / "mesh/bed.msh").as_posix()
+    text = text.replace('"mesh/bed.msh"', f'"{mesh}"')
+    machine = load_machine(FIVE_AXIS, text)
+    for mark in ("found", "hidden"):
+        new = tmp_path / mark
+        new.mkdir()
+        assert f'mesh = "{mesh}"  # {mark}: was "{mesh}"' in with_files(text, machine, new, mark)
+        assert not (new / "mesh/bed.msh").exists()
+        assert (new / "mesh/table.msh").exists()
 
 
 @pytest.mark.parametrize(

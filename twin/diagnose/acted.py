@@ -44,7 +44,7 @@ def units_of(study: Study, h: Hypothesis) -> tuple[Unit, ...]:
     if kind in READINGS:
         return ()
     place = h.name.removeprefix("films.").removeprefix("environment.").removeprefix("contacts.")
-    if h.batch.family in ("heat_source", "sun", "coolant") or kind == "film":
+    if kind in ("heat", "film", "coolant", "capacity"):  # at places, some of which are the pads of "contacts.X"
         place = h.name
     columns, weights = h.combination()
     if kind == "coolant":

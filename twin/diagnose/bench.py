@@ -33,6 +33,7 @@ from twin.progress import Progress, silent
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
+from twin.rom.sampling import Intervals, cut
 from twin.run.system import Layout, System, prepare
 
 RICH = RichOptions(samples=10, tolerance=2e-2)
@@ -40,7 +41,8 @@ FINE = 60.0  # s, steps of loads and of the truth beside them
 TRAINING_STEP = 120.0  # s
 TAIL = 6e-7  # share of the squared trajectories, in units of the noise, that is left out
 LARGEST = 190  # states
-LEAST_STEPS = 12
+MEAN_OF = {"A": 2.0, "W": 1.0, "m/s": 1.0, "1/s": 1.0, "1": 1.0}  # by unit: e of |s|^e, which acts; else s
+LEAST = 3600.0  # s, of a log
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class BenchRun:
 
     name: str
     drive: Drive  # of the description, steps of FINE
-    signals: dict[str, np.ndarray]  # (n_steps,) means over the drive's steps, SI
+    signals: dict[str, np.ndarray]  # (n_steps,) means over the drive's steps, currents as rms, SI
     start: float  # degC
     stated_start: bool
     loads: Loads
@@ -137,9 +139,17 @@ def fine_drive(model: MachineModel, run: Run, dt: float = FINE) -> Drive:
     load = model.load_model
     span = float(run.loads.time[-1] - run.loads.time[0])
     n = int(np.ceil(span / (dt * INNER) - 1e-9)) * INNER
-    if n < LEAST_STEPS * INNER:
+    if span < LEAST:
         raise LogError(f"the log covers {span / 60:.0f} min", str(run.folder), "a diagnosis needs an hour at least")
     return evaluate(load, run.loads.time, signal_values(run, load.signals), dt, n)
+
+
+def drive_arrays(drive: Drive) -> tuple[np.ndarray, ...]:
+    """All that a drive does to a machine."""
+    return (
+        drive.time, drive.power, drive.theta, drive.environment, drive.films.value, drive.losses.value,
+        drive.contact_heat, drive.weight, drive.square, drive.conductance,
+    )  # fmt: skip
 
 
 def make_bench(
@@ -158,8 +168,7 @@ def make_bench(
     ]  # fmt: skip
     digest = hashlib.sha256()
     for drive, start in zip(drives, starts, strict=True):
-        for part in (drive.time, drive.power, drive.theta, drive.environment, drive.films.value, drive.losses.value,
-                     drive.contact_heat, drive.weight, drive.square, drive.conductance, np.array(start)):  # fmt: skip
+        for part in (*drive_arrays(drive), np.array(start)):
             digest.update(np.ascontiguousarray(part).tobytes())
     known = tuple((p.path, p.nominal, p.sigma, p.low, p.high) for p in parameters)
 
@@ -226,14 +235,31 @@ def _assembled(
 
 
 def _means(model: MachineModel, run: Run, drive: Drive) -> dict[str, np.ndarray]:
-    """Signals at the middle of the drive's steps; what histories of hypotheses are made from."""
-    values = signal_values(run, model.load_model.signals)
-    middle = (drive.time[:-1] + drive.time[1:]) / 2
+    """Means of signals over the drive's steps, as MEAN_OF says; what histories of hypotheses are made from.
+
+    No single row tells of a cycle within a step. Where all rows are a step apart or more there is none to tell of: then
+    it is the row that holds in the middle.
+    """
+    signals = model.load_model.signals
+    time, edges = run.loads.time - drive.time[0], drive.time - drive.time[0]
+    intervals = cut(time, edges) if np.any(np.diff(time) < (1.0 - 1e-6) * edges[1]) else None
+    at = (drive.time[:-1] + drive.time[1:]) / 2 if intervals is None else run.loads.time
+    exponent = {s.name: MEAN_OF.get(s.unit) for s in signals}
     result = {}
-    for name, column in values.items():
+    for name, column in signal_values(run, signals).items():
         good = np.isfinite(column)
         if good.any():
-            time = run.loads.time[good]
-            last = np.clip(np.searchsorted(time, middle, side="right") - 1, 0, len(time) - 1)
-            result[name] = np.asarray(column)[good][last]
+            told = run.loads.time[good]
+            last = np.clip(np.searchsorted(told, at, side="right") - 1, 0, len(told) - 1)
+            held = np.asarray(column)[good][last]
+            result[name] = held if intervals is None else _mean(intervals, held, exponent[name])
     return result
+
+
+def _mean(intervals: Intervals, values: np.ndarray, exponent: float | None) -> np.ndarray:
+    """(n_steps,) of held samples: their mean, or of their sizes the power mean with an exponent, signed as the mean."""
+    mean = intervals.mean(values)
+    if exponent is None:
+        return mean
+    size = np.maximum(intervals.mean(np.abs(values) ** exponent), 0.0) ** (1.0 / exponent)
+    return np.copysign(size, mean)

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.diagnose.diagnosis import Cause, Window
 from twin.logs.run import Run
-from twin.logs.stuck import stuck_temperatures
+from twin.logs.stuck import standstills
 
 LEAST = 1800.0  # s that a channel must stand still
 
@@ -23,33 +23,18 @@ def stuck_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[s
             result.append(run)
             continue
         columns = dict(table.columns)
-        for problem in stuck_temperatures(table, ""):
-            sensor = problem.what.split("'")[1]
-            if sensor not in sensors:
+        for still in standstills(table):
+            start, end = float(table.time[still.first]), float(table.time[still.last])
+            if still.name not in sensors or end - start < LEAST:
                 continue
-            first, last = longest(columns[sensor])
-            start, end = float(table.time[first]), float(table.time[last])
-            if end - start < LEAST:
-                continue
-            frozen = columns[sensor].copy()
-            frozen[first : last + 1] = np.nan
-            columns[sensor] = frozen
+            frozen = columns[still.name].copy()
+            frozen[still.first : still.last + 1] = np.nan
+            columns[still.name] = frozen
             causes.append(
                 Cause(
-                    "sensor", f"sensors.{sensor}", "", float("nan"), (float("nan"), float("nan")), "K",
+                    "sensor", f"sensors.{still.name}", "", float("nan"), (float("nan"), float("nan")), "K",
                     float("inf"), 0.0, history="stuck", windows=(Window(name, start, end),),
                 )
             )  # fmt: skip
         result.append(replace(run, temperatures=replace(table, columns=columns)))
     return result, causes
-
-
-def longest(values: np.ndarray) -> tuple[int, int]:
-    """First and last row of the longest stretch of one value."""
-    best, start = (0, 0), 0
-    for i in range(1, len(values) + 1):
-        if i == len(values) or values[i] != values[start]:
-            if i - 1 - start > best[1] - best[0]:
-                best = (start, i - 1)
-            start = i
-    return best

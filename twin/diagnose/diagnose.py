@@ -13,7 +13,7 @@ from twin import __version__
 from twin.build.cache import cached, machine_hash
 from twin.calibrate.measured import Measured, measured
 from twin.calibrate.problem import run_names
-from twin.diagnose.bench import Bench, make_bench
+from twin.diagnose.bench import Bench, drive_arrays, make_bench
 from twin.diagnose.catalogue import FAMILIES, VERSION, Family
 from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.coarse import coarse_model
@@ -22,6 +22,7 @@ from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
+from twin.diagnose.settled import settled
 from twin.diagnose.study import Study, make_study
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
@@ -100,16 +101,28 @@ def prepare(
     instruments = instruments_of(study, settings.temperature_sigma, settings.tcp_sigma)
     key = hashlib.sha256()
     for planned in study.runs:
-        m = planned.measured
+        m, drive, signals = planned.measured, planned.run.drive, planned.run.signals
         for part in (m.mean_of, m.column, np.nan_to_num(m.count), m.tcp_step, m.tcp_share, m.pose, planned.z0,
-                     np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, planned.run.drive.power,
-                     planned.run.drive.environment, planned.run.drive.theta):  # fmt: skip
+                     np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
+                     *(signals[name] for name in sorted(signals))):  # fmt: skip
             key.update(np.ascontiguousarray(part).tobytes())
+    asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)
     names = tuple((f.name, f.number, f.file) for f in settings.families)
     tolerance = tuple((p.path, p.nominal, p.sigma) for p in known)
     yard = cached(
         "yardstick",
-        (machine_hash(machine), key.hexdigest(), instruments, names, tolerance, settings.form, settings.nulls, _code()),
+        (
+            machine_hash(machine),
+            asked,
+            tuple(study.fitted),
+            key.hexdigest(),
+            instruments,
+            names,
+            tolerance,
+            settings.form,
+            settings.nulls,
+            _code(),
+        ),
         lambda: make_yardstick(
             study, settings.families, instruments, Form(), (settings.form, settings.nulls), progress
         ),
@@ -159,14 +172,16 @@ def diagnose(
     found = search(yard, measured_of(study))
     verdict, causes = verdict_of(found, settings.families)
     shown = found
-    if verdict == "unknown" and not causes:  # what is told and judged then is the calibration, not what was tried
-        shown = replace(found, accepted=(), x=found.x0)
+    groups = {f.name: f.group for f in settings.families}
+    if verdict == "unknown":  # told and judged is the calibration beside faulty channels then, not what was tried
+        kept = tuple(a for a in found.accepted if groups.get(a.hypothesis.family) == "sensor")
+        x, covariance = settled(yard, measured_of(study), kept)
+        shown = replace(found, accepted=kept, x=x, covariance=covariance)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     coarse = coarse_model(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma)
     verdict, causes = with_faults(verdict, causes, () if coarse is None else (coarse,), alone="named")
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED]
-    groups = {f.name: f.group for f in settings.families}
     extension = (
         tuple(c for c in causes if groups.get(c.family) == "machine" and c.history != CALIBRATED)
         if verdict in ("named", "out_of_tolerance", "ambiguous", "signal")

@@ -3,6 +3,7 @@ beside it (a sensor drifts by K/day); times in s since a run's start."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
@@ -37,6 +38,7 @@ class Rival:
     statistic: float  # log-likelihood ratio, twice: as that of the cause it rivals
     cosine: float  # with that cause, after everything that can be calibrated is projected out
     remedy: str = ""  # the sensor or the experiment that would tell them apart; "" where the data do
+    ci95: tuple[float, float] = (math.nan, math.nan)  # of the amplitude, from the statistic alone
 
 
 @dataclass(frozen=True)

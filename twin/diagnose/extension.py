@@ -45,10 +45,11 @@ def refuse_target(target: Path, artefact: Path, machine: Machine, runs: Sequence
             raise TwinError("holds what is read", str(target), "choose another folder with -o")
     former = former_files(target)
     names = [f"runs/{name}" for name in run_names(runs)]
+    names += [DESCRIPTION, ARTEFACT, *(p.name for p in machine.folder.glob("*.py"))]
+    meshes = [Path(p.mesh) for p in machine.parts.values() if p.mesh is not None]
+    names += [str(m) for m in meshes if not m.is_absolute() and ".." not in m.parts]  # others are not copied
     if former is None:
-        names += [PAGE, REPORT, DESCRIPTION, ARTEFACT, *(p.name for p in machine.folder.glob("*.py"))]
-        meshes = [Path(p.mesh) for p in machine.parts.values() if p.mesh is not None]
-        names += [str(m) for m in meshes if not m.is_absolute() and ".." not in m.parts]  # others are not copied
+        names += [PAGE, REPORT]
     for name in names:
         if (target / name).exists() and not any(f"{f}/".startswith(f"{name}/") for f in former or ()):
             raise TwinError(f"holds another {name}", str(target), "choose another folder with -o")
@@ -144,6 +145,11 @@ def _write_description(
         text = edit.text
         signals |= edit.signals
         parameters[cause.family, cause.place] = edit.parameters[0]
+        if cause.family == "misplaced_source" and cause.ci95[1] < 1.0:
+            said.append(
+                f"{cause.place}: machine.toml moves all of its heat to {cause.settings['surface']}, these data say "
+                f"{cause.amplitude:.2f} of it: divide the source by hand to have the gain that is shown"
+            )
     if not parameters:
         return parameters, said
     (new / DESCRIPTION).write_text(with_files(text, machine, new), encoding="utf-8")
@@ -163,11 +169,10 @@ def _as_edited(cause: Cause, study: Study) -> Cause:
         amplitude = amplitude / float(settings.pop("reference", 1.0)) ** cause.exponent  # at 1 m/s
     if cause.place.startswith("films.") and cause.family == "forced_convection":
         film = cause.place.removeprefix("films.")
-        settings["surfaces"] = ",".join(p.name for p in bench.places if p.film == film and p.surfaces)
+        places = [p for p in bench.places if p.film == film]
+        settings["surfaces"] = ",".join(".".join(s) for p in places for s in p.surfaces or ((p.name,),))
     if cause.family == "coolant":
-        area = next(p.area for p in bench.places if p.name == cause.place)
-        dT = float(settings.pop("temperature_difference", 0.0)) / area  # W per W/(m^2 K)
-        settings["temperature"] = _air(study, cause) + dT
+        settings["temperature"] = _air(study, cause) + float(settings.pop("temperature_difference", 0.0))
     if cause.family == "scale_expansion":
         part = str(settings.pop("part"))
         settings["surface"] = next((p.name for p in bench.places if part in p.members and p.surfaces), part)
@@ -182,9 +187,11 @@ def _as_edited(cause: Cause, study: Study) -> Cause:
 
 
 def _air(study: Study, cause: Cause) -> float:
-    """Mean temperature [degC] of the air around the machine while a cause acts."""
+    """Mean temperature [degC] of the air at the place of a cause, that of the film there, while it acts."""
     values = []
-    e = study.bench.base.load_model.surroundings
+    load = study.bench.base.load_model
+    film = next(p.film for p in study.bench.places if p.name == cause.place)
+    e = next((f.environment for f in load.films if f.name == film), load.surroundings)
     for planned in study.runs:
         run = planned.run
         time = (run.drive.time[:-1] + run.drive.time[1:]) / 2 - run.drive.time[0]

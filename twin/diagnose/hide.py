@@ -111,7 +111,7 @@ def _hide_in_machine(asked: Hidden, target: Path, out: Path, runs: Sequence[Path
         _expect_surface(machine, place)
     edit = extended_description(text, [cause], "hidden")
     with atomic_folder(out) as new:
-        text = with_files(edit.text, machine, new)
+        text = with_files(edit.text, machine, new, "hidden")
         load_machine(path, text)
         (new / "machine.toml").write_text(text, encoding="utf-8", newline="")
         for folder, log in logs.items():
@@ -290,8 +290,11 @@ def _expect_surface(machine: Machine, place: str) -> None:
             raise DescriptionError(f"no such surface: '{place}'", place, remedy)
 
 
-def with_files(text: str, machine: Machine, new: Path) -> str:
-    """Copy meshes and scripts into the folder `new`; a mesh that lies elsewhere is named by its absolute path."""
+def with_files(text: str, machine: Machine, new: Path, mark: str = "found") -> str:
+    """Copy meshes and scripts into the folder `new`; a mesh that lies elsewhere is named by its absolute path.
+
+    mark: who changed the text, "found" or "hidden" (`twin.machine.extend.changed`).
+    """
     folder = machine.folder.resolve()
     for script in folder.glob("*.py"):
         shutil.copyfile(script, new / script.name)
@@ -300,7 +303,7 @@ def with_files(text: str, machine: Machine, new: Path) -> str:
             continue
         mesh = (folder / part.mesh).resolve()
         if not mesh.is_relative_to(folder) or Path(part.mesh).is_absolute():
-            text = changed(text, {f"parts.{name}.mesh": str(mesh)}, "hidden")
+            text = changed(text, {f"parts.{name}.mesh": str(mesh)}, mark)
             continue
         copy = new / mesh.relative_to(folder)
         copy.parent.mkdir(parents=True, exist_ok=True)

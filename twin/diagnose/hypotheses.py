@@ -36,16 +36,15 @@ class Context:
         return [p for p in self.study.bench.places if p.film]
 
 
-def _single(context: Context, family: str, kind: str, unit: str, sign: int = 0, smallest: float = 0.0,
-            fixed: bool = False) -> list[Batch]:  # fmt: skip
+def _single(context: Context, family: str, kind: str, unit: str, sign: int = 0, smallest: float = 0.0) -> list[Batch]:
     """Every column of a kind a hypothesis of its own."""
     found = context.named(kind)
-    return [_batch(context, family, kind, unit, [(p, [c]) for p, h, c in found if h == name],
-                   (_history(context, name, np.ones((1, 1))),), sign, smallest, fixed)
+    return [_batch(family, kind, unit, [(p, [c]) for p, h, c in found if h == name],
+                   (_history(context, name, np.ones((1, 1))),), sign, smallest)
             for name in dict.fromkeys(h for _, h, _ in found)]  # fmt: skip
 
 
-def _batch(context: Context, family: str, kind: str, unit: str, rows: Sequence[tuple[str, Sequence[int]]],
+def _batch(family: str, kind: str, unit: str, rows: Sequence[tuple[str, Sequence[int]]],
            histories: Sequence[History], sign: int = 0, smallest: float = 0.0,
            fixed: bool = False) -> Batch:  # fmt: skip
     return Batch(family, kind, unit, tuple(p for p, _ in rows), np.array([c for _, c in rows], dtype=int),
@@ -123,9 +122,9 @@ def film_gain(context: Context) -> list[Batch]:
     one = (_history(context, "always", np.ones((1, 1))),)
     batches = []
     if groups := [(f"films.{p}", [c]) for p, h, c in context.named("group") if h == "always"]:
-        batches.append(_batch(context, "film_gain", "group", "1", groups, one, 0, 0.2))
+        batches.append(_batch("film_gain", "group", "1", groups, one, 0, 0.2))
     if surfaces:
-        batches.append(_batch(context, "film_gain", "film", "W/(m^2*K)", surfaces, one, 0, 1.0))
+        batches.append(_batch("film_gain", "film", "W/(m^2*K)", surfaces, one, 0, 1.0))
     return batches
 
 
@@ -140,9 +139,7 @@ def forced_convection(context: Context) -> list[Batch]:
                 rows.setdefault(prefix + p, []).append(c)
         if rows and speeds:
             histories = [_history(context, name, np.eye(len(speeds))[[i]]) for i, name in enumerate(speeds)]
-            batches.append(
-                _batch(context, "forced_convection", kind, "W/(m^2*K)", list(rows.items()), histories, 1, 1.0)
-            )
+            batches.append(_batch("forced_convection", kind, "W/(m^2*K)", list(rows.items()), histories, 1, 1.0))
     return batches
 
 
@@ -158,19 +155,17 @@ def heat_source(context: Context) -> list[Batch]:
         (p.name, [*(context.index["heat", p.name, s] for s in signals), *blocks["heat", p.name]])
         for p in context.study.bench.places
     ]
-    return [_batch(context, "heat_source", "heat", "W", rows, histories, 1, 1.0)]
+    return [_batch("heat_source", "heat", "W", rows, histories, 1, 1.0)]
 
 
 def loss_law(context: Context) -> list[Batch]:
     """Gains of sources, and other shapes at their places."""
     one = (_history(context, "always", np.ones((1, 1))),)
     gains = [(path.removesuffix(".gain"), [c]) for path, _, c in context.named("gain") if path.startswith("sources.")]
-    batches = [_batch(context, "loss_law", "gain", "1", gains, one, 0, 0.15)] if gains else []
+    batches = [_batch("loss_law", "gain", "1", gains, one, 0, 0.15)] if gains else []
     for name in dict.fromkeys(h for _, h, _ in context.named("source")):
         rows = [(f"sources.{p}", [c]) for p, h, c in context.named("source") if h == name]
-        batches.append(
-            _batch(context, "loss_law", "source", "W", rows, (_history(context, name, np.ones((1, 1))),), 0, 1.0)
-        )
+        batches.append(_batch("loss_law", "source", "W", rows, (_history(context, name, np.ones((1, 1))),), 0, 1.0))
     return batches
 
 
@@ -182,7 +177,7 @@ def joint(context: Context) -> list[Batch]:
     for kind in ("joint", "contact"):
         rows = [(f"contacts.{p}", list(c)) for (k, p), c in context.elements.block_of.items() if k == kind]
         if rows:
-            batches.append(_batch(context, "joint", kind, "1", rows, histories, 0, 0.3))
+            batches.append(_batch("joint", kind, "1", rows, histories, 0, 0.3))
     return batches
 
 
@@ -194,11 +189,11 @@ def zone(context: Context) -> list[Batch]:
     for kind, prefix, unit, smallest in (("air", "environment.", "K", 0.3), ("zone", "films.", "K", 0.5)):
         rows = [(prefix + p, list(c)) for (k, p), c in context.elements.block_of.items() if k == kind]
         if rows:
-            batches.append(_batch(context, "zone", kind, unit, rows, histories, 0, smallest))
+            batches.append(_batch("zone", kind, unit, rows, histories, 0, smallest))
     gradients = [(f"environment.{p}", [c]) for p, _, c in context.named("gradient")]
     if gradients:
         one = (_history(context, "always", np.ones((1, 1))),)
-        batches.append(_batch(context, "zone", "gradient", "K/m", gradients, one, 0, 0.3))
+        batches.append(_batch("zone", "gradient", "K/m", gradients, one, 0, 0.3))
     return batches
 
 
@@ -217,7 +212,7 @@ def sun(context: Context) -> list[Batch]:
             if (np.abs(weights).sum(axis=1) > 0).all():
                 histories.append(History(bells.name(bell, runs), weights, windows=windows, bell=bell))
     rows = [(p.name, list(context.elements.block_of["heat", p.name])) for p in context.outer]
-    return [_batch(context, "sun", "heat", "W", rows, histories, 1, 2.0)] if histories and rows else []
+    return [_batch("sun", "heat", "W", rows, histories, 1, 2.0)] if histories and rows else []
 
 
 def coolant(context: Context) -> list[Batch]:
@@ -229,7 +224,7 @@ def coolant(context: Context) -> list[Batch]:
         for name, w, windows in _windows(context)
     ]
     rows = [(p.name, [*blocks["film", p.name], *blocks["heat", p.name]]) for p in context.outer]
-    return [_batch(context, "coolant", "coolant", "W/(m^2*K)", rows, histories, 1, 5.0)] if rows else []
+    return [_batch("coolant", "coolant", "W/(m^2*K)", rows, histories, 1, 5.0)] if rows else []
 
 
 def sensor(context: Context) -> list[Batch]:
@@ -242,7 +237,7 @@ def sensor(context: Context) -> list[Batch]:
     ):  # fmt: skip
         rows = [(f"sensors.{p}", [c]) for p, _, c in context.named(kind)]
         if rows:
-            result.append(_batch(context, "sensor", kind, unit, rows, one[kind], sign, smallest, kind == "swapped"))
+            result.append(_batch("sensor", kind, unit, rows, one[kind], sign, smallest, kind == "swapped"))
     return result
 
 
@@ -253,9 +248,9 @@ def signal(context: Context) -> list[Batch]:
     result = []
     if rows:
         one = (History("factor", np.ones((1, 1))),)
-        result.append(_batch(context, "signal", "signal", "1", rows, one, 1, 0.0, True))
+        result.append(_batch("signal", "signal", "1", rows, one, 1, 0.0, True))
     if clocks:
-        result.append(_batch(context, "signal", "clock", "s", clocks, (History("clock", np.ones((1, 1))),), 0, 30.0))
+        result.append(_batch("signal", "clock", "s", clocks, (History("clock", np.ones((1, 1))),), 0, 30.0))
     return result
 
 
@@ -270,8 +265,8 @@ def expansion(context: Context) -> list[Batch]:
     gains = [(p, [c]) for p, _, c in context.named("gain") if p.endswith(".expansion")]
     whole = "parts." if any(p.surfaces for p in context.study.bench.places) else "tcp.expansion."  # of lumped machines
     parts = [(whole + p, [c]) for p, _, c in context.named("expansion")]
-    result = [_batch(context, "expansion", "expansion", "1", parts, one, 0, 0.05)] if parts else []
-    return result + ([_batch(context, "expansion", "gain", "1", gains, one, 0, 0.05)] if gains else [])
+    result = [_batch("expansion", "expansion", "1", parts, one, 0, 0.05)] if parts else []
+    return result + ([_batch("expansion", "gain", "1", gains, one, 0, 0.05)] if gains else [])
 
 
 def slip(context: Context) -> list[Batch]:
@@ -298,7 +293,7 @@ def measurement(context: Context) -> list[Batch]:
         rows = [(f"tcp.{p}", [c]) for p, _, c in context.named(kind)]
         if rows:
             one = (History(history, np.ones((1, 1))),)
-            result.append(_batch(context, "measurement", kind, unit, rows, one, 0, smallest))
+            result.append(_batch("measurement", kind, unit, rows, one, 0, smallest))
     return result
 
 
@@ -326,12 +321,10 @@ def not_thermal(context: Context) -> list[Batch]:
                 History(f"step at {float(start) / 3600:.1f} h of {run.name}", np.eye(n)[[i]], windows=windows)
             )
         of_place = [(f"tcp.{p}", [c for _, c in own]) for p, own in rows.items()]
-        result.append(_batch(context, "not_thermal", "step", "m", of_place, histories, 0, 2e-6))
+        result.append(_batch("not_thermal", "step", "m", of_place, histories, 0, 2e-6))
     loads = [(f"tcp.{p}", [c]) for p, _, c in context.named("load")]
     if loads:
-        result.append(
-            _batch(context, "not_thermal", "load", "m per unit", loads, (History("load", np.ones((1, 1))),), 0, 0.0)
-        )
+        result.append(_batch("not_thermal", "load", "m per unit", loads, (History("load", np.ones((1, 1))),), 0, 0.0))
     return result
 
 

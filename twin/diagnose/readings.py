@@ -9,6 +9,8 @@ slip      dx           1 m of play, seen at WIDTH; at other widths by `play`
 step      dx           1 m from a measurement on
 load      dx:signal    1 m per unit of a signal
 probe     dx           1 m/s of drift;   frame dx:axis  1 m/m;   heated dx  1 m from first to last row of a set
+
+In runs with `tcp_reference = "first"` all TCP rows lose what a cause does to the first one.
 """
 
 from __future__ import annotations
@@ -64,7 +66,12 @@ def _rate(plan: Planned, T: np.ndarray) -> np.ndarray:
 def _tcp_rate(study: Study, plan: Planned, nominal: Nominal) -> np.ndarray:
     rows, z = np.asarray(plan.rows.row), nominal.states
     step = np.asarray(plan.rows.step)
-    return np.asarray(np.einsum("kcr,kr->kc", rows, (z[step + 1] - z[step]) * nominal.rate))
+    return _shown(plan, np.asarray(np.einsum("kcr,kr->kc", rows, (z[step + 1] - z[step]) * nominal.rate)))
+
+
+def _shown(plan: Planned, w: np.ndarray) -> np.ndarray:
+    """(k, 3) of the TCP as a run tells it: counted from its first row where it says so, as `Study.read` does."""
+    return w - w[0] if plan.measured.from_first else w
 
 
 def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarray], add: Add) -> None:
@@ -112,7 +119,7 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
 
     def column(of: Sequence[np.ndarray]) -> list[np.ndarray]:
         return [
-            np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), w.ravel()])
+            np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), _shown(plan, w).ravel()])
             for plan, w in zip(plans, of, strict=True)
         ]
 
@@ -172,7 +179,7 @@ def play(study: Study, nominal: Sequence[Nominal], name: str, width: float) -> n
         plan = study.runs[k]
         w = np.zeros((plan.shapes[1][0], 3))
         w[:, c] = _play(plan, nominal[k], c, max(width, NARROW))
-        parts.append(np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), w.ravel()]))
+        parts.append(np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), _shown(plan, w).ravel()]))
     return np.concatenate(parts)
 
 
@@ -193,7 +200,7 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
             T = plan.measured.mean_of @ (_state(read, np.arange(len(z)) - steps) - read)
             at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
             w = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), _state(z, at - steps) - _state(z, at))
-        parts.append(np.concatenate([T.ravel(), w.ravel()]) / by)
+        parts.append(np.concatenate([T.ravel(), _shown(plan, w).ravel()]) / by)
     return np.concatenate(parts)
 
 

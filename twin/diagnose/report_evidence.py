@@ -17,7 +17,7 @@ from twin.diagnose.report_pictures import (
     short,
     write_values,
 )
-from twin.diagnose.report_text import history_words, near_interval
+from twin.diagnose.report_text import history_words
 from twin.pictures.style import INK, figure
 
 CANDIDATES = 15
@@ -102,7 +102,7 @@ def candidates_picture(d: Diagnosis) -> Picture | None:
 
 
 def sized(rival: Rival) -> str:
-    said = [size_words(rival.amplitude, near_interval(rival), rival.unit), history_words(rival.history)]
+    said = [size_words(rival.amplitude, rival.ci95, rival.unit), history_words(rival.history)]
     return ", ".join(text.replace("95 % interval ", "") for text in said if text)
 
 

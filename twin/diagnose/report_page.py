@@ -200,7 +200,8 @@ def _rivals(d: Diagnosis) -> str:
 def _gain(d: Diagnosis, show: Any) -> str:
     pictures = show(*(p for s in d.series if s.sealed for p in (gain_picture(d, s.run), overlay_picture(d, s))))
     if not d.gain:
-        why = "nothing was added to the model" if not d.causes else "no run was kept aside"
+        sealed = any(s.sealed for s in d.series)
+        why = "nothing was measured in the run kept aside" if sealed else "no run was kept aside"
         return f"<p>There is no gain to report: {why}.</p>" + pictures
     runs = sealed_runs(d)
     told = f"Run {runs[0]} was" if len(runs) == 1 else f"Runs {', '.join(runs)} were"
@@ -252,7 +253,7 @@ def _limits(d: Diagnosis) -> str:
     lead = ""
     if d.verdict == "nothing":
         sizes = _items(map(limit_words, d.detection_limits))
-        lead = f"<p><strong>These data would have shown at least:</strong></p>{sizes}"
+        lead = f"<p><strong>At half of all places these data would have shown, in 95 of 100 cases:</strong></p>{sizes}"
     text = (
         "The smallest size of each effect that would have been named in these data; smaller ones may be there unseen."
     )

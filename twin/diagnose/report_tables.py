@@ -8,7 +8,7 @@ from html import escape
 
 from twin.diagnose.diagnosis import Cause, Diagnosis, Rival
 from twin.diagnose.report_numbers import customary, interval_and_unit, number, quantity
-from twin.diagnose.report_text import beyond, history_words, near_interval, place_words, what
+from twin.diagnose.report_text import beyond, history_words, place_words, times, what
 
 MANY = 60  # rows that a table shows at most
 
@@ -60,7 +60,7 @@ def rivals_table(rivals: Sequence[Rival], thresholds: bool, d: Diagnosis) -> str
     """Candidates or rivals; `thresholds` adds the column of their family's threshold."""
     rows = []
     for k, r in enumerate(rivals):
-        size, interval = _sized(r.amplitude, near_interval(r), r.unit)
+        size, interval = _sized(r.amplitude, r.ci95, r.unit)
         row = [str(k + 1), what(r.family), place_words(r.place), history_words(r.history) or "always", size, interval]
         row += [number(r.statistic)] + ([number(d.thresholds.get(r.family, math.nan))] if thresholds else [])
         rows.append([*row, f"{r.cosine:.2f}" if math.isfinite(r.cosine) else "-"])
@@ -83,6 +83,7 @@ def limits_table(d: Diagnosis) -> str:
     for x in d.detection_limits:
         largest = max((abs(v) for v in (x.size, x.smallest, x.largest) if math.isfinite(v)), default=math.nan)
         factor, unit = customary(x.unit, largest)
+        unit = unit or times(x.family, x.unit)
         sizes = [f"{number(factor * v)} {unit}".rstrip() for v in (x.size, x.smallest, x.largest)]
         rows.append([what(x.family), *sizes, place_words(x.place)])
     head = ["what", "seen from (median of places)", "at the best place", "at the worst place", "place of the median"]

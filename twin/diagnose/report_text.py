@@ -15,7 +15,7 @@ WHAT: dict[str, str] = {
     "film_gain": "heat transfer other than declared",
     "forced_convection": "cooling by air that motion drives",
     "heat_source": "heat that the description lacks",
-    "loss_law": "a loss that follows another law than declared",
+    "loss_law": "a loss other than declared",
     "joint": "a joint that conducts otherwise than declared",
     "zone": "surroundings warmer or colder than declared",
     "sun": "heat from the sun",
@@ -38,15 +38,6 @@ _KINDS = {
 }  # fmt: skip
 
 
-def near_interval(rival: Rival) -> tuple[float, float]:
-    """95 % interval of a candidate from its statistic alone, which is (amplitude / sigma)² where the amplitude enters
-    linearly."""
-    if not (rival.statistic > 0 and math.isfinite(rival.amplitude)):
-        return math.nan, math.nan
-    half = 1.96 * abs(rival.amplitude) / math.sqrt(rival.statistic)
-    return rival.amplitude - half, rival.amplitude + half
-
-
 def what(family: str) -> str:
     return WHAT.get(family, family.replace("_", " "))
 
@@ -57,6 +48,7 @@ def place_words(place: str) -> str:
     return f"{_KINDS[kind]} {name}" if dot and kind in _KINDS else place
 
 
+_FACTORS = ("film_gain", "loss_law", "joint", "expansion")  # whose sizes without a unit multiply a declared number
 _KIND_OF_FAULT = ("sensor", "signal", "measurement", "not_thermal")  # families whose history says what kind it is
 
 
@@ -64,15 +56,42 @@ def history_words(history: str) -> str:
     return "" if history in ("", "always") else history.replace("^2", "²").replace("^3", "³")
 
 
+def times(family: str, unit: str) -> str:
+    """What a size without a unit is a multiple of."""
+    if unit not in ("", "1"):
+        return ""
+    if family == "misplaced_source":
+        return "times what it emits"
+    return "times the declared" if family in _FACTORS else ""
+
+
+def setting_words(cause: Cause | Rival) -> str:
+    """What a size holds for: the surface that heat really enters, the medium, the part that a scale follows."""
+    settings = cause.settings if isinstance(cause, Cause) else {}
+    said = []
+    if surface := settings.get("surface"):
+        said.append(f"which enters at {surface}")
+    if part := settings.get("part"):
+        said.append(f"with the temperature of {part}")
+    if difference := float(settings.get("temperature_difference", 0.0)):
+        said.append(f"{number(abs(difference))} K {'colder' if difference < 0.0 else 'warmer'} than the air there")
+    if (reference := settings.get("reference")) and isinstance(cause, Cause) and cause.signal:
+        said.append(f"where {cause.signal} is {number(float(reference))} in SI units")
+    if height := settings.get("height"):
+        said.append(f"about {number(float(height))} m")
+    return ", ".join(said)
+
+
 def cause_words(cause: Cause | Rival) -> str:
     """As "heat that the description lacks at bed.x_motor: 85 W (95 % interval 80 to 90 W), following x_current²"."""
-    ci95 = cause.ci95 if isinstance(cause, Cause) else near_interval(cause)
     where = place_words(cause.place)
     if cause.family in ("sensor", "signal") and where:
         head = f"{where} is at fault"
     else:
         head = what(cause.family) + (f" {'in' if where.startswith('run ') else 'at'} {where}" if where else "")
-    size = size_words(cause.amplitude, ci95, cause.unit)
+    size = size_words(cause.amplitude, cause.ci95, cause.unit)
+    size = ", ".join(t for t in (f"{size} {times(cause.family, cause.unit)}".strip() if size else "",
+                                 setting_words(cause)) if t)  # fmt: skip
     history = history_words(cause.history)
     if cause.family in _KIND_OF_FAULT:
         said = [text for text in (history, size) if text]
@@ -82,7 +101,7 @@ def cause_words(cause: Cause | Rival) -> str:
 
 
 def limit_words(limit: Limit) -> str:
-    return f"{what(limit.family)}, {quantity(limit.size, limit.unit)}"
+    return f"{what(limit.family)}, {quantity(limit.size, limit.unit)} {times(limit.family, limit.unit)}".rstrip()
 
 
 def joined(items: Sequence[str]) -> str:
@@ -124,7 +143,7 @@ def verdict_sentence(d: Diagnosis) -> str:
     causes = joined([cause_words(c) for c in d.causes])
     if d.verdict == "nothing":
         limits = d.detection_limits
-        seen = f"; {limit_words(limits[0])}, would have been seen" if limits else ""
+        seen = f"; {limit_words(limits[0])}, would have been seen at half of all places" if limits else ""
         return f"Nothing is missing that these data could show: within their noise the description explains them{seen}."
     if d.verdict == "unknown":
         return _sentence(_unknown_words(d) + (f"; named besides: {causes}" if causes else ""))
@@ -307,7 +326,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"Worth a look: {joined([pull_words(p) for p in far[:2]])}.")
     if d.detection_limits and d.verdict == "nothing":
         shown = joined([limit_words(x) for x in d.detection_limits[:5]])
-        lines.append(f"These data would have shown at least: {shown}.")
+        lines.append(f"At half of all places these data would have shown, in 95 of 100 cases: {shown}.")
     before, after = (np.array([w[k] for w in d.whiteness], dtype=float) for k in (1, 2))
     if np.isfinite(before).any() and np.isfinite(after).any():
         lines.append(

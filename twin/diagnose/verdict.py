@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -48,6 +49,13 @@ CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it
 PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
 
 
+def told(kind: str, amplitude: float) -> float:
+    """An amplitude as reports take it: relative changes and logarithms of factors as factors, others as they are."""
+    if kind in RELATIVE:
+        return max(1.0 + amplitude, 0.0)
+    return float(np.exp(amplitude)) if kind == "gain" else amplitude
+
+
 def cause_of(a: Accepted, study: Study) -> Cause:
     """A cause as reports and edits take it: factors as factors, differences as differences.
 
@@ -60,10 +68,7 @@ def cause_of(a: Accepted, study: Study) -> Cause:
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), own))
     low, high = value - 1.96 * sigma, value + 1.96 * sigma
     settings: dict[str, float | str] = {}
-    if kind in RELATIVE:
-        value, low, high = 1.0 + value, max(1.0 + low, 0.0), 1.0 + high
-    elif kind == "gain":
-        value, low, high = float(np.exp(value)), float(np.exp(low)), float(np.exp(high))
+    value, low, high = (told(kind, v) for v in (value, low, high))
     place = h.name
     history_name, exponent = h.when.name, h.when.exponent
     if h.family == "signal" and kind == "signal":
@@ -79,7 +84,8 @@ def cause_of(a: Accepted, study: Study) -> Cause:
         names = [e.name for e in study.bench.base.load_model.environments]
         settings["height"] = pivot(study, names.index(place.removeprefix("environment.")))
     elif h.family == "coolant" and len(a.amplitude) > 1 and value > 0:
-        settings["temperature_difference"] = float(a.amplitude[1]) / value
+        area = next(p.area for p in study.bench.places if p.name == place)
+        settings["temperature_difference"] = float(a.amplitude[1]) / (value * area)
     elif h.family == "sun" and len(a.amplitude) > 1:
         # one size, a level per day
         top = float(max(a.amplitude))
@@ -102,8 +108,15 @@ def cause_of(a: Accepted, study: Study) -> Cause:
 
 
 def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
-    """A hypothesis in a row of a table."""
-    return Rival(h.family, h.name, h.when.name, h.amplitude[0], h.batch.unit, h.statistic, cosine, remedy)
+    """A hypothesis in a row of a table. Its interval is that of an amplitude that enters linearly, of which the
+    statistic is (amplitude / sigma)^2; an exact factor has none."""
+    kind, value, place = h.batch.kind, h.amplitude[0], h.name
+    if h.family == "signal" and kind == "signal":
+        place, factor = place.split("*")
+        return Rival(h.family, place, h.when.name, float(factor), h.batch.unit, h.statistic, cosine, remedy)
+    half = 1.96 * abs(value) / math.sqrt(h.statistic) if h.statistic > 0.0 and not h.batch.fixed else math.nan
+    ci95 = (told(kind, value - half), told(kind, value + half))
+    return Rival(h.family, place, h.when.name, told(kind, value), h.batch.unit, h.statistic, cosine, remedy, ci95)
 
 
 def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float) -> Rival:
@@ -251,7 +264,7 @@ def with_faults(
 def limits_at(yard: Yardstick) -> dict[tuple[str, str, str, bool], float]:
     """(family, unit, place, whether it comes and goes) -> the size that would have been named in 95 of 100 cases.
 
-    The median over histories, in `unit`.
+    The median over histories, as amplitudes are: relative changes, logarithms of factors.
     """
     result: dict[tuple[str, str, str, bool], float] = {}
     _, J = yard.fitter.surrogate.at(np.zeros(len(yard.study.bench.parameters)))
@@ -270,7 +283,8 @@ def limits_at(yard: Yardstick) -> dict[tuple[str, str, str, bool], float]:
 
 
 def limits_of(yard: Yardstick) -> tuple[Limit, ...]:
-    """Per family and unit `limits_at` its places, for what always acts where there is such."""
+    """Per family and unit `limits_at` its places, for what always acts where there is such; factors as factors."""
+    kinds = {(batch.family, batch.unit): batch.kind for batch in yard.columns.batches}
     at = limits_at(yard)
     found: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for (family, unit, place, windowed), size in at.items():
@@ -280,5 +294,6 @@ def limits_of(yard: Yardstick) -> tuple[Limit, ...]:
     for (family, unit), sizes in found.items():
         ordered = sorted(sizes)
         median, place = ordered[len(ordered) // 2]
-        limits.append(Limit(family, place, median, ordered[0][0], ordered[-1][0], unit))
+        size, smallest, largest = (told(kinds[family, unit], s) for s in (median, ordered[0][0], ordered[-1][0]))
+        limits.append(Limit(family, place, size, smallest, largest, unit))
     return tuple(limits)

@@ -11,7 +11,6 @@ Rasmussen, Williams, Gaussian Processes for Machine Learning, 2006, section 2.7,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,11 +84,10 @@ def missing(study: Study) -> np.ndarray:
     return ~np.isfinite(measured_of(study))
 
 
-def measured_of(study: Study, runs: Sequence[int] | None = None) -> np.ndarray:
+def measured_of(study: Study) -> np.ndarray:
     """(m,) what was measured in the fitted runs, NaN where nothing was."""
-    chosen = study.fitted if runs is None else runs
     parts = []
-    for k in chosen:
+    for k in study.fitted:
         m = study.runs[k].measured
         parts += [m.temperature.ravel(), m.tcp.ravel()]
     return np.concatenate(parts) if parts else np.zeros(0)

@@ -149,7 +149,8 @@ def _whitened(whiten: Whitener, raw: np.ndarray) -> np.ndarray:
 def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[str, float]:
     """Per family the statistic that a common tail probability allows, so that `alarm` of all nulls pass any of them.
 
-    Gumbel tail by moments above the median (Embrechts, Klueppelberg, Mikosch, Modelling Extremal Events, 1997, ch. 6).
+    Gumbel tail through the quantiles of 50 % and 97 % (on such tails: Embrechts, Klueppelberg, Mikosch, Modelling
+    Extremal Events, 1997, ch. 6).
     """
     tails = {name: _gumbel(values) for name, values in nulls.items() if len(values) and values.max() > 0.0}
     if not tails:

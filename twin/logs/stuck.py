@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
 from twin.errors import Problem
@@ -13,32 +16,53 @@ _ROWS = 20  # a shorter standstill is not looked at
 _EXPECTED = 25.0  # changes that its neighbours made one expect, for a standstill to be told
 
 
-def stuck_temperatures(table: Table, where: str) -> list[Problem]:
-    """Warnings about temperatures that stand still while the others change as often as before.
+@dataclass(frozen=True)
+class Standstill:
+    """A temperature that stands still while the others change as often as before."""
+
+    name: str
+    first: int  # row of the first reading of the stretch
+    last: int
+    value: float  # degC
+    expected: float  # changes that the others made one expect
+
+
+def standstills(table: Table) -> list[Standstill]:
+    """Where temperatures stand still, one stretch of each at most: the one in which most goes on elsewhere.
 
     Expected changes are the channel's own elsewhere, scaled by how often the others (their median) changed meanwhile:
-    a coarse sensor in slow air may rest for an hour, one with noise may not.
+    a coarse sensor in slow air may rest for an hour, one with noise may not. What changes is seen from one reading of
+    the channel to its next: empty cells neither end a standstill nor make one.
     """
     columns = {name: held(v) for name, v in table.columns.items() if np.isfinite(v).any()}
-    moves = {name: np.diff(v) != 0.0 for name, v in columns.items()}
-    counts = {name: np.concatenate([[0], np.cumsum(m)]) for name, m in moves.items()}
-    problems = []
-    busy = np.sum(list(moves.values()), axis=0, dtype=int) if moves else np.zeros(0, int)
-    for name, own in counts.items():
+    every = _moves(columns, np.arange(len(table.time)))
+    found = []
+    for name, values in columns.items():
+        rows = np.flatnonzero(np.isfinite(table.columns[name]))
+        moves, busy = every if len(rows) == len(values) else _moves(columns, rows)
+        own = np.count_nonzero(moves[name])
         first, last = longest_rest(moves[name], busy - moves[name])
-        if last - first < _ROWS or own[-1] < 10:
+        if last - first < _ROWS or own < 10:
             continue
-        others = [c for n, c in counts.items() if n != name]
-        inside = np.array([c[last] - c[first] for c in others], dtype=float)
-        outside = np.array([c[-1] for c in others], dtype=float) - inside
+        others = [m for n, m in moves.items() if n != name]
+        inside = np.array([np.count_nonzero(m[first:last]) for m in others], dtype=float)
+        outside = np.array([np.count_nonzero(m) for m in others], dtype=float) - inside
         usable = outside >= 10
         if not usable.any():
             continue
-        expected = float(own[-1] * np.median(inside[usable] / outside[usable]))
+        expected = float(own * np.median(inside[usable] / outside[usable]))
         if expected >= _EXPECTED:
-            what = f"'{name}' stands still at {columns[name][first]:g} degC while others go on"
-            remedy = f"about {expected:.0f} changes were to be expected: a frozen channel? leave its cells empty if so"
-            problems.append(warning(what, span(where, first, last), remedy))
+            found.append(Standstill(name, int(rows[first]), int(rows[last]), float(values[rows[first]]), expected))
+    return found
+
+
+def stuck_temperatures(table: Table, where: str) -> list[Problem]:
+    """Warnings about temperatures that stand still."""
+    problems = []
+    for s in standstills(table):
+        what = f"'{s.name}' stands still at {s.value:g} degC while others go on"
+        remedy = f"about {s.expected:.0f} changes were to be expected: a frozen channel? leave its cells empty if so"
+        problems.append(warning(what, span(where, s.first, s.last), remedy))
     return problems
 
 
@@ -80,6 +104,12 @@ def longest_rest(moves: np.ndarray, meanwhile: np.ndarray | None = None) -> tupl
     last = edges[1:] - 1  # the row before the next move
     k = int(np.argmax(happened[last] - happened[edges[:-1]]))
     return int(edges[k]), int(edges[k + 1] - 1)
+
+
+def _moves(columns: Mapping[str, np.ndarray], rows: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Per channel (n - 1,) bool: whether it changes from one of n rows to the next; and how many do."""
+    moves = {name: np.diff(v[rows]) != 0.0 for name, v in columns.items()}
+    return moves, np.sum(list(moves.values()), axis=0, dtype=int)
 
 
 def _one_of_two(loads: Table, frozen: str, other: str, where: str) -> list[Problem]:

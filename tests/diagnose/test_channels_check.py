@@ -1,0 +1,72 @@
+"""A stuck sensor is emptied where it is stuck: not where it rests, and not where it says nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from twin.diagnose.channels_check import stuck_sensors
+from twin.logs.run import Run, Table
+
+HOUR = 3600.0
+TIME = 30.0 * np.arange(1800)  # 15 h
+NIGHT = (TIME >= 8 * HOUR) & (TIME < 14 * HOUR)
+NAMES = ("a", "b", "c")
+
+
+def temperatures(resolution: float = 0.0) -> dict[str, np.ndarray]:
+    """8 h of work that starts and stops, 6 h of rest in which nothing changes, and work again."""
+    rng = np.random.default_rng(4)
+    columns = {}
+    for k, name in enumerate(NAMES):
+        values = 22.0 + (1.5 + 0.4 * k) * np.sin(TIME / 900.0 + k) + 0.02 * rng.standard_normal(len(TIME))
+        if resolution:
+            values[NIGHT] = 21.0
+            values = resolution * np.round(values / resolution)
+        columns[name] = values
+    return columns
+
+
+def checked(columns: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[tuple[str, float, float]]]:
+    """Columns after the check, and (place, start, end) of each cause."""
+    run = Run(Table(TIME, {}, {}), Table(TIME, columns, dict.fromkeys(columns, "degC")))
+    (after,), causes = stuck_sensors([run], NAMES, ["run"])
+    assert after.temperatures is not None
+    assert all(c.history == "stuck" for c in causes)
+    return dict(after.temperatures.columns), [(c.place, w.start, w.end) for c in causes for w in c.windows]
+
+
+def test_a_frozen_hour_of_work_and_not_the_longer_rest_at_night():
+    columns = temperatures(resolution=0.1)
+    assert checked(columns)[1] == []
+    frozen = (TIME >= 3 * HOUR) & (TIME <= 4 * HOUR)
+    columns["b"] = np.where(frozen, columns["b"][TIME == 3 * HOUR], columns["b"])
+    after, ((place, start, end),) = checked(columns)
+    assert place == "sensors.b"
+    assert (start, end) == pytest.approx((3 * HOUR, 4 * HOUR), abs=200.0)  # what was the same before and after too
+    assert np.isnan(after["b"][frozen]).all()
+    np.testing.assert_array_equal(after["b"][NIGHT], columns["b"][NIGHT])
+
+
+@pytest.mark.parametrize("every", [2, 3, 7])
+def test_empty_cells_here_and_there_hide_no_frozen_channel(every):
+    columns = temperatures()
+    frozen = (TIME >= 3 * HOUR) & (TIME <= 5 * HOUR)
+    columns["b"] = np.where(frozen, 22.5, columns["b"])
+    columns["b"][::every] = np.nan
+    after, ((place, start, end),) = checked(columns)
+    assert place == "sensors.b"
+    assert (start, end) == pytest.approx((3 * HOUR, 5 * HOUR), abs=30.0)
+    assert np.isnan(after["b"][frozen]).all()
+    np.testing.assert_array_equal(after["b"][~frozen], columns["b"][~frozen])
+
+
+def test_a_silent_channel_is_not_stuck():
+    columns = temperatures(resolution=0.1)
+    columns["b"][(TIME >= 4 * HOUR) & (TIME < 7 * HOUR)] = np.nan
+    columns["c"][TIME >= 5 * HOUR] = np.nan
+    columns["c"][:200] = np.nan
+    after, found = checked(columns)
+    assert found == []
+    for name in NAMES:
+        np.testing.assert_array_equal(after[name], columns[name])

@@ -1,0 +1,166 @@
+"""Runs whose TCP counts from its first row: causes that act on what is read change them as damaged logs do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from twin.calibrate.measured import measured
+from twin.diagnose.damage import Damage, damaged
+from twin.diagnose.gain import _read
+from twin.diagnose.readings import late, play, readings_of
+from twin.diagnose.study import Study, make_study
+from twin.logs.run import Run
+
+SIZE = 4e-6  # m
+EVERY = 2400.0  # s, between measurements of three rows
+KINDS = ("scale", "expansion", "slip", "step", "probe", "frame", "heated", "load")
+
+
+@cache
+def runs(reference: str = "first", lost: bool = False) -> tuple[Run, ...]:
+    """The runs of the small case with three TCP rows a minute apart; lost: the first one is empty."""
+    made = []
+    for run in small_case.runs():
+        rows = (np.arange(EVERY, run.loads.time[-1], EVERY)[:, None] + [0.0, 60.0, 120.0]).ravel()
+        rng = np.random.default_rng(7)
+        displacement = 5e-6 * rng.standard_normal((len(rows), 3))
+        if reference == "first":
+            displacement -= displacement[0]
+        if lost:
+            displacement[0] = np.nan
+        tcp = replace(run.tcp, time=rows, position=rng.uniform(-0.1, 0.3, (len(rows), 1)), displacement=displacement,
+                      sigma=None)  # fmt: skip
+        made.append(replace(run, tcp=tcp, tcp_reference=reference))
+    return tuple(made)
+
+
+def planned(of: tuple[Run, ...]) -> Study:
+    """The study of these runs, two of them fitted."""
+    bench = small_case.bench()
+    return make_study(
+        bench, [measured(bench.base, r, b.drive, b.name) for r, b in zip(of, bench.runs, strict=True)], (0, 1)
+    )
+
+
+def zeros(study: Study) -> np.ndarray:
+    return np.zeros(len(study.bench.parameters))
+
+
+@cache
+def read(reference: str = "first", lost: bool = False) -> tuple[Study, np.ndarray, dict]:
+    """The study, its reading columns, and where each is."""
+    study = planned(runs(reference, lost))
+    J = [study.jacobian(k, zeros(study))[:, : len(zeros(study))] for k in study.fitted]
+    outputs = [study.outputs(k, zeros(study)) for k in study.fitted]
+    return study, *readings_of(study, small_case.nominal()[:2], outputs, J)
+
+
+def tcp_of(study: Study, y: np.ndarray) -> list[np.ndarray]:
+    """(k, 3) of each fitted run."""
+    parts, first = [], 0
+    for k in study.fitted:
+        parts.append(study.runs[k].split(y[first : first + study.runs[k].size])[1])
+        first += study.runs[k].size
+    return parts
+
+
+def from_first(study: Study, y: np.ndarray) -> np.ndarray:
+    return np.concatenate([(w - w[0]).ravel() for w in tcp_of(study, y)])
+
+
+def flat(study: Study, y: np.ndarray) -> np.ndarray:
+    return np.concatenate([w.ravel() for w in tcp_of(study, y)])
+
+
+def told(study: Study) -> np.ndarray:
+    """What is measured of the TCP in the fitted runs."""
+    return np.concatenate([study.runs[k].measured.tcp.ravel() for k in study.fitted])
+
+
+LOST_TOO = ("step", "drift", "frame", "load")  # of "heating", a row that is lost moves the first one of a measurement
+
+
+@pytest.mark.parametrize(
+    ("kind", "lost"), [("heating", False), *((k, lost) for k in LOST_TOO for lost in (False, True))]
+)
+def test_a_reading_changes_as_a_damaged_log_does(kind, lost):
+    study, columns, index = read("first", lost)
+    whole = runs("first", lost)
+    rows, top = whole[0].tcp.time, float(whole[0].loads.columns["spindle_current"].max())
+    damage, key, amplitude = {
+        "step": (
+            Damage("not_thermal", "tcp.dx", SIZE, kind, start=2 * EVERY),
+            ("step", "dx", f"0:{2 * EVERY:.0f}"), SIZE,
+        ),
+        "drift": (Damage("measurement", "tcp.dx", SIZE, kind), ("probe", "dx", "always"), SIZE / (rows[-1] - rows[0])),
+        "frame": (Damage("measurement", "tcp.dx:x", 1e-4, kind), ("frame", "dx:x", "always"), 1e-4),
+        "heating": (Damage("measurement", "tcp.dx", SIZE, kind), ("heated", "dx", "always"), SIZE),
+        "load": (
+            Damage("not_thermal", "tcp.dx", SIZE, kind, signal="spindle_current"),
+            ("load", "dx:spindle_current", "always"), SIZE / top,
+        ),
+    }[kind]  # fmt: skip
+    change = told(planned((damaged(whole[0], damage), *whole[1:]))) - told(study)
+    n = study.runs[0].measured.tcp.size
+    assert np.abs(change[:n]).max() > 0.1 * SIZE
+    np.testing.assert_allclose(amplitude * flat(study, columns[:, index[key]])[:n], change[:n], atol=1e-6 * SIZE)
+    if kind == "step":  # it has come to stay, and a later run counts from its own first row
+        assert not flat(study, columns[:, index[key]])[n:].any()
+
+
+@pytest.mark.parametrize("seconds", [-60.0, 90.0])
+def test_a_late_clock_leaves_what_it_is_said_to(seconds):
+    study, _, _ = read()
+    split = [study.runs[k].split(study.outputs(k, zeros(study)))[1] for k in range(3)]
+    whole = tuple(
+        replace(r, tcp=replace(r.tcp, displacement=w)) for r, w in zip(runs(), split, strict=True)
+    )  # what the machine does
+    stamped = damaged(whole[0], Damage("signal", "run", seconds, "clock"))
+    after = planned((stamped, *whole[1:]))
+    left = told(after) - flat(after, np.concatenate([after.outputs(k, zeros(after)) for k in after.fitted]))
+    said = seconds * flat(after, late(after, {0: small_case.nominal()[0].states}, seconds))
+    assert np.abs(said).max() > 0.0
+    np.testing.assert_allclose(said, left, atol=1e-3 * np.abs(left).max())
+
+
+def test_every_reading_of_the_tcp_counts_from_the_first_row():
+    study, columns, index = read()
+    absolute, before, of = read("absolute")
+    assert index == of
+    touched = set()
+    for (kind, _, _), c in index.items():
+        if kind in (*KINDS, "clock"):
+            wanted = from_first(absolute, before[:, c].astype(float))
+            found = flat(study, columns[:, c])
+            np.testing.assert_allclose(found, wanted, atol=1e-6 * max(np.abs(before[:, c]).max(), 1e-12), err_msg=kind)
+            touched |= {kind} if np.abs(found).max() > 0.0 else set()
+    assert touched == {kind for kind, _, _ in index} & {*KINDS, "clock"}
+    nominal = small_case.nominal()
+    for width in (1e-6, 8e-6):
+        wanted = from_first(absolute, play(absolute, nominal, "dz", width))
+        np.testing.assert_allclose(flat(study, play(study, nominal, "dz", width)), wanted, atol=1e-12)
+    states = {0: nominal[0].states}
+    wanted = from_first(absolute, late(absolute, states, 600.0))
+    np.testing.assert_allclose(flat(study, late(study, states, 600.0)), wanted, atol=1e-18)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("probe", "tcp.dx"), ("frame", "tcp.dy:x"), ("slip", "tcp.dz")])
+def test_a_sealed_run_that_counts_from_its_first_row_does_so_in_what_is_predicted(kind, name):
+    cause = SimpleNamespace(
+        hypothesis=SimpleNamespace(batch=SimpleNamespace(kind=kind), name=name), amplitude=np.array([SIZE])
+    )
+    added = []
+    for reference in ("first", "absolute"):
+        study = read(reference)[0]
+        yard = SimpleNamespace(study=study, nominal=small_case.nominal())
+        found = SimpleNamespace(yardstick=yard, accepted=(cause,), x=zeros(study))
+        added.append(study.runs[2].split(_read(found, 2))[1])
+    assert np.abs(added[0]).max() > 0.0
+    assert not added[0][0].any()
+    np.testing.assert_allclose(added[0], added[1] - added[1][0], atol=1e-6 * np.abs(added[1]).max())
