@@ -121,9 +121,9 @@ def test_a_contact_that_never_was_takes_its_parameter_along():
 @pytest.mark.parametrize(
     ("source", "factor", "verdict", "rival"),
     [
-        ("nut", 2.0, "ambiguous", "signals.x_speed*2"),  # friction: in proportion to the speed
-        ("motor", 3.0, "ambiguous", "signals.spindle_current*1.73205"),  # copper: to the current squared
-        ("front", 3.0, "out_of_tolerance", ""),  # three sources read that speed: it would have warmed all
+        ("nut", 2.0, "ambiguous", ("signals.x_speed", 2.0)),  # friction: in proportion to the speed
+        ("motor", 3.0, "ambiguous", ("signals.spindle_current", 1.73205)),  # copper: to the current squared
+        ("front", 3.0, "out_of_tolerance", ()),  # three sources read that speed: it would have warmed all
     ],
 )
 def test_a_wrong_factor_of_the_one_signal_that_a_source_reads_is_its_rival(source, factor, verdict, rival):
@@ -134,6 +134,6 @@ def test_a_wrong_factor_of_the_one_signal_that_a_source_reads_is_its_rival(sourc
     said, causes = verdict_of(search(small_case.yardstick(), clean(x) + noise(5)), FAMILIES)
     assert (said, causes[0].family, causes[0].place) == (verdict, "loss_law", f"sources.{source}")
     assert causes[0].amplitude == pytest.approx(factor, rel=0.1)
-    rivals = {r.place: r.remedy for r in causes[0].rivals}
+    rivals = {(r.place, r.amplitude): r.remedy for r in causes[0].rivals}
     assert (rival in rivals) == bool(rival)
     assert all("instrument" in remedy for remedy in rivals.values())
