@@ -65,17 +65,16 @@ def times(family: str, unit: str) -> str:
     return "times the declared" if family in _FACTORS else ""
 
 
-def setting_words(cause: Cause | Rival) -> str:
+def setting_words(cause: Cause) -> str:
     """What a size holds for: the surface that heat really enters, the medium, the part that a scale follows."""
-    settings = cause.settings if isinstance(cause, Cause) else {}
-    said = []
+    settings, said = cause.settings, []
     if surface := settings.get("surface"):
         said.append(f"which enters at {surface}")
     if part := settings.get("part"):
         said.append(f"with the temperature of {part}")
     if difference := float(settings.get("temperature_difference", 0.0)):
         said.append(f"{number(abs(difference))} K {'colder' if difference < 0.0 else 'warmer'} than the air there")
-    if (reference := settings.get("reference")) and isinstance(cause, Cause) and cause.signal:
+    if (reference := settings.get("reference")) and cause.signal:
         said.append(f"where {cause.signal} is {number(float(reference))} in SI units")
     if height := settings.get("height"):
         said.append(f"about {number(float(height))} m")
@@ -90,8 +89,10 @@ def cause_words(cause: Cause | Rival) -> str:
     else:
         head = what(cause.family) + (f" {'in' if where.startswith('run ') else 'at'} {where}" if where else "")
     size = size_words(cause.amplitude, cause.ci95, cause.unit)
-    size = ", ".join(t for t in (f"{size} {times(cause.family, cause.unit)}".strip() if size else "",
-                                 setting_words(cause)) if t)  # fmt: skip
+    if size and (whose := times(cause.family, cause.unit)):
+        size = f"{size} {whose}"
+    if isinstance(cause, Cause) and (settings := setting_words(cause)):
+        size = f"{size}, {settings}" if size else settings
     history = history_words(cause.history)
     if cause.family in _KIND_OF_FAULT:
         said = [text for text in (history, size) if text]
