@@ -50,7 +50,7 @@ def units_of(study: Study, h: Hypothesis) -> tuple[Unit, ...]:
     if kind == "coolant":
         half = weights.shape[1] // 2
         return (
-            Unit("film", place, int(columns[0]), _shapes(study, h, 0)),
+            Unit("wetted", place, int(columns[0]), _shapes(study, h, 0)),
             Unit("heat", place, int(columns[half]), _shapes(study, h, 1)),
         )
     if kind in ("moved", "start", "signal", "source", "gradient"):
@@ -93,6 +93,12 @@ def _shapes(study: Study, h: Hypothesis, which: int) -> tuple[np.ndarray, ...]:
     return tuple(result)
 
 
+def environment_at(study: Study, p: int) -> int:
+    """Number of the environment that the film of place p is in."""
+    load, film = study.bench.base.load_model, study.bench.places[p].film
+    return next((f.environment for f in load.films if f.name == film), load.surroundings)
+
+
 def _lasts(study: Study, windows: Sequence[Window]) -> bool:
     """Whether windows end with the last fitted run: the cause has come to stay."""
     last = study.runs[study.fitted[-1]].run
@@ -120,10 +126,11 @@ def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) 
         coarse = fine.mean(axis=1)
         if unit.kind == "film":
             p = [q.name for q in bench.places].index(unit.place)
-            film = bench.places[p].film
-            e = load.films[films.index(film)].environment if film else load.surroundings
             slots.A[s], slots.M[s], slots.gate[:, s] = bench.A[p], bench.M[p], coarse
-            slots.rise[:, :, s] = air[:, e].reshape(n, INNER)
+            slots.rise[:, :, s] = air[:, environment_at(study, p)].reshape(n, INNER)
+        elif unit.kind == "wetted":  # a liquid keeps its temperature while the air's wanders: heat tells by how much
+            p = [q.name for q in bench.places].index(unit.place)
+            slots.A[s], slots.gate[:, s] = bench.A[p], coarse  # to the reference temperature: no rise
         elif unit.kind == "group_film":
             f = films.index(unit.place)
             slots.A[s] = np.asarray(bench.system.A[0])[f]
