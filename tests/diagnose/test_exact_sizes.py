@@ -137,3 +137,26 @@ def test_a_wrong_factor_of_the_one_signal_that_a_source_reads_is_its_rival(sourc
     rivals = {(r.place, r.amplitude): r.remedy for r in causes[0].rivals}
     assert (rival in rivals) == bool(rival)
     assert all("instrument" in remedy for remedy in rivals.values())
+
+
+@pytest.mark.parametrize("film", [50.0, 200.0])
+def test_a_liquid_is_found_with_its_film_and_its_temperature_while_the_air_wanders(film):
+    study, degrees = small_case.study(), 12.0
+    bench, k = study.bench, study.fitted[0]
+    p = [q.name for q in bench.places].index("housing")
+    slots = study.slots(k)
+    n = len(slots.gate)
+    slots.A[0], slots.M[0] = bench.A[p], bench.M[p]
+    slots.gate[n // 4 : 3 * n // 4, 0] = 1.0  # for two hours
+    slots.rise[:, :, 0] = degrees - bench.base.reference_temperature
+    x = 0.5 * np.random.default_rng(9).standard_normal(len(study.bench.parameters))
+    wet = study.outputs(k, x, slots, (film,)) - study.outputs(k, x)
+    verdict, causes = verdict_of(
+        search(small_case.yardstick(), clean(x) + np.pad(wet, (0, len(clean()) - len(wet))) + noise(9)), FAMILIES
+    )
+    assert (verdict, causes[0].family, causes[0].place) == ("named", "coolant", "housing")
+    low, high = causes[0].ci95
+    assert low < film < high < 2.0 * film
+    sigma = causes[0].settings["temperature_sigma"]
+    assert 0.0 < sigma < 1.0
+    assert causes[0].settings["temperature"] == pytest.approx(degrees, abs=3.0 * sigma)

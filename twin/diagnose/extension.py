@@ -14,8 +14,6 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from twin.build.product import build_artefact
 from twin.calibrate.problem import run_names
 from twin.diagnose.diagnose import Result
@@ -172,7 +170,7 @@ def _as_edited(cause: Cause, study: Study) -> Cause:
         places = [p for p in bench.places if p.film == film]
         settings["surfaces"] = ",".join(".".join(s) for p in places for s in p.surfaces or ((p.name,),))
     if cause.family == "coolant":
-        settings["temperature"] = _air(study, cause) + float(settings.pop("temperature_difference", 0.0))
+        settings.pop("temperature_sigma", None)
     if cause.family == "scale_expansion":
         part = str(settings.pop("part"))
         settings["surface"] = next((p.name for p in bench.places if part in p.members and p.surfaces), part)
@@ -184,18 +182,3 @@ def _as_edited(cause: Cause, study: Study) -> Cause:
     if cause.family == "scale_expansion":
         place = f"axes.{cause.place.removeprefix('axes.')}"
     return replace(cause, amplitude=amplitude, unit=unit, settings=settings, place=place)
-
-
-def _air(study: Study, cause: Cause) -> float:
-    """Mean temperature [degC] of the air at the place of a cause, that of the film there, while it acts."""
-    values = []
-    load = study.bench.base.load_model
-    film = next(p.film for p in study.bench.places if p.name == cause.place)
-    e = next((f.environment for f in load.films if f.name == film), load.surroundings)
-    for planned in study.runs:
-        run = planned.run
-        time = (run.drive.time[:-1] + run.drive.time[1:]) / 2 - run.drive.time[0]
-        for w in cause.windows:
-            if w.run == run.name:
-                values.append(run.drive.environment[(time >= w.start) & (time < w.end), e])
-    return float(np.concatenate(values).mean()) if values else 20.0

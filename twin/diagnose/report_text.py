@@ -72,8 +72,9 @@ def setting_words(cause: Cause) -> str:
         said.append(f"which enters at {surface}")
     if part := settings.get("part"):
         said.append(f"with the temperature of {part}")
-    if difference := float(settings.get("temperature_difference", 0.0)):
-        said.append(f"{number(abs(difference))} K {'colder' if difference < 0.0 else 'warmer'} than the air there")
+    if cause.family == "coolant" and "temperature" in settings:
+        medium, half = float(settings["temperature"]), 1.96 * float(settings.get("temperature_sigma", math.nan))
+        said.append(f"to a medium of {size_words(medium, (medium - half, medium + half), 'degC')}")
     if (reference := settings.get("reference")) and cause.signal:
         said.append(f"where {cause.signal} is {number(float(reference))} in SI units")
     if height := settings.get("height"):

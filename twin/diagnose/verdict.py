@@ -84,8 +84,7 @@ def cause_of(a: Accepted, study: Study) -> Cause:
         names = [e.name for e in study.bench.base.load_model.environments]
         settings["height"] = pivot(study, names.index(place.removeprefix("environment.")))
     elif h.family == "coolant" and len(a.amplitude) > 1 and value > 0:
-        area = next(p.area for p in study.bench.places if p.name == place)
-        settings["temperature_difference"] = float(a.amplitude[1]) / (value * area)
+        settings |= _medium(study, a, own)
     elif h.family == "sun" and len(a.amplitude) > 1:
         # one size, a level per day
         top = float(max(a.amplitude))
@@ -105,6 +104,19 @@ def cause_of(a: Accepted, study: Study) -> Cause:
         exponent=exponent, windows=windows, settings=settings,
         rivals=tuple(_rival(a.hypothesis, other, cosine) for other, cosine in a.rivals),
     )  # fmt: skip
+
+
+def _medium(study: Study, a: Accepted, own: float) -> dict[str, float | str]:
+    """Temperature [degC] of what wets a surface, and its standard deviation [K].
+
+    T_ref + Q / (h A) of the film h (its own error of form: own) and the heat Q at the reference temperature.
+    """
+    h, Q = map(float, a.amplitude)
+    area = next(p.area for p in study.bench.places if p.name == a.hypothesis.name)
+    slope = np.array([-Q / (h**2 * area), 1.0 / (h * area)])
+    variance = float(slope @ a.covariance @ slope) + (slope[0] * own) ** 2
+    rise = Q / (h * area)
+    return {"temperature": study.bench.base.reference_temperature + rise, "temperature_sigma": float(np.sqrt(variance))}
 
 
 def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
