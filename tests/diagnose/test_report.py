@@ -300,7 +300,7 @@ def test_decimals_follow_the_interval():
             "coolant",
             "W/(m^2*K)",
             {"temperature": 14.0, "temperature_sigma": 0.5},
-            "1.62 W/(m²·K), to a medium of 14.0 °C (95 % interval 13.0 to 15.0 °C)",
+            "1.62 W/(m²·K), to a medium of 14.00 °C (95 % interval 13.02 to 14.98 °C)",
         ),
         ("scale_expansion", "1/K", {"part": "bed"}, "1620000 µm/(m·K), with the temperature of bed"),
         ("heat_source", "W", {"reference": 8.0}, "1.62 W, where x_current is 8.00 in SI units"),
