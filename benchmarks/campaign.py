@@ -40,7 +40,8 @@ NOISE = 0.08  # K
 SETTINGS = Settings(temperature_sigma=NOISE)
 NULLS, EACH = 200, 10
 SIZES = (1.0, 0.5, 2.0)
-MORE = (("outside", 20), ("null_law", 10), ("pair", 10), ("two", 10), ("effect_and_sensor", 10))
+MORE = (("outside", 20), ("null_law", 10))
+SEVERAL = (("pair", 10), ("two", 10), ("effect_and_sensor", 10))  # no figure of the goals
 FAST = 4  # rounds that all nulls are in
 FIRST = 4500  # seed of the first trial: none that anything was tuned on
 FIRST_NULL = 4400  # of those with nothing hidden: made once more only after a change that they can feel
@@ -58,7 +59,7 @@ def items() -> list[Item]:
         result += [item for item in sized if _differs(*item)]
         result += [(name, 1.0, FIRST + i) for name, n in MORE for i in range(k * n // EACH, (k + 1) * n // EACH)]
         result += [("null", 1.0, FIRST_NULL + i) for i in nulls]
-    return result
+    return result + [(name, 1.0, FIRST + i) for name, n in SEVERAL for i in range(n)]
 
 
 def _differs(family: str, size: float, seed: int) -> bool:
