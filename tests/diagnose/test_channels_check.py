@@ -70,3 +70,22 @@ def test_a_silent_channel_is_not_stuck():
     assert found == []
     for name in NAMES:
         np.testing.assert_array_equal(after[name], columns[name])
+
+
+def test_a_channel_that_froze_in_one_run_is_frozen_in_all_of_the_next():
+    first, second = temperatures(), temperatures()
+    first["b"] = np.where(TIME >= 9 * HOUR, 22.5, first["b"])
+    second["b"], second["c"] = np.full(len(TIME), 22.1), np.full(len(TIME), np.nan)
+    runs = [Run(Table(TIME, {}, {}), Table(TIME, own, dict.fromkeys(own, "degC"))) for own in (first, second)]
+    usable, causes = stuck_sensors(runs, NAMES, ["monday", "tuesday"])
+    assert [(c.place, c.windows[0].run) for c in causes] == [("sensors.b", "monday"), ("sensors.b", "tuesday")]
+    assert [np.isfinite(run.temperatures.columns["b"]).sum() for run in usable] == [1080, 0]
+    assert stuck_sensors(runs, ["a", "c"], ["monday", "tuesday"])[1] == []
+    # alone, the second run does not tell how often it should have changed
+    assert stuck_sensors(runs[1:], NAMES, ["tuesday"])[1] == []
+
+
+def test_a_run_at_rest_is_not_a_frozen_channel():
+    work, rest = temperatures(resolution=0.1), {name: np.full(len(TIME), 21.0) for name in NAMES}
+    runs = [Run(Table(TIME, {}, {}), Table(TIME, own, dict.fromkeys(own, "degC"))) for own in (work, rest)]
+    assert stuck_sensors(runs, NAMES, ["work", "rest"])[1] == []

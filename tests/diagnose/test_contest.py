@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -105,3 +106,25 @@ def test_what_a_cause_may_be():
 def test_a_bent_calibration_is_no_place_to_begin():
     np.testing.assert_array_equal(beginning(np.array([1.0, -2.0])), [1.0, -2.0])
     np.testing.assert_array_equal(beginning(np.array([1.0, -4.0])), [0.0, 0.0])
+
+
+def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch):
+    """The exact model takes 5 % of either: the one that was refitted first does not lose by that."""
+    contest = sys.modules[worth.__module__]
+    straight, bent = hypothesis(), replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
+    straight, bent = replace(straight, statistic=100.0), replace(bent, statistic=97.0)
+    far = replace(hypothesis(), statistic=50.0)
+    refitted = []
+
+    def exact(yard, y, fitted, h):
+        refitted.append(h)
+        return replace(h, statistic=0.95 * h.statistic)
+
+    monkeypatch.setattr(contest, "exact", exact)
+    monkeypatch.setattr(contest, "_bent", lambda yard, h: h.batch.kind == "moved")
+    nothing = np.zeros(0)
+    order = contest._fair(None, nothing, None, [far, bent, straight])
+    assert [h.statistic for h in order] == [97.0, 95.0, 50.0]
+    assert refitted == [straight]
+    assert contest._fair(None, nothing, None, [straight, far]) == [straight, far]  # nothing near it was refitted
+    assert refitted == [straight]

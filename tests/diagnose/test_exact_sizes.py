@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import freed, parameter_of
+from twin.diagnose.accepted import Accepted, freed, parameter_of
+from twin.diagnose.acted import slots_with, units_of
+from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.contest import exact
+from twin.diagnose.contest import LOW, exact
 from twin.diagnose.readings import late
+from twin.diagnose.refit import refit
 from twin.diagnose.search import search
 from twin.diagnose.sizes import sized_candidates
 from twin.diagnose.verdict import verdict_of
@@ -158,5 +161,43 @@ def test_a_liquid_is_found_with_its_film_and_its_temperature_while_the_air_wande
     low, high = causes[0].ci95
     assert low < film < high < 2.0 * film
     sigma = causes[0].settings["temperature_sigma"]
-    assert 0.0 < sigma < 1.0
+    assert 0.0 < sigma < 1.5
     assert causes[0].settings["temperature"] == pytest.approx(degrees, abs=3.0 * sigma)
+
+
+@pytest.mark.parametrize("seconds", [900.0, 2400.0])
+def test_a_sensor_that_follows_late_is_found_with_its_time_constant(seconds):
+    study = small_case.study()
+    (body,) = study.bench.base.bodies
+    x = 0.5 * np.random.default_rng(11).standard_normal(len(study.bench.parameters))
+    y, first = clean(x) + noise(11), 0
+    for k in study.fitted:
+        plan = study.runs[k]
+        (b, s), _ = plan.shapes
+        i = plan.measured.sensors.index("front")
+        T = study.states(k, x) @ body.C[plan.measured.column[i]]
+        shown, keep = T.copy(), np.exp(-60.0 / seconds)
+        for j in range(1, len(T)):
+            shown[j] = keep * shown[j - 1] + (1.0 - keep) * T[j]
+        y[first : first + b * s].reshape(b, s)[:, i] += plan.measured.mean_of @ (shown - T)
+        first += plan.size
+    verdict, causes = verdict_of(search(small_case.yardstick(), y), FAMILIES)
+    assert (verdict, causes[0].place, causes[0].history) == ("sensor", "sensors.front", "lag")
+    assert causes[0].amplitude == pytest.approx(seconds, rel=0.1)
+
+
+def test_a_joint_that_conducts_nothing_any_more_keeps_its_evidence():
+    """The march holds conductances at two hundredths: beyond, no derivative was left, and the cause was dropped."""
+    study, yard = small_case.study(), small_case.yardstick()
+    batch = next(b for b in yard.columns.batches if b.kind == "joint")
+    when = next(w for w in batch.histories if w.windows and w.windows[0].run == "run_0" and w.windows[0].start > 3000.0)
+    h = Hypothesis(batch, list(batch.places).index("contacts.shrink_fit"), when, 100.0, (-0.95,), 1.0)
+    units, x = units_of(study, h), np.zeros(len(study.bench.parameters))
+    y = noise(12)
+    y += np.concatenate(
+        [study.outputs(k, x, slots_with(study, yard.elements, units, k), [-0.98]) for k in study.fitted]
+    )
+    _, (found,) = refit(yard, y, x, [Accepted(h, units, np.array([-0.95]), np.eye(1), 100.0, 36.0, ())])
+    assert found.amplitude[0] == pytest.approx(LOW, abs=0.01)
+    assert found.amplitude[0] >= LOW
+    assert 0.0 < found.covariance[0, 0] < 0.1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,17 @@ from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.search import search
 from twin.diagnose.search_strained import PULLED, strained
-from twin.diagnose.verdict import CALIBRATED, STRAINED, limits_at, limits_of, rival_of, strained_of, told, verdict_of
+from twin.diagnose.verdict import (
+    CALIBRATED,
+    STRAINED,
+    _more_alike,
+    limits_at,
+    limits_of,
+    rival_of,
+    strained_of,
+    told,
+    verdict_of,
+)
 
 
 @pytest.mark.parametrize(
@@ -115,3 +126,21 @@ def test_contacts_that_calibration_strains_are_told_with_what_they_became():
     assert cause.statistic == pytest.approx(1.44 * cause.threshold)
     assert cause.ci95[0] < cause.amplitude < cause.ci95[1]
     assert cause.amplitude == pytest.approx(np.exp(-1.2 * STRAINED * parameters[contact].sigma))
+
+
+@pytest.mark.parametrize(
+    ("causes", "next_one", "statistic", "left", "wanted"),
+    [
+        (3, "runs.a.d", 957.0, 247.0, True),  # one more part of the same body
+        (3, "runs.a.d", 957.0, 1500.0, False),  # it does not explain what is left
+        (3, "runs.b.d", 957.0, 247.0, False),  # in another run
+        (2, "runs.a.d", 957.0, 247.0, False),  # the search could have named it
+    ],
+)
+def test_what_one_more_part_of_a_warm_body_explains_is_not_unknown(causes, next_one, statistic, left, wanted):
+    def start(name, statistic=500.0):
+        return SimpleNamespace(family="initial_state", name=name, statistic=statistic)
+
+    accepted = [SimpleNamespace(hypothesis=start(f"runs.a.{part}")) for part in "bcx"[:causes]]
+    found = SimpleNamespace(accepted=accepted, steps=[SimpleNamespace(ranked=(start(next_one, statistic),))])
+    assert _more_alike(found, left) == wanted

@@ -10,11 +10,11 @@ import numpy as np
 from twin.diagnose.acted import CONDUCTS, Unit, slots_with
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.fitter import bounds
-from twin.diagnose.readings import late, play
+from twin.diagnose.readings import lagged, late, play
 from twin.diagnose.study import Study
 from twin.diagnose.yardstick import Yardstick
 
-CURVED = ("slip", "clock")  # kinds that act on what is read, and not in proportion to their size
+CURVED = ("slip", "clock", "lag")  # kinds that act on what is read, and not in proportion to their size
 OWN = ("gain", "conductance", "total")  # how parameters of sources, films, contacts and joints are called there
 ASIDE = 0.1  # of a size, by which such a one is moved for its derivative
 
@@ -131,8 +131,10 @@ def curved_change(yard: Yardstick, h: Hypothesis, size: float, x: np.ndarray | N
     run = h.name.removeprefix("runs.")
     states = {
         k: yard.nominal[k].states if x is None else study.states(k, x)
-        for k in study.fitted if study.runs[k].run.name == run
+        for k in study.fitted if study.runs[k].run.name == run or h.batch.kind == "lag"
     }  # fmt: skip
+    if h.batch.kind == "lag":
+        return size * lagged(study, states, h.name.removeprefix("sensors."), max(size, h.batch.smallest))
     return size * late(study, states, size)
 
 

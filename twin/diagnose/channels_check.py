@@ -2,39 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from twin.diagnose.diagnosis import Cause, Window
-from twin.logs.run import Run
-from twin.logs.stuck import standstills
+from twin.logs.run import Run, Table
+from twin.logs.stuck import Standstill, frozen_throughout, standstills
 
 LEAST = 1800.0  # s that a channel must stand still
 
 
 def stuck_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[str]) -> tuple[list[Run], list[Cause]]:
     """Runs with the frozen stretch of every stuck sensor emptied, and a cause for each."""
-    result, causes = [], []
-    for run, name in zip(runs, names, strict=True):
-        table = run.temperatures
-        if table is None:
-            result.append(run)
+    tables = {k: run.temperatures for k, run in enumerate(runs) if run.temperatures is not None}
+    parted = [(k, still) for k, table in tables.items() for still in standstills(table)]
+    left, _ = _emptied(tables, parted, sensors, names)
+    own = list(left)
+    whole = [(own[i], still) for i, still in frozen_throughout([left[k] for k in own])]
+    tables, causes = _emptied(tables, sorted([*parted, *whole], key=lambda found: found[0]), sensors, names)
+    return [replace(run, temperatures=tables.get(k)) for k, run in enumerate(runs)], causes
+
+
+def _emptied(
+    tables: Mapping[int, Table], found: Sequence[tuple[int, Standstill]], sensors: Sequence[str], names: Sequence[str]
+) -> tuple[dict[int, Table], list[Cause]]:
+    """Tables by run without the stretches of these sensors that last, and the causes."""
+    result, causes = dict(tables), []
+    for k, still in found:
+        table = result[k]
+        start, end = float(table.time[still.first]), float(table.time[still.last])
+        if still.name not in sensors or end - start < LEAST:
             continue
-        columns = dict(table.columns)
-        for still in standstills(table):
-            start, end = float(table.time[still.first]), float(table.time[still.last])
-            if still.name not in sensors or end - start < LEAST:
-                continue
-            frozen = columns[still.name].copy()
-            frozen[still.first : still.last + 1] = np.nan
-            columns[still.name] = frozen
-            causes.append(
-                Cause(
-                    "sensor", f"sensors.{still.name}", "", float("nan"), (float("nan"), float("nan")), "K",
-                    float("inf"), 0.0, history="stuck", windows=(Window(name, start, end),),
-                )
-            )  # fmt: skip
-        result.append(replace(run, temperatures=replace(table, columns=columns)))
+        frozen = table.columns[still.name].copy()
+        frozen[still.first : still.last + 1] = np.nan
+        result[k] = replace(table, columns={**table.columns, still.name: frozen})
+        causes.append(
+            Cause(
+                "sensor", f"sensors.{still.name}", "", float("nan"), (float("nan"), float("nan")), "K",
+                float("inf"), 0.0, history="stuck", windows=(Window(names[k], start, end),),
+            )
+        )  # fmt: skip
     return result, causes

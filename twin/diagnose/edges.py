@@ -27,7 +27,7 @@ BRIEF = 7200.0  # s, the shortest bell
 PRIOR = 1800.0  # s: standard deviation of an edge about the hour that the search found
 STEP = 1800.0  # s, the longest step of an edge
 EXPONENT = 0.12  # standard deviation of a signal's exponent about the one of the catalogue
-WARMER = 0.15  # standard deviation of what a coolant's heat changes by from the middle of a window to its end
+WARMER = 0.3  # standard deviation of what a coolant's heat changes by from the middle of a window to its end
 LONGER = 1800.0  # s, likewise of the length of a bell that was fitted
 
 

@@ -15,9 +15,11 @@ In runs with `tcp_reference = "first"` all TCP rows lose what a cause does to th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from scipy.signal import lfilter
 
 from twin.diagnose.bank import Nominal
 from twin.diagnose.elements import Key
@@ -201,6 +203,26 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
             at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
             w = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), _state(z, at - steps) - _state(z, at))
         parts.append(np.concatenate([T.ravel(), _shown(plan, w).ravel()]) / by)
+    return np.concatenate(parts)
+
+
+def lagged(study: Study, states: Mapping[int, np.ndarray], sensor: str, seconds: float) -> np.ndarray:
+    """(m,) what the fitted runs read more where a sensor follows with a time constant of `seconds` [s], per second.
+
+    states: (n_fine + 1, r) of the runs, by their number. A run begins with the sensor as warm as what it sits on.
+    """
+    (body,) = study.bench.base.bodies
+    parts = []
+    for k in study.fitted:
+        plan = study.runs[k]
+        T, w = np.zeros(plan.shapes[0]), np.zeros(plan.shapes[1])
+        if k in states and sensor in plan.measured.sensors:
+            i = plan.measured.sensors.index(sensor)
+            read = states[k] @ body.C[plan.measured.column[i]]
+            keep = math.exp(-float(plan.run.drive.time[1] - plan.run.drive.time[0]) / seconds)
+            followed, _ = lfilter([1.0 - keep], [1.0, -keep], read, zi=[keep * read[0]])
+            T[:, i] = plan.measured.mean_of @ (followed - read)
+        parts.append(np.concatenate([T.ravel(), w.ravel()]) / seconds)
     return np.concatenate(parts)
 
 

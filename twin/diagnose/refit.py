@@ -21,7 +21,7 @@ from twin.diagnose.accepted import (
 )
 from twin.diagnose.acted import RELATIVE, slots_with
 from twin.diagnose.batch import Hypothesis
-from twin.diagnose.contest import lowest, priors, solved
+from twin.diagnose.contest import LOW, lowest, priors, solved
 from twin.diagnose.edges import shape_errors
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.formal import of_channels
@@ -30,7 +30,6 @@ from twin.diagnose.yardstick import Yardstick
 
 WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
 REFITS = 10  # passes
-GONE = -0.97  # of a relative change: what a score says beyond it would be an exchange the wrong way
 LONGEST = 0.7  # step of the logarithm of a factor
 STILL, LESS = (
     0.1,
@@ -142,9 +141,9 @@ def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted]
     for a in accepted:
         old, new = before[first], found[first]
         if a.hypothesis.batch.kind in RELATIVE:
-            old = max(old, GONE)
+            old = max(old, LOW)  # what a score says beyond it would be an exchange the wrong way
             step = np.clip((new - old) / (1.0 + old), -LONGEST, LONGEST)
-            result[first] = (1.0 + old) * np.exp(step) - 1.0
+            result[first] = max((1.0 + old) * np.exp(step) - 1.0, LOW)
         elif a.hypothesis.batch.kind == "gain":
             result[first] = np.clip(new, old - LONGEST, old + LONGEST)
         elif a.hypothesis.batch.kind in CURVED:

@@ -1,8 +1,8 @@
-"""Plays and clocks at several sizes: their responses change in shape with their size, not in height.
+"""Plays, clocks and lags at several sizes: their responses change in shape with their size, not in height.
 
 A wide play holds the tool nearly still and a narrow one lags a little behind every turn; a clock that is an hour off
-shows another hour's heating, not sixty times that of a minute. The bank of columns knows one size of each; here the
-others are scored when they are looked for.
+shows another hour's heating, not sixty times that of a minute; a sensor that follows in an hour shows no cycle at all.
+The bank of columns knows one size of each; here the others are scored when they are looked for.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from twin.diagnose.yardstick import Yardstick
 SIZES = {
     "slip": (1e-6, 2e-6, 6e-6, 9e-6, 13e-6, 20e-6),  # m
     "clock": (-3600.0, -1200.0, -400.0, 400.0, 1200.0, 3600.0),  # s
+    "lag": (600.0, 1800.0, 5400.0),  # s
 }
 
 
 def sized_candidates(yard: Yardstick, projector: Projector, white: np.ndarray) -> list[Hypothesis]:
-    """Plays of every TCP component and clocks of every run that would explain white residuals (m,), at SIZES."""
+    """Plays of TCP components, clocks of runs and lags of sensors that would explain white residuals (m,), at SIZES."""
     found = []
     for batch in yard.columns.batches:
         for i in range(len(batch.places) if batch.kind in SIZES else 0):

@@ -16,7 +16,9 @@ from twin.diagnose.contest import AMPLITUDE
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.elements import pivot
 from twin.diagnose.fitter import bounds
+from twin.diagnose.search import MOST, SEVERAL
 from twin.diagnose.search_look import Search
+from twin.diagnose.search_strained import COVERS
 from twin.diagnose.sight import sight
 from twin.diagnose.study import Study
 from twin.diagnose.unknown import history
@@ -36,7 +38,7 @@ OWN = {
     "group": 0.12,
     "gain": 0.1,
     "group_film": 0.12,
-    "coolant": 0.12,
+    "coolant": 0.15,
     "scale": 0.12,
     "moved": 0.2,
     "capacity": 0.1,
@@ -169,7 +171,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     relaxed = [a.statistic for a in found.accepted if freed(found.yardstick.study, a.hypothesis)]
     before = max([*found.steps[0].parts.values(), *relaxed], default=0.0)
     causes = tuple(cause_of(a, found.yardstick.study) for a in found.accepted)
-    if left > thresholds["unknown"] and (not causes or left > REMAINDER * before):
+    if left > thresholds["unknown"] and (not causes or left > REMAINDER * before) and not _more_alike(found, left):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
     if not causes:
@@ -195,6 +197,17 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     declared = lead.family in PLAIN and not lead.windows and not lead.signal
     whole = lead.place.split(".")[0] in ("films", "contacts", "sources", "materials")
     return ("out_of_tolerance" if declared and whole else "named"), causes
+
+
+def _more_alike(found: Search, left: float) -> bool:
+    """Whether a search ended with as many causes as it takes, all of a family that comes part by part, and one more of
+    them explains what is left: a body that was warm has more parts than that, and nothing about it is unknown."""
+    alike = {(a.hypothesis.family, a.hypothesis.name.rpartition(".")[0]) for a in found.accepted}
+    best = next(iter(found.steps[-1].ranked), None)
+    return (
+        len(found.accepted) >= MOST and best is not None and best.family in SEVERAL
+        and alike == {(best.family, best.name.rpartition(".")[0])} and best.statistic > COVERS * left
+    )  # fmt: skip
 
 
 def strained_of(found: Search) -> tuple[Cause, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +53,30 @@ def standstills(table: Table) -> list[Standstill]:
         expected = float(own * np.median(inside[usable] / outside[usable]))
         if expected >= _EXPECTED:
             found.append(Standstill(name, int(rows[first]), int(rows[last]), float(values[rows[first]]), expected))
+    return found
+
+
+def frozen_throughout(tables: Sequence[Table]) -> list[tuple[int, Standstill]]:
+    """Temperatures that stand still in all of a table and not in others of the same machine, with the table's number.
+
+    As `standstills`, which tells nothing of a channel that never changed: how often it should have is taken from the
+    other tables, by how often the others (their median) changed there and here.
+    """
+    moves = []
+    for table in tables:
+        columns = {n: v[np.isfinite(v)] for n, v in table.columns.items()}
+        moves.append({n: int(np.count_nonzero(np.diff(v))) for n, v in columns.items() if len(v) > _ROWS})
+    busy = [float(np.median(list(m.values()))) if m else 0.0 for m in moves]
+    found = []
+    for k, table in enumerate(tables):
+        for name in (n for n, m in moves[k].items() if m == 0):
+            elsewhere = [i for i, m in enumerate(moves) if m.get(name, 0) >= 10 and busy[i] > 0.0]
+            own, others = sum(moves[i][name] for i in elsewhere), sum(busy[i] for i in elsewhere)
+            expected = busy[k] * own / others if elsewhere else 0.0
+            if expected >= _EXPECTED:
+                rows = np.flatnonzero(np.isfinite(table.columns[name]))
+                value = float(table.columns[name][rows[0]])
+                found.append((k, Standstill(name, int(rows[0]), int(rows[-1]), value, expected)))
     return found
 
 
