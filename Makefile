@@ -55,10 +55,10 @@ bench: $(READY) ## what is claimed about speed, memory and accuracy, measured he
 	$(BIN)/python -m benchmarks
 
 .PHONY: campaign
-campaign: $(READY) ## hide effects in data by the hundred and look for them; MINUTES=60 stops earlier, and goes on next time
+campaign: $(READY) ## hide effects in data by the hundred and look for them; MINUTES=60 stops earlier, and goes on next time; FIRST=4400 are other trials
 	@$(BIN)/python -c 'import gmsh' 2>/dev/null || { echo "installing gmsh, for the other mesh of the trials"; \
 	    $(BIN)/python -m pip install -qq --disable-pip-version-check --no-build-isolation -e '.[mesh]'; }
-	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign $(MINUTES)
+	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign $(or $(MINUTES),inf) $(FIRST)
 
 .PHONY: demo
 demo: $(READY) ## build, verify and run the shipped five-axis machine; leaves out/ with pictures

@@ -1,4 +1,4 @@
-"""Effects hidden in data and looked for, hundreds of times: `python -m benchmarks.campaign [MINUTES]`."""
+"""Effects hidden in data and looked for, hundreds of times: `python -m benchmarks.campaign [MINUTES [FIRST]]`."""
 
 from __future__ import annotations
 
@@ -48,17 +48,17 @@ FIRST = 4600  # seed of the first trial: none that anything was tuned on
 Item = tuple[str, float, int]
 
 
-def items() -> list[Item]:
-    """All trials, in an order in which an unfinished campaign is worth most."""
+def items(first: int = FIRST) -> list[Item]:
+    """All trials from this seed on, in an order in which an unfinished campaign is worth most."""
     families = [f.name for f in FAMILIES if f.name in HIDDEN]
     result: list[Item] = []
     for k in range(EACH):
         nulls = range(min(k * NULLS // FAST, NULLS), min((k + 1) * NULLS // FAST, NULLS))
-        sized = [(family, size, FIRST + k) for family in families for size in SIZES]
+        sized = [(family, size, first + k) for family in families for size in SIZES]
         result += [item for item in sized if _differs(*item)]
-        result += [(name, 1.0, FIRST + i) for name, n in MORE for i in range(k * n // EACH, (k + 1) * n // EACH)]
-        result += [("null", 1.0, FIRST + i) for i in nulls]
-    return result + [(name, 1.0, FIRST + i) for name, n in SEVERAL for i in range(n)]
+        result += [(name, 1.0, first + i) for name, n in MORE for i in range(k * n // EACH, (k + 1) * n // EACH)]
+        result += [("null", 1.0, first + i) for i in nulls]
+    return result + [(name, 1.0, first + i) for name, n in SEVERAL for i in range(n)]
 
 
 def _differs(family: str, size: float, seed: int) -> bool:
@@ -182,22 +182,22 @@ def _several(deadline: float, trials: Sequence[Item]) -> None:
             f.write(json.dumps(result) + "\n")
 
 
-def results() -> list[dict[str, Any]]:
-    """The trials that were made; of one that is in several files, the last file's by name."""
+def results(first: int = FIRST) -> list[dict[str, Any]]:
+    """The trials from this seed on that were made; of one that is in several files, the last file's by name."""
     lines = [line for path in sorted(OUT.glob("trials-*.jsonl")) for line in path.read_text("utf-8").splitlines()]
     found = {(r["family"], r["factor"], r["seed"]): r for r in map(json.loads, lines)}
-    return [found[item] for item in items() if item in found]
+    return [found[item] for item in items(first) if item in found]
 
 
-def main(minutes: float = float("inf")) -> None:
+def main(minutes: float = float("inf"), first: int = FIRST) -> None:
     yard = yardstick()
-    done = {(r["family"], r["factor"], r["seed"]) for r in results()}
-    todo = [i for i in items() if i not in done]
+    done = {(r["family"], r["factor"], r["seed"]) for r in results(first)}
+    todo = [i for i in items(first) if i not in done]
     deadline = time.time() + 60.0 * minutes
     pieces = [list(sizes) for _, sizes in groupby(todo, key=lambda item: (item[0], item[2]))]
     with bar("campaign", len(pieces)) as advance:
         each(_several, deadline, pieces, lambda p: advance(f"{p[0][0]} of seed {p[0][2]}"), long=0.0)
-    write_tables(results(), limits_of(yard), OUT, FOLDER)
+    write_tables(results(first), limits_of(yard), OUT, FOLDER)
 
 
 if __name__ == "__main__":
@@ -205,4 +205,5 @@ if __name__ == "__main__":
 
     from benchmarks.campaign import main as called  # helpers import functions by the name of their module
 
-    called(float(sys.argv[1]) if len(sys.argv) > 1 else float("inf"))
+    given = sys.argv[1:]
+    called(float(given[0]) if given else float("inf"), int(given[1]) if len(given) > 1 else FIRST)
