@@ -91,8 +91,8 @@ def _fair(yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[H
     while True:
         lead = order[0]
         near = [h for h in order[1:] if worth(h) > (1.0 - BEHIND) * worth(lead)]
-        refitted = _bent(yard, lead) or id(lead) in exactly or lead.batch.kind in READINGS
-        if refitted or not any(_bent(yard, h) or id(h) in exactly for h in near):
+        settled = _bent(yard, lead) or id(lead) in exactly or lead.batch.kind in READINGS or lead.batch.fixed
+        if settled or not any(_bent(yard, h) or id(h) in exactly for h in near):
             break
         order[0] = exact(yard, y, fitted, lead)
         exactly.add(id(order[0]))
