@@ -18,10 +18,11 @@ def stuck_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[s
     """Runs with the frozen stretch of every stuck sensor emptied, and a cause for each."""
     tables = {k: run.temperatures for k, run in enumerate(runs) if run.temperatures is not None}
     parted = [(k, still) for k, table in tables.items() for still in standstills(table)]
-    left, _ = _emptied(tables, parted, sensors, names)
-    own = list(left)
-    whole = [(own[i], still) for i, still in frozen_throughout([left[k] for k in own])]
-    tables, causes = _emptied(tables, sorted([*parted, *whole], key=lambda found: found[0]), sensors, names)
+    tables, causes = _emptied(tables, parted, sensors, names)
+    own = list(tables)
+    whole = [(own[i], still) for i, still in frozen_throughout([tables[k] for k in own])]
+    tables, more = _emptied(tables, whole, sensors, names)
+    causes = sorted([*causes, *more], key=lambda c: names.index(c.windows[0].run))
     return [replace(run, temperatures=tables.get(k)) for k, run in enumerate(runs)], causes
 
 
