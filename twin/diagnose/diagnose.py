@@ -106,6 +106,9 @@ def prepare(
                      np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
                      *(signals[name] for name in sorted(signals))):  # fmt: skip
             key.update(np.ascontiguousarray(part).tobytes())
+    # the window's coordinates: made anew on other cores they may be others, and z0 is zero at the reference temperature
+    for rows in (bench.B, *(body.C for body in bench.base.bodies)):
+        key.update(np.ascontiguousarray(rows).tobytes())
     asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)
     names = tuple((f.name, f.number, f.file) for f in settings.families)
     tolerance = tuple((p.path, p.nominal, p.sigma) for p in known)

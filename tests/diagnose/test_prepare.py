@@ -1,0 +1,42 @@
+"""What a cached yardstick is a yardstick of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tests.diagnose import small_case
+from twin.diagnose import diagnose
+from twin.diagnose.bench import Bench
+
+
+@pytest.fixture
+def keys(monkeypatch):
+    """The keys that yardsticks are looked for by; none is made."""
+    seen = []
+
+    def cached(stage, key, make):
+        seen.append(key)
+        raise InterruptedError
+
+    monkeypatch.setattr(diagnose, "cached", cached)
+    return seen
+
+
+def turned(bench: Bench) -> Bench:
+    """The same machine in coordinates of the other sign."""
+    (body,) = bench.base.bodies
+    return replace(bench, B=-bench.B, base=replace(bench.base, bodies=(replace(body, B=-body.B, C=-body.C),)))
+
+
+def test_a_yardstick_belongs_to_the_coordinates_it_was_made_in(keys, monkeypatch):
+    """A window that is made anew, on other cores, may have others; at the reference temperature all starts are zero."""
+    runs, make = small_case.runs(), diagnose.make_bench
+    for other in (None, None, turned):
+        if other is not None:
+            monkeypatch.setattr(diagnose, "make_bench", lambda *given: turned(make(*given)))
+        with pytest.raises(InterruptedError):
+            diagnose.prepare(None, small_case.machine(), runs[:2], runs[2:], diagnose.Settings())
+    first, again, apart = keys
+    assert first == again != apart
