@@ -277,14 +277,14 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 @cache
-def _largest(name: str) -> float:
+def largest(name: str) -> float:
     """Of a logged signal in all runs of a trial."""
     from benchmarks.hidden_parts import signal
 
     return max(float(signal(r, name).max()) for r in range(3))
 
 
-def page(results: Sequence[Result], limits: Sequence[Limit], model: Path, top: Top = _largest) -> str:
+def page(results: Sequence[Result], limits: Sequence[Limit], model: Path, top: Top = largest) -> str:
     """All tables in Markdown, of a campaign that may be unfinished. model: folder of the machine's description."""
     tables = described(model)
     wrong = Counter(str(r["error"]).partition(":")[0] for r in results if "error" in r)

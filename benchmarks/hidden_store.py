@@ -1,4 +1,4 @@
-"""Full-model truths of the trials in tests/hidden/trials.py, written where tests find them.
+"""Full-model truths of the trials in tests/hidden, written where tests find them.
 
     python -m benchmarks.hidden_store                  # those that are missing, the most important first
     python -m benchmarks.hidden_store zone coolant     # these, anew
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +23,8 @@ import numpy as np
 
 from benchmarks.hidden_truth import START, STEP, _felt, machine_of, other_text
 from tests.hidden.load import MODEL, RUNS, TRUTH, Truth, plan, write
-from tests.hidden.trials import SIMULATED, TRIALS, Trial, about, hidden_text
+from tests.hidden.trial import Trial, about, hidden_text
+from tests.hidden.trials import SIMULATED, TRIALS
 from twin.build.full_model import FullModel, assemble
 from twin.build.simulate import simulate
 from twin.build.stepper import CoupledStepper, Loads, contact_matrix, sensor_temperatures
@@ -46,6 +47,7 @@ class Ride:
     ahead: float  # s of work before the run's start
     when: np.ndarray  # (m,) s of TCP rows, since the drive's start
     where: np.ndarray  # (m, axes) m
+    warm: Mapping[str, float]  # body -> K above START at the start
 
 
 class SideBySide(CoupledStepper):
@@ -97,7 +99,8 @@ def made(trials: Sequence[Trial]) -> list[tuple[Truth, ...]]:
     texts = [hidden_text(other_text(t.seed), t) for t in trials]
     models = [assemble(machine_of(text)) for text, _ in texts]
     felt, before = texts[0][1], trials[0].before
-    rides = [_ride(models[0], run, felt.get(run, {}), before.get(run, 0.0)) for run in RUNS]
+    warm = {run: {body: by for (where, body), by in trials[0].warm.items() if where == run} for run in RUNS}
+    rides = [_ride(models[0], run, felt.get(run, {}), before.get(run, 0.0), warm[run]) for run in RUNS]
     return ridden(models, rides)
 
 
@@ -112,7 +115,10 @@ def ridden(models: Sequence[FullModel], rides: Sequence[Ride], steps: int | None
     """Per model its truths, of all rides side by side; models are thermally alike. The first `steps` of the rides."""
     model = models[0].thermal
     stepper, drives = SideBySide(model, KEPT), [r.drive for r in rides]
-    x = [np.repeat(xb[:, None], len(rides), axis=1) for xb in stepper.uniform(START)]
+    x = [
+        xb[:, None] + np.outer(body.one, [ride.warm.get(body.name, 0.0) for ride in rides])
+        for body, xb in zip(model.bodies, stepper.uniform(START), strict=True)
+    ]
     shown = [measured_air(model.load_model, d)[:, [e for _, e in model.ambient_sensors]] for d in drives]
     row_step = [np.searchsorted(r.drive.time, r.when, side="left") - 1 for r in rides]
     tcp = [[np.zeros((len(r.when), 3)) for r in rides] for _ in models]
@@ -140,19 +146,21 @@ def ridden(models: Sequence[FullModel], rides: Sequence[Ride], steps: int | None
     ]  # fmt: skip
 
 
-def _ride(full: FullModel, name: str, felt: dict[str, np.ndarray], before: float) -> Ride:
+def _ride(
+    full: FullModel, name: str, felt: Mapping[str, np.ndarray], before: float = 0.0, warm: Mapping[str, float] = {}
+) -> Ride:
     run = read_run(MODEL / "runs" / name)
     when, where = plan(run, full.thermal.pose_axes)
     longer, ahead = _felt(run, felt, before)
     load = full.thermal.load_model
     drive = evaluate(load, longer.loads.time, signal_values(longer, load.signals), STEP)
-    return Ride(name, drive, ahead, when + ahead, where)
+    return Ride(name, drive, ahead, when + ahead, where, warm)
 
 
 def print_error(steps: int) -> None:
     """Against Euler steps of `twin simulate`: four to the minute, and sixteen, which are next to exact."""
     full = assemble(machine_of(other_text(0)))
-    rides = [_ride(full, run, {}, 0.0) for run in RUNS]
+    rides = [_ride(full, run, {}) for run in RUNS]
     began = time.process_time()
     (side,) = ridden([full], rides, steps)
     print(f"   {len(RUNS)} runs of {steps} min side by side in {time.process_time() - began:.0f} s")

@@ -162,9 +162,9 @@ def truth(
 ) -> Truth:
     """What the machine of a description really does in one of RUNS, without noise; from the cache where it is there.
 
-    extra: signals that the machine feels and the log lacks (n,) [SI, 1], by name, at the rows of loads.csv. before [h]:
-    so much of the run's own work comes before its start, so that the machine is not at START there. model: makes the
-    full model of `text`, where several runs share it.
+    extra: signals that the machine feels and the log lacks or has wrong (n,) [SI], by name, at the rows of loads.csv.
+    before [h]: so much of the run's own work comes before its start, so that the machine is not at START there. model:
+    makes the full model of `text`, where several runs share it.
     """
     loads = FOLDER / "runs" / run / "loads.csv"
     digest = hashlib.sha256(text.encode() + loads.read_bytes() + f"{before:g} {size:g} {STEP} {SUBSTEPS}".encode())
@@ -229,7 +229,7 @@ def _simulated(
 def _felt(run: Run, extra: Mapping[str, np.ndarray], before: float) -> tuple[Run, float]:
     """The run as the machine feels it, and the time [s] by which its start is late there."""
     columns = {**run.loads.columns, **extra}
-    units = {**run.loads.units, **dict.fromkeys(extra, "1")}
+    units = {**dict.fromkeys(extra, "1"), **run.loads.units}
     t = run.loads.time
     ahead = round(3600.0 * before / STEP) * STEP
     first = t < ahead  # the work of its first hours, once more

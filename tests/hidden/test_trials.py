@@ -8,20 +8,8 @@ import numpy as np
 import pytest
 
 from tests.hidden.load import MODEL, RUNS, TRUTH, load, read
-from tests.hidden.trials import (
-    BROKEN,
-    DOOR,
-    HOUR,
-    SEALED,
-    SIMULATED,
-    SUN,
-    TRIALS,
-    Trial,
-    about,
-    hidden_text,
-    stored,
-    trial,
-)
+from tests.hidden.trial import HOUR, Trial, about, hidden_text
+from tests.hidden.trials import BROKEN, DOOR, SEALED, SIMULATED, SUN, TRIALS, stored, trial
 from twin.diagnose.damage import DAMAGES
 from twin.diagnose.diagnosis import VERDICTS
 from twin.diagnose.edits import EDITS

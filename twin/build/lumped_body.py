@@ -88,14 +88,13 @@ def conduction(machine: Machine, body: LumpedBody) -> sp.csr_array:
                 rows.append(i)
                 columns.append(j)
                 values.append(np.full(bar.elements, sign * g))
-    for member, tank in tanks_on(machine, body.members).items():  # each state of the place by its share of the mean
-        share = tank.conductance * row(machine, body, tank.surface)
-        place = np.flatnonzero(share)
-        there = np.full(len(place), body.states(member, machine).start)
-        for i, j, sign in ((place, place, 1), (there, there, 1), (place, there, -1), (there, place, -1)):
-            rows.append(i)
-            columns.append(j)
-            values.append(sign * share[place])
+    for member, tank in tanks_on(machine, body.members).items():  # against the mean of the place: `twin.build.tanks`
+        apart = row(machine, body, tank.surface)
+        apart[body.states(member, machine)] = -1.0
+        states = np.flatnonzero(apart)
+        rows.append(np.repeat(states, len(states)))
+        columns.append(np.tile(states, len(states)))
+        values.append(tank.conductance * np.outer(apart[states], apart[states]).ravel())
     if not rows:
         return sp.csr_array((body.n, body.n))
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
