@@ -60,6 +60,20 @@ def test_matrices(full):
         assert body.F.shape[1] == body.n
 
 
+@pytest.mark.parametrize("most", [3000, 10])
+def test_what_it_takes_leaves_its_surface_evenly(machine, full, tmp_path, monkeypatch, most):
+    """k b b^T with the weights b of the mean: no heat goes from the warm end of a surface to the cold one."""
+    bare = assemble(load_machine(edited(tmp_path)))
+    monkeypatch.setattr("twin.build.tanks.MOST", most)
+    thermal = full.thermal if most == 3000 else assemble(machine).thermal
+    for body, without, k in zip(thermal.bodies, bare.thermal.bodies, (10.0, 25.0), strict=True):
+        A0 = body.A0.toarray()
+        b = -A0[:-1, -1] / k
+        assert b.sum() == pytest.approx(1.0, rel=1e-12)
+        assert 0 < np.count_nonzero(b) <= most
+        np.testing.assert_allclose(A0[:-1, :-1] - without.A0.toarray(), k * np.outer(b, b), atol=1e-10)
+
+
 @pytest.mark.parametrize("kind", ["full", "reduced"])
 def test_heat_balance(models, kind):
     model = models[kind]
