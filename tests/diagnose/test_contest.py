@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.contest import (
     AMPLITUDE,
@@ -18,6 +19,7 @@ from twin.diagnose.contest import (
     WET,
     _moved,
     beginning,
+    exact,
     lowest,
     priors,
     proof,
@@ -93,14 +95,36 @@ def test_amplitudes_that_would_be_too_low_are_held_and_the_others_make_the_best_
 
 
 def test_what_a_cause_may_be():
+    yard = small_case.yardstick()
     coolant = hypothesis(q=2)
     coolant = replace(coolant, batch=replace(coolant.batch, kind="coolant", family="coolant", smallest=5.0))
-    np.testing.assert_array_equal(lowest(coolant), [5.0, -np.inf])
+    np.testing.assert_array_equal(lowest(yard, coolant), [5.0, -np.inf])
     assert [p[0] for p in priors(coolant)] == [WET, WET**-2]
     sun = hypothesis(q=2)
-    assert np.all(lowest(replace(sun, batch=replace(sun.batch, family="sun"))) == 0.0)
-    assert np.all(np.isneginf(lowest(sun)))
+    assert np.all(lowest(yard, replace(sun, batch=replace(sun.batch, family="sun"))) == 0.0)
+    assert np.all(np.isneginf(lowest(yard, sun)))
     assert not np.any(priors(sun)[1])
+
+
+def test_a_surface_lacks_no_more_film_than_it_has():
+    """The refit stops where nothing is left of the described film, whatever the data ask for."""
+    yard = small_case.yardstick()
+    study = yard.study
+    batch = next(b for b in yard.columns.batches if b.family == "film_gain" and b.kind == "film")
+    films = [f.name for f in study.bench.base.load_model.films]
+    place = next(p for p in study.bench.places if p.name == batch.places[0])
+    h = Hypothesis(batch, 0, batch.histories[0], 100.0, (-1.0,), 1.0)
+    (floor,) = lowest(yard, h)
+    own = [yard.nominal[k].total[:, films.index(place.film)] for k in study.fitted]
+    assert floor == -max(f.max() for f in own) < 0.0
+    wanted = replace(h, amplitude=(3.0 * floor,))
+    x = np.zeros(len(study.bench.parameters))
+    units = units_of(study, h)
+    slots = [slots_with(study, yard.elements, units, k) for k in study.fitted]
+    y = np.concatenate(
+        [study.by_amplitudes(k, x, s, [3.0 * floor])[0] for k, s in zip(study.fitted, slots, strict=True)]
+    )
+    assert exact(yard, y, yard.fitter(y), wanted).amplitude[0] >= floor
 
 
 def test_a_bent_calibration_is_no_place_to_begin():

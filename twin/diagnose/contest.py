@@ -126,7 +126,8 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
     before = misfit(yard, fitted)
     inner = edges_of(study, h)
     low, high = bounds(study)
-    a = np.maximum(a, lowest(h))
+    floor = lowest(yard, h)
+    a = np.maximum(a, floor)
     mean, inverse = priors(h)
     if h.batch.kind == "coolant":  # a strong film saturates: a score that takes it for a straight line says little
         a[0] = WET
@@ -163,8 +164,8 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
             stiff = 1e9 * inverse if i < held else inverse
             F = D.T @ PD + np.diag([*stiff, *(e.prior**-2.0 for e in edges)])
             pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
-            floor = np.concatenate([lowest(h) - now.a, np.full(len(edges), -np.inf)])
-            found = solved(F, PD.T @ left + pulled, floor)
+            below = np.concatenate([floor - now.a, np.full(len(edges), -np.inf)])
+            found = solved(F, PD.T @ left + pulled, below)
             after = _moved(now.a, found[:q], relative, h.batch.sign)
             shifts = np.clip(found[q:], -STEP, STEP)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
@@ -174,7 +175,7 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
             moved(study, yard.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
         )
         now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
-    if h.batch.kind == "coolant" and best.a[0] <= lowest(h)[0] and best.a[1] > 0.0:
+    if h.batch.kind == "coolant" and best.a[0] <= floor[0] and best.a[1] > 0.0:
         statistic = 0.0  # that is heat
     # what better parameters remove is not the cause's
     plain = np.concatenate([study.outputs(k, best.x) for k in study.fitted])
@@ -219,13 +220,18 @@ def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:
         held |= beyond
 
 
-def lowest(h: Hypothesis) -> np.ndarray:
-    """(q,) below which no amplitude goes."""
+def lowest(yard: Yardstick, h: Hypothesis) -> np.ndarray:
+    """(q,) below which no amplitude goes: less than the described film cannot lack at a surface."""
     result = np.full(h.batch.q, -np.inf)
     if h.batch.kind == "coolant":
         result[0] = h.batch.smallest
     elif h.family == "sun":  # on no day does it cool
         result[:] = 0.0
+    elif h.batch.kind == "film" and not h.batch.sign:
+        bench = yard.study.bench
+        film = next(p.film for p in bench.places if p.name == h.name)
+        f = [own.name for own in bench.base.load_model.films].index(film)
+        result[0] = -max(float(yard.nominal[k].total[:, f].max()) for k in yard.study.fitted)
     return result
 
 

@@ -55,7 +55,7 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
     swapped = np.concatenate([np.full(len(a.amplitude), a.hypothesis.batch.kind == "swapped") for a in accepted])
     gains = gains_of(study, accepted)
     mean, inverse_prior = (np.concatenate(p) for p in zip(*(priors(a.hypothesis) for a in accepted), strict=True))
-    floor = np.concatenate([lowest(a.hypothesis) for a in accepted])
+    floor = np.concatenate([lowest(yard, a.hypothesis) for a in accepted])
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
     x = x.copy()
     x[held] = 0.0
