@@ -43,7 +43,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Trial:
-    """One row of the table. Without causes and `other` the truth is that of a file which another trial made."""
+    """One row of the table. Where nothing is done to the machine, `truth` names the file of another trial."""
 
     name: str
     expected: Expected

@@ -5,9 +5,9 @@
 What it takes leaves the surface evenly, as the heat of a source enters it. So what a tank adds to the conduction has
 rank one, is symmetric, positive semidefinite and zero for equal temperatures: k [b, -1] [b, -1]^T with the weights b of
 the mean. An exchange k/A (T - x) point by point, as sparse as a film, was rejected: through it the warm end of a face
-heats the cold one (82 kJ/K behind 23 W/K on the side of the five-axis machine's column are a short circuit before they
-store anything), and `twin diagnose`, which looks for a capacity with the mean's history, could not name what
-`twin hide` had hidden. The block of b b^T is dense: of a large surface every second, third, ... node is taken.
+heats the cold one, so that a tank is a short circuit before it stores anything, and `twin diagnose`, which looks for a
+capacity with the mean's history, could not name what `twin hide` had hidden. The block of b b^T is dense: of a large
+surface every second, third, ... node is taken.
 
 The tanks follow the nodes of their body, each a member of its own, "tanks.NAME". They carry no film, source, port or
 sensor, and do not grow.

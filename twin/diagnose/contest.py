@@ -230,8 +230,8 @@ def lowest(yard: Yardstick, h: Hypothesis) -> np.ndarray:
     elif h.batch.kind == "film" and not h.batch.sign:
         bench = yard.study.bench
         film = next(p.film for p in bench.places if p.name == h.name)
-        f = [own.name for own in bench.base.load_model.films].index(film)
-        result[0] = -max(float(yard.nominal[k].total[:, f].max()) for k in yard.study.fitted)
+        own = [f for f, described in enumerate(bench.base.load_model.films) if described.name == film]  # perhaps none
+        result[0] = -max(float(yard.nominal[k].total[:, own].max(initial=0.0)) for k in yard.study.fitted)
     return result
 
 
