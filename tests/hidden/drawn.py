@@ -1,7 +1,8 @@
 """Trials of which a seed draws all: place, kind, size, times, parameters of the machine, and noise; one per family.
 
 What is hidden is that of the campaign (`benchmarks.hidden_draw.part_of`) at 1 to 2 times its nominal size. Here the
-full model is stepped through it, of another machine for each seed, where the campaign has one reduced machine for all.
+full model is stepped through it, of another machine for each seed, where the campaign has one reduced machine for all;
+faults of a log are done to the stored truth of one machine.
 Nobody chose a seed: they are numbered in the order of the families. A signal's clock and a stuck sensor need yardsticks
 of their own (`tests.hidden.trials` has both), so the next seed after the last is taken there.
 """

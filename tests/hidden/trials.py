@@ -62,7 +62,7 @@ _ZONE = cause_of("zone", "environment.enclosure", 2.5, "K", windows=DOOR)
 # The most important first: `benchmarks.hidden_store` makes them in this order.
 _MACHINE = (
     in_machine("heat_source", 101, _HEAT),
-    # b_bearing and the rails carry so little heat that nothing shows: the flange has that of the spindle
+    # of joints that carry little heat, such as the bearing of B, nothing shows: the flange has that of the spindle
     in_machine("joint", 102, cause_of("joint", "contacts.spindle_flange", 0.08, "1", windows=BROKEN)),
     in_machine("coolant", 103, cause_of(
         "coolant", "table.top", 60.0, "W/(m^2*K)", windows=CUTTING, settings={"temperature": 14.0}

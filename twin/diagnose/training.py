@@ -49,7 +49,7 @@ def values_of(parameters: Sequence[Parameter], seed: int, spread: float = SPREAD
     """Parameters drawn from their priors, within bounds; nominal ones for seed 0.
 
     In turn some contacts are lost, far beyond their priors: a joint that conducts well has no jump of temperature, and
-    a window that has never seen one makes a lost joint conduct on: the spindle of the five-axis machine warms a sixth.
+    in a window that has never seen one a lost joint conducts on.
     """
     if seed == 0:
         return {}
