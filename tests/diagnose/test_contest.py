@@ -14,16 +14,21 @@ from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.contest import (
     AMPLITUDE,
     EDGE,
+    FROZEN,
     HIGH,
     LOW,
+    TRIAL,
     WET,
+    _liquid,
     _moved,
     beginning,
     exact,
+    judged,
     lowest,
     priors,
     proof,
     solved,
+    tried,
     worth,
 )
 from twin.diagnose.diagnosis import Window
@@ -125,6 +130,65 @@ def test_a_surface_lacks_no_more_film_than_it_has():
         [study.by_amplitudes(k, x, s, [3.0 * floor])[0] for k, s in zip(study.fitted, slots, strict=True)]
     )
     assert exact(yard, y, yard.fitter(y), wanted).amplitude[0] >= floor
+
+
+def a_coolant(place: int, film: float, heat: float) -> Hypothesis:
+    """On the small machine, in one window."""
+    batch = next(b for b in small_case.yardstick().columns.batches if b.kind == "coolant")
+    return Hypothesis(batch, place, batch.histories[0], 100.0, (film, heat), 1.0)
+
+
+def test_no_medium_is_frozen():
+    yard = small_case.yardstick()
+    h = a_coolant(0, 5.0, -1.0)
+    area = next(p.area for p in yard.study.bench.places if p.name == h.name)
+    above = yard.study.bench.base.reference_temperature - FROZEN
+    cold = -10.0 * area * above
+    np.testing.assert_allclose(_liquid(yard.study, h, np.array([5.0, cold])), [10.0, cold])
+    for kept in ([12.0, cold], [5.0, -cold]):
+        np.testing.assert_array_equal(_liquid(yard.study, h, np.array(kept)), kept)
+    plain = hypothesis()
+    np.testing.assert_array_equal(_liquid(yard.study, plain, np.array([-1e9])), [-1e9])
+
+
+def test_where_a_coolant_leads_all_coolants_are_tried(monkeypatch):
+    """A straight line ranks the face behind first; after some passes from its last start the wetted one leads."""
+    contest = sys.modules[worth.__module__]
+    behind, wetted = (replace(a_coolant(p, 5.0, -1.0), statistic=s) for p, s in ((0, 1000.0), (1, 700.0)))
+    cold = replace(wetted, amplitude=(7.0, -2.0))
+    heat = replace(hypothesis(), statistic=900.0)
+    passes = []
+
+    def exact(yard, y, fitted, h, most):
+        passes.append(most)
+        return replace(h, statistic=1100.0 if h is cold else 950.0)
+
+    monkeypatch.setattr(contest, "exact", exact)
+    nothing = np.zeros(0)
+    order = tried(None, nothing, None, [(heat,), (behind,), (wetted, cold)])
+    assert [starts[0].statistic for starts in order] == [1100.0, 950.0, 900.0]
+    assert (order[0][0].amplitude, passes) == (cold.amplitude, [TRIAL, TRIAL])
+    heat = replace(heat, statistic=2000.0)
+    order = tried(None, nothing, None, [(behind,), (heat,), (wetted, cold)])
+    assert order == [(heat,), (behind,), (wetted, cold)]  # as they were
+    assert len(passes) == 2
+    assert tried(None, nothing, None, []) == []
+
+
+def test_a_capacity_further_behind_is_refitted(monkeypatch):
+    """Heat in many windows explains more; a capacity that scores two thirds of it explains as much when refitted."""
+    contest = sys.modules[worth.__module__]
+    bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
+
+    def kind(name: str, statistic: float) -> Hypothesis:
+        return replace(bent, batch=replace(bent.batch, kind=name), statistic=statistic)
+
+    heat, tank, film = kind("moved", 328.0), kind("capacity", 226.0), kind("film", 226.0)
+    monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=h.statistic + 1.0))
+    nothing = np.zeros(0)
+    proved, others = judged(None, nothing, None, [(heat,), (tank,), (film,)])
+    assert [h.batch.kind for h in proved] == ["moved", "capacity"]
+    assert others == [film]
 
 
 def test_a_bent_calibration_is_no_place_to_begin():

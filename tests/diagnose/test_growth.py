@@ -84,7 +84,21 @@ def test_a_coolant_begins_where_cold_does_most(first):
         assert found is None  # it has begun there already
     else:
         assert found is not None
-        assert (found.when, found.amplitude) == (batch.histories[0], pytest.approx((10.0, -9.0)))
+        assert (found.when.windows, found.amplitude) == (batch.histories[0].windows, pytest.approx((10.0, -9.0)))
+        np.testing.assert_array_equal(found.when.weights, batch.histories[0].weights)
+
+
+def test_a_coolant_begins_in_all_hours_that_cold_asks_for():
+    """Cold of hours 1, 2 and 4 of four: two windows, for hours that touch are one."""
+    hours = [Window("a", 3600.0 * b, 3600.0 * (b + 1)) for b in range(4)]
+    windows = [History(f"{b} h", np.kron(np.eye(2), np.eye(4)[[b]]), windows=(hour,)) for b, hour in enumerate(hours)]
+    batch = Batch("coolant", "coolant", "W/(m^2*K)", ("p",), np.arange(8)[None], tuple(windows), 1, smallest=5.0)
+    g = np.concatenate([np.full(4, 10.0), [-9.0, -9.0, 0.0, -9.0]])
+    found = chilled(Hypothesis(batch, 0, windows[2], 1.0, (10.0, -2.0), 1.0), g, np.eye(8))
+    assert found is not None
+    assert found.when.windows == (Window("a", 0.0, 7200.0), Window("a", 10800.0, 14400.0))
+    np.testing.assert_array_equal(found.when.weights, np.kron(np.eye(2), [[1.0, 1.0, 0.0, 1.0]]))
+    assert found.amplitude == pytest.approx((10.0, -9.0))
 
 
 def test_no_cold_and_no_coolant_begin_nowhere_else():

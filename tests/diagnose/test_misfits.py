@@ -39,6 +39,8 @@ def test_what_comes_and_goes_often_must_leave_nothing_anywhere(windows, left, re
     yard = small_case.yardstick()
     accepted = [in_windows(windows)]
     assert len(_restless(yard, accepted, {"elsewhere": left * yard.thresholds["unknown"]})) == restless
+    strong = [replace(accepted[0], statistic=5.1 / LEAVES * yard.thresholds["unknown"])]  # whose misfits they may be
+    assert not _restless(yard, strong, {"elsewhere": left * yard.thresholds["unknown"]})
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from twin.diagnose.verdict import limits_at, limits_of
 ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few of CI
 LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a yardstick of their own
 # Not said as it should be: `make hidden` shows it, with the long ones.
-MISSED = ("coolant", "film_gain", "initial_state", "drawn_capacity", "drawn_signal")
+MISSED = ("coolant", "film_gain", "initial_state", "drawn_signal")
 SLOW = pytest.mark.slow
 
 

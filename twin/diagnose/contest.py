@@ -19,19 +19,22 @@ from twin.diagnose.batch import Hypothesis
 from twin.diagnose.edges import STEP, Edge, edges_of, moved, with_pulses
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.growth import GROWTH
-from twin.diagnose.study import K
+from twin.diagnose.study import K, Study
 from twin.diagnose.yardstick import Yardstick
 
 BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant", "moved")
 PASSES, WINDOW_PASSES, READ_PASSES = 3, 8, 6
 ENTRANTS = 5  # candidates that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
+TANK = 0.4  # likewise of a capacity, whose straight line is the worse the larger it is
 EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
 GONE = -0.7  # of a relative change, as a straight line
 WET = 40.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
 ENOUGH = 0.02  # of a size, that a pass moves it by when it has arrived
 LESS, SHARE = 1.0, 1e-3  # likelihood-ratio units and share of a statistic: a pass that changes less is the last
+FROZEN = 0.0  # degC, below which no medium flows over a machine
 HELD = 2  # passes in which its heat and edges are found for that film, before all are free
+TRIAL = 4  # passes by which coolants are compared before the best of them are refitted
 BENDS = 2.5  # prior standard deviations that only something hidden moves a parameter by
 NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
 LOW, HIGH = -0.97, 20.0  # of relative changes: from -0.98 on the march holds a conductance, and no derivative is left
@@ -73,7 +76,8 @@ def judged(
     left: list[Hypothesis] = []
     count = 0
     for h in waiting:
-        led = bool(done) and worth(h) < (1.0 - BEHIND) * max(worth(d) for d in done)
+        behind = TANK if h.batch.kind == "capacity" else BEHIND
+        led = bool(done) and worth(h) < (1.0 - behind) * max(worth(d) for d in done)
         bent = _bent(yard, h)
         if (led and not _saturated(h)) or (bent and count >= ENTRANTS):
             left.append(h)
@@ -82,6 +86,22 @@ def judged(
         done.append(max((exact(yard, y, fitted, s) for s in starts[id(h)]), key=worth) if bent else h)
     straight = [h for h in left if not _bent(yard, h)]
     return _fair(yard, y, fitted, [*done, *straight]), [h for h in left if _bent(yard, h)]
+
+
+def tried(
+    yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
+) -> list[Sequence[Hypothesis]]:
+    """Candidates, most worthy first, of `judged`. Where a coolant leads, each coolant has been refitted for some
+    passes, from the last of its starts: a straight line through a film that saturates is wrong by tens of per cent,
+    more at the wetted face than at those behind it, which would be left aside."""
+    order = sorted(candidates, key=lambda starts: -worth(starts[0]))
+    if not order or order[0][0].batch.kind != "coolant":
+        return order
+    passed = [
+        (exact(yard, y, fitted, starts[-1], TRIAL),) if starts[0].batch.kind == "coolant" else starts
+        for starts in order
+    ]
+    return sorted(passed, key=lambda starts: -worth(starts[0]))
 
 
 def _fair(yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -109,10 +129,11 @@ def _bent(yard: Yardstick, h: Hypothesis) -> bool:
     return h.batch.kind in (*BENT, *CURVED) or (h.batch.kind not in READINGS and bool(edges_of(yard.study, h)))
 
 
-def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes: int = 0) -> Hypothesis:
     """A hypothesis with amplitudes, edges in time and statistic of the exact model, the parameters fitted with it.
 
-    y (m,): NaN where nothing was measured. What accepted causes do is added to what it does.
+    y (m,): NaN where nothing was measured. What accepted causes do is added to what it does. passes: at most, 0 for as
+    many as its kind needs.
     """
     if h.batch.kind in CURVED:
         return _read_anew(yard, fitted, h)
@@ -136,7 +157,7 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
     now = _Point(a, x0, h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
     held = HELD if h.batch.kind == "coolant" else 0
-    for i in range(held + (PASSES if not inner else WINDOW_PASSES)):
+    for i in range(passes or held + (PASSES if not inner else WINDOW_PASSES)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(yard, now, edges)
         J = jacobian(yard, now.x, [(h, float(now.a[0]))])
@@ -166,7 +187,7 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypo
             pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
             below = np.concatenate([floor - now.a, np.full(len(edges), -np.inf)])
             found = solved(F, PD.T @ left + pulled, below)
-            after = _moved(now.a, found[:q], relative, h.batch.sign)
+            after = _liquid(study, h, _moved(now.a, found[:q], relative, h.batch.sign))
             shifts = np.clip(found[q:], -STEP, STEP)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
             drift = np.clip(np.clip(nuisance, low, high) - now.x, -NEAR, NEAR)
@@ -233,6 +254,16 @@ def lowest(yard: Yardstick, h: Hypothesis) -> np.ndarray:
         own = [f for f, described in enumerate(bench.base.load_model.films) if described.name == film]  # perhaps none
         result[0] = -max(float(yard.nominal[k].total[:, own].max(initial=0.0)) for k in yard.study.fitted)
     return result
+
+
+def _liquid(study: Study, h: Hypothesis, a: np.ndarray) -> np.ndarray:
+    """(q,) amplitudes, a coolant's film no less than what takes its heat to a medium that is not FROZEN: plain cold at
+    a large face beside it imitates a coolant, from far below that."""
+    if h.batch.kind != "coolant":
+        return a
+    area = next(p.area for p in study.bench.places if p.name == h.name)
+    above = study.bench.base.reference_temperature - FROZEN
+    return np.array([max(a[0], -a[1] / (area * above)) if above > 0.0 else a[0], a[1]])
 
 
 def priors(h: Hypothesis) -> tuple[np.ndarray, np.ndarray]:

@@ -3,11 +3,13 @@ bell in every run."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from twin.diagnose.batch import RIDGE, History, Hypothesis
+from twin.diagnose.diagnosis import Window
 
 GROWTH = 12.0  # likelihood-ratio units that another window must bring
 SHARE = 0.05  # and the least share of what the others explain: a strong cause has misfits that windows imitate
@@ -55,21 +57,43 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
 
 
 def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis | None:
-    """A coolant in the window that plain cold likes best; None where it has that one, or cold explains nothing.
+    """A coolant in the windows that plain cold likes best; None where it has those, or cold explains nothing.
 
     A score takes a film for a straight line, in which cold and film cancel over hours that have neither: a window that
     is far too long can then lead. What a coolant takes away is cold, whatever its film.
     """
     if h.batch.kind != "coolant" or len(h.when.windows) == 0:
         return None
+    histories = tuple(replace(w, weights=w.weights[1:]) for w in h.batch.histories)  # of its heat
     own = g[h.batch.columns[h.place]]
-    W = np.stack([w.weights[1] for w in h.batch.histories])  # (h, L): its heat
+    W = np.concatenate([w.weights for w in histories])  # (h, L)
     num, F = W @ own, np.einsum("hl,lm,hm->h", W, block, W, optimize=True)
     statistic = np.where(num < 0.0, num**2 / (F + F.max(initial=0.0) * RIDGE + 1e-12), 0.0)
     k = int(np.argmax(statistic))
-    if statistic[k] <= 0.0 or h.batch.histories[k].windows == h.when.windows:
+    if statistic[k] <= 0.0:
         return None
-    return replace(h, when=h.batch.histories[k], amplitude=(h.amplitude[0], float(num[k] / F[k])))
+    plain = replace(h.batch, histories=histories, sign=-1, smallest=0.0)
+    found = grown(
+        Hypothesis(plain, h.place, histories[k], float(statistic[k]), (float(num[k] / F[k]),), float(F[k])), g, block
+    )
+    windows = _joined(found.when.windows)
+    if windows == h.when.windows:
+        return None
+    (heat,) = found.when.weights  # the columns of its film come first, in the same order
+    weights = np.stack([np.roll(heat, -(len(heat) // 2)), heat])
+    when = replace(found.when, weights=weights, windows=windows)
+    return replace(h, when=when, amplitude=(h.amplitude[0], found.amplitude[0]))
+
+
+def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:
+    """Windows in their order, those that touch as one."""
+    result: list[Window] = []
+    for w in windows:
+        if result and result[-1].run == w.run and w.start <= result[-1].end:
+            result[-1] = replace(result[-1], end=max(result[-1].end, w.end))
+        else:
+            result.append(w)
+    return tuple(result)
 
 
 def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:

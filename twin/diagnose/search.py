@@ -13,7 +13,7 @@ import numpy as np
 from twin.diagnose.accepted import Accepted, exchanged
 from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Hypothesis
-from twin.diagnose.contest import beginning, judged, proof
+from twin.diagnose.contest import beginning, judged, proof, tried
 from twin.diagnose.fitter import Fitted
 from twin.diagnose.growth import chilled, grown
 from twin.diagnose.hotter import hotter
@@ -71,9 +71,9 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         ]  # fmt: skip
         if not passing or len(accepted) >= most or fruitless >= TRIES or imitated:
             break
-        proved, others = judged(
-            yard, exchanged(yard.study, y, accepted), fitted, [_starts(seen, h) for h in passing[:AHEAD]]
-        )
+        ahead = [_starts(seen, h) for h in passing[:AHEAD]]
+        rest = exchanged(yard.study, y, accepted)
+        proved, others = judged(yard, rest, fitted, tried(yard, rest, fitted, ahead))
         standing = [h for h in proved if proof(yard, h) > NAMED * limits[h.family]]
         if not any(proof(yard, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
@@ -151,11 +151,11 @@ def _differ(a: Hypothesis, b: Hypothesis) -> bool:
 
 def _restless(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
     """Causes that come and go more than FEW times and leave heat anywhere: a history that no name tells."""
-    if max(parts.values(), default=0.0) <= yard.thresholds["unknown"]:
-        return []
+    left = max(parts.values(), default=0.0)
     return [
         a for a in accepted
         if len(a.hypothesis.when.windows) > FEW and a.hypothesis.when.bell is None and a.units
+        and left > max(yard.thresholds["unknown"], LEAVES * a.statistic)
     ]  # fmt: skip
 
 
