@@ -165,7 +165,9 @@ def test_where_a_coolant_leads_all_coolants_are_tried(monkeypatch):
 
     monkeypatch.setattr(contest, "exact", exact)
     nothing = np.zeros(0)
-    order = tried(None, nothing, None, [(heat,), (behind,), (wetted, cold)])
+    far = replace(wetted, statistic=0.5 * behind.statistic)
+    order = tried(None, nothing, None, [(heat,), (behind,), (wetted, cold), (far,)])
+    assert order.pop() == (far,)
     assert [starts[0].statistic for starts in order] == [1100.0, 950.0, 900.0]
     assert (order[0][0].amplitude, passes) == (cold.amplitude, [TRIAL, TRIAL])
     heat = replace(heat, statistic=2000.0)

@@ -16,7 +16,7 @@ from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.diagnosis import Window
-from twin.diagnose.search import FEW, LEAVES, LEFT, _leaking, _restless, search
+from twin.diagnose.search import DRIES, FEW, LEAVES, LEFT, _leaking, _restless, search
 from twin.diagnose.search_declared import declared_candidates
 from twin.diagnose.search_look import look
 from twin.diagnose.search_strained import LATER, closed, strained
@@ -57,6 +57,9 @@ def test_one_window_may_leave_no_heat_but_a_strong_ones_misfits(statistic, left,
     yard = replace(yard, thresholds={**yard.thresholds, "unknown": 36.0})
     one = replace(in_windows(1), statistic=statistic)
     assert len(_leaking(yard, [one], {"elsewhere": left})) == leaking
+    batch = replace(one.hypothesis.batch, kind="coolant")
+    wet = replace(one, hypothesis=replace(one.hypothesis, batch=batch))
+    assert len(_leaking(yard, [wet], {"elsewhere": left * (DRIES / LEAVES if statistic > 1e4 else 1.0)})) == leaking
     always = replace(one, hypothesis=replace(one.hypothesis, when=replace(one.hypothesis.when, windows=())))
     assert not _leaking(yard, [always], {"elsewhere": left})
 

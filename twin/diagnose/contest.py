@@ -26,7 +26,7 @@ BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant", "moved")
 PASSES, WINDOW_PASSES, READ_PASSES = 3, 8, 6
 ENTRANTS = 5  # candidates that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
-TANK = 0.4  # likewise of a capacity, whose straight line is the worse the larger it is
+SATURATES = 0.4  # likewise of capacities and of coolants' films: their straight lines are the worse the larger they are
 EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
 GONE = -0.7  # of a relative change, as a straight line
 WET = 40.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
@@ -76,7 +76,7 @@ def judged(
     left: list[Hypothesis] = []
     count = 0
     for h in waiting:
-        behind = TANK if h.batch.kind == "capacity" else BEHIND
+        behind = SATURATES if h.batch.kind == "capacity" else BEHIND
         led = bool(done) and worth(h) < (1.0 - behind) * max(worth(d) for d in done)
         bent = _bent(yard, h)
         if (led and not _saturated(h)) or (bent and count >= ENTRANTS):
@@ -91,16 +91,18 @@ def judged(
 def tried(
     yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
 ) -> list[Sequence[Hypothesis]]:
-    """Candidates, most worthy first, of `judged`. Where a coolant leads, each coolant has been refitted for some
-    passes, from the last of its starts: a straight line through a film that saturates is wrong by tens of per cent,
-    more at the wetted face than at those behind it, which would be left aside."""
+    """Candidates, most worthy first, of `judged`. Where a coolant leads, it and others within SATURATES have been
+    refitted for some passes, from the last of their starts: a straight line through a film that saturates is wrong by
+    tens of per cent, more at the wetted face than at those behind it, so that it would be left aside."""
     order = sorted(candidates, key=lambda starts: -worth(starts[0]))
     if not order or order[0][0].batch.kind != "coolant":
         return order
+    least = (1.0 - SATURATES) * worth(order[0][0])
     passed = [
-        (exact(yard, y, fitted, starts[-1], TRIAL),) if starts[0].batch.kind == "coolant" else starts
+        (exact(yard, y, fitted, starts[-1], TRIAL),)
+        if starts[0].batch.kind == "coolant" and worth(starts[0]) > least else starts
         for starts in order
-    ]
+    ]  # fmt: skip
     return sorted(passed, key=lambda starts: -worth(starts[0]))
 
 

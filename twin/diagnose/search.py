@@ -30,7 +30,8 @@ MOST = 3  # causes
 TRIES = 3  # rounds of candidates that the exact model refuses
 WINDOWS = 4  # in which a cause comes and goes at one place; what does so more often has a history that no name tells
 FEW = 2  # windows likewise that a cause may have and still leave heat where it is
-LEFT, LEAVES = 0.5, 0.005  # of the threshold of heat of any history, of its statistic: what windows may leave of it
+LEFT = 0.5  # of the threshold of heat of any history: what windows may leave of it
+LEAVES, DRIES = 0.005, 0.01  # of their statistic likewise; of a coolant, whose film saturates as the model has it
 SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
 NAMED = 0.7  # share of its own threshold that a name needs where another one passes
@@ -155,7 +156,7 @@ def _restless(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, fl
     return [
         a for a in accepted
         if len(a.hypothesis.when.windows) > FEW and a.hypothesis.when.bell is None and a.units
-        and left > max(yard.thresholds["unknown"], LEAVES * a.statistic)
+        and left > max(yard.thresholds["unknown"], _misfit(a))
     ]  # fmt: skip
 
 
@@ -166,8 +167,13 @@ def _leaking(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, flo
     return [
         a for a in accepted
         if a.hypothesis.when.windows and a.hypothesis.when.bell is None and a.units and a.hypothesis.family != "joint"
-        and left > max(LEFT * yard.thresholds["unknown"], LEAVES * a.statistic)
+        and left > max(LEFT * yard.thresholds["unknown"], _misfit(a))
     ]  # fmt: skip
+
+
+def _misfit(a: Accepted) -> float:
+    """Heat that a cause in windows may leave because the model is not the machine."""
+    return (DRIES if a.hypothesis.batch.kind == "coolant" else LEAVES) * a.statistic
 
 
 def _parts(study: Study, name: str) -> set[str]:
