@@ -14,6 +14,7 @@ from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.contest import (
     AMPLITUDE,
     EDGE,
+    ENTRANTS,
     FROZEN,
     HIGH,
     LOW,
@@ -191,6 +192,31 @@ def test_a_capacity_further_behind_is_refitted(monkeypatch):
     proved, others = judged(None, nothing, None, [(heat,), (tank,), (film,)])
     assert [h.batch.kind for h in proved] == ["moved", "capacity"]
     assert others == [film]
+
+
+def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
+    """One gains 20 % by its edges, as the other would; a refit that finds several times more is not brought back."""
+    contest = sys.modules[worth.__module__]
+    bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
+    lead, near, far = (replace(bent, statistic=s) for s in (1000.0, 900.0, 600.0))
+    nothing = np.zeros(0)
+    monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=1.2 * h.statistic))
+    proved, others = judged(None, nothing, None, [(lead,), (near,), (far,)])
+    assert ([h.statistic for h in proved], others) == ([1200.0, 1080.0], [far])
+    monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=5.0 * h.statistic))
+    proved, others = judged(None, nothing, None, [(lead,), (near,), (far,)])
+    assert ([h.statistic for h in proved], others) == ([5000.0], [near, far])
+
+
+def test_candidates_of_one_kind_do_not_keep_others_out(monkeypatch):
+    contest = sys.modules[worth.__module__]
+    bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
+    many = [replace(bent, statistic=100.0 - k) for k in range(ENTRANTS + 1)]
+    film = replace(bent, batch=replace(bent.batch, kind="film"), statistic=93.0)
+    monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: h)
+    proved, others = judged(None, np.zeros(0), None, [(h,) for h in (*many, film)])
+    assert proved == [*many[:ENTRANTS], film]
+    assert others == many[ENTRANTS:]
 
 
 def test_a_bent_calibration_is_no_place_to_begin():

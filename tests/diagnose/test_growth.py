@@ -105,5 +105,7 @@ def test_no_cold_and_no_coolant_begin_nowhere_else():
     batch, block = coolant()
     warm = np.concatenate([np.zeros(4), [9.0, 1.0, 1.0, 1.0]])
     assert chilled(Hypothesis(batch, 0, batch.histories[1], 1.0, (10.0, 2.0), 1.0), warm, block) is None
+    hot = np.concatenate([np.zeros(4), [9.0, -3.0, -3.0, -2.0]])  # more than cold of the last three hours
+    assert chilled(Hypothesis(batch, 0, batch.histories[2], 1.0, (10.0, 2.0), 1.0), hot, block) is None
     heat, block = coolant("heat")
     assert chilled(Hypothesis(heat, 0, heat.histories[1], 1.0, (10.0, 2.0), 1.0), -warm, block) is None

@@ -101,7 +101,7 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
     x0, covariance = settled(yard, y, ())
     declared = declared_candidates(yard, y, fitted)
     seen, ranked, step = look(yard, fitted, declared)
-    relaxed = strained(yard, y, fitted, x0, covariance)
+    relaxed = strained(yard, y, fitted, x0, covariance, look(yard, fitted))
     assert relaxed is not None
     module = sys.modules[closed.__module__]
     monkeypatch.setattr(module, "misfit", lambda *_: 0.0)  # the number itself removes nothing of what was left

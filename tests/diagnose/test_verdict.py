@@ -14,7 +14,8 @@ from twin.diagnose.accepted import parameter_of
 from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.search import search
-from twin.diagnose.search_strained import PULLED, strained
+from twin.diagnose.search_look import look
+from twin.diagnose.search_strained import FAINT, PULLED, strained
 from twin.diagnose.verdict import (
     CALIBRATED,
     STRAINED,
@@ -94,7 +95,8 @@ def test_films_without_a_declared_gain_are_not_asked_for_it():
     assert parameter_of(other.study, film) is None
     n = len(told)
     y = np.concatenate([yard.study.outputs(k, np.zeros(n)) for k in yard.study.fitted])
-    assert strained(other, y, yard.fitter(y), np.zeros(n), 0.5 * np.eye(n)) is None
+    fitted = yard.fitter(y)
+    assert strained(other, y, fitted, np.zeros(n), 0.5 * np.eye(n), look(yard, fitted)) is None
 
 
 def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch):
@@ -105,11 +107,14 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     x[j] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
     fitted, half = yard.fitter(y), 0.5 * np.eye(len(x))
-    assert strained(yard, y, fitted, x, half) is not None
+    glance = look(yard, fitted)
+    assert strained(yard, y, fitted, x, half, glance) is not None
+    much = replace(glance[1][0], statistic=10.0 / FAINT * glance[1][0].statistic)
+    assert strained(yard, y, fitted, x, half, (glance[0], [much], glance[2])) is None  # that would be left
     module = sys.modules[strained.__module__]
     gone = lambda *a: (fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
     monkeypatch.setattr(module, "refit", gone)
-    assert strained(yard, y, fitted, x, half) is None
+    assert strained(yard, y, fitted, x, half, glance) is None
 
 
 def test_contacts_that_calibration_strains_are_told_with_what_they_became():

@@ -8,6 +8,7 @@ they really remove. Conductances move in t = a / (1 + a), in which temperatures 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +25,7 @@ from twin.diagnose.yardstick import Yardstick
 
 BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant", "moved")
 PASSES, WINDOW_PASSES, READ_PASSES = 3, 8, 6
-ENTRANTS = 5  # candidates that are refitted
+ENTRANTS = 5  # candidates of a kind that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
 SATURATES = 0.4  # likewise of capacities and of coolants' films: their straight lines are the worse the larger they are
 EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
@@ -67,23 +68,28 @@ def judged(
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Candidates, most worthy first: those whose statistics are exact, and the others.
 
-    Those that are bent or have edges are refitted, until one leads all others by a share of BEHIND. A candidate may
-    have several starts, of which the first has its score: it is the worthiest that they end at.
+    Those that are bent or have edges are refitted, until one leads all others by a share of BEHIND: by what both score
+    before they are refitted, for windows with fitted edges gain by it what others would gain, too. A candidate may have
+    several starts, of which the first has its score: it is the worthiest that they end at.
     """
     starts = {id(first): (first, *more) for first, *more in candidates}
     waiting = sorted((c[0] for c in candidates), key=worth, reverse=True)
     done: list[Hypothesis] = []
     left: list[Hypothesis] = []
-    count = 0
+    lead, leads_by, count = -np.inf, -np.inf, Counter[str]()
     for h in waiting:
         behind = SATURATES if h.batch.kind == "capacity" else BEHIND
-        led = bool(done) and worth(h) < (1.0 - behind) * max(worth(d) for d in done)
+        led = worth(h) < (1.0 - behind) * leads_by
         bent = _bent(yard, h)
-        if (led and not _saturated(h)) or (bent and count >= ENTRANTS):
+        if (led and not _saturated(h)) or (bent and count[h.batch.kind] >= ENTRANTS):
             left.append(h)
             continue
-        count += bent
-        done.append(max((exact(yard, y, fitted, s) for s in starts[id(h)]), key=worth) if bent else h)
+        count[h.batch.kind] += bent
+        now = max((exact(yard, y, fitted, s) for s in starts[id(h)]), key=worth) if bent else h
+        if worth(now) > lead:
+            lead = worth(now)
+            leads_by = min(lead, max(worth(h), (1.0 - SATURATES) * lead))
+        done.append(now)
     straight = [h for h in left if not _bent(yard, h)]
     return _fair(yard, y, fitted, [*done, *straight]), [h for h in left if _bent(yard, h)]
 

@@ -57,32 +57,39 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
 
 
 def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis | None:
-    """A coolant in the windows that plain cold likes best; None where it has those, or cold explains nothing.
+    """A coolant in the windows that plain cold likes best; None where it has those, or heat explains more than cold.
 
     A score takes a film for a straight line, in which cold and film cancel over hours that have neither: a window that
     is far too long can then lead. What a coolant takes away is cold, whatever its film.
     """
     if h.batch.kind != "coolant" or len(h.when.windows) == 0:
         return None
-    histories = tuple(replace(w, weights=w.weights[1:]) for w in h.batch.histories)  # of its heat
+    cold, hot = _plain(h, g, block, -1), _plain(h, g, block, 1)
+    if cold is None or (hot is not None and hot.statistic > cold.statistic):
+        return None
+    windows = _joined(cold.when.windows)
+    if windows == h.when.windows:
+        return None
+    (heat,) = cold.when.weights  # the columns of its film come first, in the same order
+    weights = np.stack([np.roll(heat, -(len(heat) // 2)), heat])
+    return replace(
+        h, when=replace(cold.when, weights=weights, windows=windows), amplitude=(h.amplitude[0], cold.amplitude[0])
+    )
+
+
+def _plain(h: Hypothesis, g: np.ndarray, block: np.ndarray, sign: int) -> Hypothesis | None:
+    """A coolant's heat of one sign without its film, in the windows that it likes best; None if it explains nothing."""
+    histories = tuple(replace(w, weights=w.weights[1:]) for w in h.batch.histories)
     own = g[h.batch.columns[h.place]]
     W = np.concatenate([w.weights for w in histories])  # (h, L)
     num, F = W @ own, np.einsum("hl,lm,hm->h", W, block, W, optimize=True)
-    statistic = np.where(num < 0.0, num**2 / (F + F.max(initial=0.0) * RIDGE + 1e-12), 0.0)
+    statistic = np.where(sign * num > 0.0, num**2 / (F + F.max(initial=0.0) * RIDGE + 1e-12), 0.0)
     k = int(np.argmax(statistic))
     if statistic[k] <= 0.0:
         return None
-    plain = replace(h.batch, histories=histories, sign=-1, smallest=0.0)
-    found = grown(
-        Hypothesis(plain, h.place, histories[k], float(statistic[k]), (float(num[k] / F[k]),), float(F[k])), g, block
-    )
-    windows = _joined(found.when.windows)
-    if windows == h.when.windows:
-        return None
-    (heat,) = found.when.weights  # the columns of its film come first, in the same order
-    weights = np.stack([np.roll(heat, -(len(heat) // 2)), heat])
-    when = replace(found.when, weights=weights, windows=windows)
-    return replace(h, when=when, amplitude=(h.amplitude[0], found.amplitude[0]))
+    batch = replace(h.batch, histories=histories, sign=sign, smallest=0.0)
+    amplitude = float(num[k] / F[k])
+    return grown(Hypothesis(batch, h.place, histories[k], float(statistic[k]), (amplitude,), float(F[k])), g, block)
 
 
 def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:

@@ -48,7 +48,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     x0, covariance = settled(yard, y, ())
     declared = declared_candidates(yard, y, fitted)
     glance = look(yard, fitted, declared)
-    relaxed = strained(yard, y, fitted, x0, covariance)
+    relaxed = strained(yard, y, fitted, x0, covariance, glance)
     if relaxed and (ended := closed(yard, y, fitted, declared, glance, relaxed, x0)):
         return ended
     accepted, steps = list[Accepted](), list[Step]()

@@ -12,7 +12,7 @@ import numpy as np
 
 from twin.diagnose.accepted import Accepted, freed, parameter_of, readings_columns
 from twin.diagnose.acted import CONDUCTS, units_of
-from twin.diagnose.batch import Hypothesis
+from twin.diagnose.batch import Hypothesis, score
 from twin.diagnose.contest import beginning, misfit
 from twin.diagnose.fitter import Fitted
 from twin.diagnose.refit import WIDE, refit
@@ -31,6 +31,7 @@ ALIKE = 0.9  # cosine of what a signal's factor and a declared number do, from w
 SAME = 0.998  # cosine likewise of what is read nowhere else
 DISTANT = 1.0  # logarithm of a source's factor, beyond which derivatives of the described machine say little
 FORM = 0.1  # of the logarithm of a source's factor, that a wrong form of the model takes
+FAINT = 0.2  # of what explains most: a declared number that scores less leaves that, whatever it is freed to
 FAR = 2  # numbers that are freed, each alone: the farthest may be another one's doing
 OTHERS = 12  # other explanations that are looked at
 
@@ -107,12 +108,13 @@ def _weak(yard: Yardstick, ranked: Sequence[Hypothesis], misfits: float) -> bool
 
 
 def strained(
-    yard: Yardstick, y: np.ndarray, fitted: Fitted, x0: np.ndarray, covariance: np.ndarray
-) -> tuple[Fitted, Accepted] | None:
+    yard: Yardstick, y: np.ndarray, fitted: Fitted, x0: np.ndarray, covariance: np.ndarray,
+    glance: tuple[Sight, list[Hypothesis], Step],
+) -> tuple[Fitted, Accepted] | None:  # fmt: skip
     """Of the declared numbers that calibration moves farthest the one that leaves least, freed of its tolerance.
 
-    None if all are within. x0 (n,), covariance (n, n): settled. Where tolerances are right, x0 has the variance
-    1 - covariance.
+    None if all are within, or what was seen at a glance explains so much more that it would be left. x0 (n,),
+    covariance (n, n): settled. Where tolerances are right, x0 has the variance 1 - covariance.
     """
     variance = np.diag(covariance)
     pulls = np.where(variance < TOLD, x0 / np.sqrt(np.maximum(1.0 - variance, 1.0 - TOLD)), 0.0)
@@ -129,8 +131,23 @@ def strained(
             likelihood = float((PULLED * strain[j]) ** 2)
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(yard.study.scale[j] ** -2.0)))
     far = sorted((h for h in found if h.statistic >= PULLED**2), key=lambda h: -h.statistic)
-    freed_ones = [made for h in far[:FAR] if (made := _freed(yard, y, fitted, h))]
+    seen, ranked, _ = glance
+    least = FAINT * ranked[0].statistic if ranked else 0.0
+    near = [h for h in far[:FAR] if _scored(yard, fitted, seen, h) > least]
+    freed_ones = [made for h in near if (made := _freed(yard, y, fitted, h))]
     return min(freed_ones, key=lambda made: misfit(yard, made[0]), default=None)
+
+
+def _scored(yard: Yardstick, fitted: Fitted, seen: Sight, h: Hypothesis) -> float:
+    """What a declared number scores by its derivative, and a contact by its response when it is nearly gone."""
+    own = next(own for own in seen.ready if own.batch is h.batch)
+    best = float(score(own, seen.g).statistic[h.place].max())
+    name = (h.batch.kind, h.name.removeprefix("contacts."))
+    if name in yard.lost.names:
+        D = yard.lost.responses[:, yard.lost.names.index(name)]
+        P = fitted.projector(D)
+        best = max(best, float(P @ yard.whiten(fitted.residual)) ** 2 / max(float(D @ P), 1e-30))
+    return best
 
 
 def _freed(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
