@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.accepted import Accepted
 from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.contest import (
@@ -34,6 +35,7 @@ from twin.diagnose.contest import (
 )
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.growth import GROWTH
+from twin.diagnose.verdict import OWN, cause_of
 
 
 def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
@@ -244,3 +246,15 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
     assert refitted == [straight]
     assert contest._fair(None, nothing, None, [straight, far]) == [straight, far]  # nothing near it was refitted
     assert refitted == [straight]
+
+
+@pytest.mark.parametrize(("film", "wrong"), [(WET / 2.0, WET), (2.0 * WET, 2.0 * WET)])
+def test_a_coolants_film_has_an_error_of_form_of_its_own(film, wrong):
+    """As a share of it, but of no less than the film that is presumed."""
+    yard = small_case.yardstick()
+    h = a_coolant(0, film, -10.0)
+    cause = cause_of(
+        Accepted(h, units_of(yard.study, h), np.array([film, -10.0]), np.zeros((2, 2)), 100.0, 36.0, ()), yard.study
+    )
+    assert cause.amplitude == film
+    np.testing.assert_allclose(cause.ci95, film + 1.96 * OWN["coolant"] * wrong * np.array([-1.0, 1.0]))

@@ -133,7 +133,8 @@ def strained(
     far = sorted((h for h in found if h.statistic >= PULLED**2), key=lambda h: -h.statistic)
     seen, ranked, _ = glance
     least = FAINT * ranked[0].statistic if ranked else 0.0
-    near = [h for h in far[:FAR] if _scored(yard, fitted, seen, h) > least]
+    # a film many times as large scores hardly anything by its derivative: it is freed whatever it scores
+    near = [h for h in far[:FAR] if h.batch.kind == "group" or _scored(yard, fitted, seen, h) > least]
     freed_ones = [made for h in near if (made := _freed(yard, y, fitted, h))]
     return min(freed_ones, key=lambda made: misfit(yard, made[0]), default=None)
 
