@@ -38,7 +38,7 @@ OWN = {
     "group": 0.12,
     "gain": 0.1,
     "group_film": 0.12,
-    "coolant": 0.3,  # at least of WET: in campaigns films between 30 and 120 W/(m^2 K) came out some 18 too small
+    "coolant": 0.3,  # at least of WET: in campaigns films between 30 and 120 W/(m^2 K) came out some 20 too small
     "scale": 0.12,
     "moved": 0.2,
     "capacity": 0.1,
