@@ -154,7 +154,7 @@ def test_no_medium_is_frozen():
     np.testing.assert_array_equal(_liquid(yard.study, plain, np.array([-1e9])), [-1e9])
 
 
-def test_where_a_coolant_leads_all_coolants_are_tried(monkeypatch):
+def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
     """A straight line ranks the face behind first; after some passes from its last start the wetted one leads."""
     contest = sys.modules[worth.__module__]
     behind, wetted = (replace(a_coolant(p, 5.0, -1.0), statistic=s) for p, s in ((0, 1000.0), (1, 700.0)))
