@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnose.acted import CONDUCTS, Unit, slots_with
+from twin.diagnose.acted import CONDUCTS, Unit, slots_with, units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.fitter import bounds
 from twin.diagnose.readings import lagged, late, play
@@ -58,12 +58,15 @@ def jacobian(
     """(m, n) derivatives by the parameters at x (n,), with causes of these amplitudes.
 
     The surrogate knows nothing of causes, and a film of nine times its size changes what every other parameter does:
-    those that take a parameter's place are put there. Conductances beyond their bounds, where no surrogate holds, get
-    derivatives made anew, unless there are some from `before`. A number's own column is left empty.
+    those that take a parameter's place are put there. Conductances beyond their bounds, where no surrogate holds, and
+    beside a signal that is corrected, get derivatives made anew, unless there are some from `before`. A number's own
+    column is left empty.
     """
     study = yard.study
     low, high = bounds(study)
-    there, held, beyond = x.copy(), list[int](), False
+    there, held = x.copy(), list[int]()
+    corrected = [(h, amplitude) for h, amplitude in causes if h.batch.kind == "signal"]
+    beyond = bool(corrected)
     for h, amplitude in causes:
         for j in freed(study, h):
             size = amplitude if h.batch.kind == "gain" else float(np.log1p(amplitude))
@@ -75,7 +78,11 @@ def jacobian(
     elif before is not None:
         J = before
     else:
-        J = np.vstack([study.jacobian(k, there)[:, : len(x)] for k in study.fitted])
+        units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
+        J = np.vstack([
+            study.jacobian(k, there, slots_with(study, yard.elements, units, k), sizes)[:, : len(x)]
+            for k in study.fitted
+        ])  # fmt: skip
     J[:, held] = 0.0
     return J
 

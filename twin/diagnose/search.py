@@ -18,9 +18,9 @@ from twin.diagnose.fitter import Fitted
 from twin.diagnose.growth import chilled, grown
 from twin.diagnose.hotter import hotter
 from twin.diagnose.refit import refit
-from twin.diagnose.search_declared import declared_candidates
+from twin.diagnose.search_declared import declared_candidates, declared_exactly
 from twin.diagnose.search_look import Search, Step, cosines, look
-from twin.diagnose.search_strained import COVERS, LATER, NEAR, closed, strained
+from twin.diagnose.search_strained import COVERS, LATER, NEAR, PULLED, closed, strained
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight
 from twin.diagnose.study import K, Study
@@ -49,6 +49,10 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     declared = declared_candidates(yard, y, fitted)
     glance = look(yard, fitted, declared)
     relaxed = strained(yard, y, fitted, x0, covariance, glance)
+    alarm = any(h.statistic > yard.thresholds[h.family] for h in glance[1])
+    if alarm or relaxed or np.abs(x0).max(initial=0.0) > PULLED:  # without, nothing is said at all
+        declared = declared_exactly(yard, y, fitted)
+        glance = look(yard, fitted, declared)
     if relaxed and (ended := closed(yard, y, fitted, declared, glance, relaxed, x0)):
         return ended
     accepted, steps = list[Accepted](), list[Step]()

@@ -3,37 +3,114 @@
 A current of twice what the log says is four times the heat of a motor, and calibration finds a gain of four. Beside
 that fit the right factor explains nothing more. So every factor is given a fit of its own, which begins at the
 description, and counts by how much less misfit it leaves than calibration without it.
+
+To first order that says which factors are worth a try, and not what they explain: with four times the heat a film or a
+joint near the motor counts four times as much. Those few are fitted with the model that has the corrected signal.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from twin.diagnose.accepted import parameter_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import misfit
 from twin.diagnose.fitter import Fitted, bounds
+from twin.diagnose.march import loads_for
+from twin.diagnose.study import Planned, Study
 from twin.diagnose.yardstick import Yardstick
+from twin.rom.drive import Drive, evaluate
 
-CLOSELY = 3  # factors that are looked at again where their parameters are
+CLOSELY = 3  # factors that are looked at again where their parameters are; likewise of a signal, fitted exactly
+SIGNALS = 2  # of which any is fitted exactly
 PASSES = 4
+EXACT = 3  # passes likewise of the model with a corrected signal
 
 
 def declared_candidates(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
-    """Exact factors of signals that leave less misfit than the fit without a cause does."""
+    """Exact factors of signals that leave less misfit than the fit without a cause does, to first order."""
     before, found = misfit(yard, fitted), []
+    for h, D in _promising(yard, y)[:CLOSELY]:
+        statistic = before - _fitted_with(yard, y, D)
+        if statistic > 0.0:
+            found.append(replace(h, statistic=statistic))
+    return found
+
+
+def declared_exactly(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
+    """Likewise with the model that has the corrected signal: the best factor of each of the SIGNALS most promising, and
+    where that explains and where that explains half of what a signal must, CLOSELY of them; less does not count."""
+    before, found = misfit(yard, fitted), list[Hypothesis]()
+    factors = dict[str, list[Hypothesis]]()
+    for h, _ in _promising(yard, y):
+        factors.setdefault(h.name.split("*")[0], []).append(h)
+    for name, own in list(factors.items())[:SIGNALS]:
+        for h in own[:CLOSELY]:
+            corrected = with_signal(yard.study, name.removeprefix("signals."), float(h.name.split("*")[1]))
+            least = 0.5 * yard.thresholds[h.family]
+            statistic = before - _fitted_by(yard, y, corrected, before - least)
+            if statistic < least:
+                break
+            found.append(replace(h, statistic=statistic))
+    return found
+
+
+def with_signal(study: Study, signal: str, factor: float) -> Study:
+    """The fitted runs as if the logged values of a signal were larger by a factor."""
+    runs = [_corrected(study, p, signal, factor) if k in study.fitted else p for k, p in enumerate(study.runs)]
+    return replace(study, runs=tuple(runs))
+
+
+def _corrected(study: Study, planned: Planned, signal: str, factor: float) -> Planned:
+    base, run = study.bench.base, planned.run
+    if signal not in run.signals:
+        return planned
+    signals = {n: values * (factor if n == signal else 1.0) for n, values in run.signals.items()}
+    more, less = (_evaluated(study, run.drive, values) for values in (signals, run.signals))
+    drive = _sum(run.drive, more, less, list(base.load_model.contact_sources))
+    return replace(planned, run=replace(run, drive=drive, signals=signals, loads=loads_for(base, drive)))
+
+
+def _evaluated(study: Study, drive: Drive, signals: dict[str, np.ndarray]) -> Drive:
+    """From means over the steps of a drive, which know nothing of what happens within them."""
+    dt = float(drive.time[1] - drive.time[0])
+    return evaluate(study.bench.base.load_model, drive.time[:-1], signals, dt, drive.n_steps)
+
+
+def _sum(drive: Drive, more: Drive, less: Drive, moving: list[int]) -> Drive:
+    """What laws of sources and films say in a drive, and by how much more they say it in another than in a third.
+
+    moving: sources at contacts, whose heat goes where the pads of the first drive are.
+    """
+    power = drive.power + more.power - less.power
+    ratio = (power / np.where(drive.power != 0.0, drive.power, 1.0))[:, moving]
+    return replace(
+        drive,
+        power=power,
+        contact_heat=drive.contact_heat * ratio[:, :, None],
+        theta=drive.theta + more.theta - less.theta,
+        films=replace(drive.films, value=drive.films.value + more.films.value - less.films.value),
+        losses=replace(drive.losses, value=drive.losses.value + more.losses.value - less.losses.value),
+    )
+
+
+def _promising(yard: Yardstick, y: np.ndarray) -> list[tuple[Hypothesis, np.ndarray]]:
+    """Factors and their white responses (m,), first those that leave least beside the description, to first order."""
+    found = []
     for batch in yard.columns.batches:
         if batch.kind != "signal":
             continue
         D = yard.columns.raw[:, batch.columns[:, 0]].astype(float)
-        f, J = yard.fitter.surrogate.at(np.zeros_like(fitted.x))
-        projector, white = yard.fitter.projector(J), yard.whiten(y - f)
-        left = white[:, None] - D
-        order = np.argsort((left * projector(left)).sum(axis=0))
-        for i in order[:CLOSELY]:
-            statistic = before - _fitted_with(yard, y, D[:, i])
-            if statistic > 0.0:
-                found.append(Hypothesis(batch, int(i), batch.histories[0], statistic, (1.0,), 0.0))
-    return found
+        f, J = yard.fitter.surrogate.at(np.zeros(len(yard.study.bench.parameters)))
+        left = yard.whiten(y - f)[:, None] - D
+        remains = (left * yard.fitter.projector(J)(left)).sum(axis=0)
+        found += [
+            (float(remains[i]), Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), D[:, i])
+            for i in range(len(batch.places))
+        ]
+    return [(h, D) for _, h, D in sorted(found, key=lambda made: made[0])]
 
 
 def _fitted_with(yard: Yardstick, y: np.ndarray, change: np.ndarray) -> float:
@@ -47,3 +124,45 @@ def _fitted_with(yard: Yardstick, y: np.ndarray, change: np.ndarray) -> float:
         left = float(white @ projector(white))
         x = np.clip(projector.most_likely(white)[: len(x)], low, high)
     return left
+
+
+def _fitted_by(yard: Yardstick, y: np.ndarray, study: Study, enough: float) -> float:
+    """The misfit of a study with other loads, parameters fitted. Where it is below `enough`, with exact derivatives."""
+    low, high = bounds(study)
+    x, hotter, left = np.zeros(len(low)), _gains(yard.study, study), np.inf
+    for i in range(EXACT + 1):
+        if i < EXACT:
+            J = yard.fitter.surrogate.at(x + hotter)[1]
+        elif left < enough:
+            J = np.vstack([study.jacobian(k, x)[:, : len(x)] for k in study.fitted])
+        else:
+            break
+        projector = yard.fitter.projector(J)
+        white = yard.whiten(y - np.concatenate([study.outputs(k, x) for k in study.fitted]) + J @ x)
+        left = float(white @ projector(white))
+        x = np.clip(projector.most_likely(white)[: len(x)], low, high)
+    return left
+
+
+def _gains(described: Study, corrected: Study) -> np.ndarray:
+    """(n,) prior standard deviations by which sources of the description would be moved to emit what they do with
+    corrected loads: parameters do there nearly what they do here."""
+    before, after = _emitted(described), _emitted(corrected)
+    result = np.zeros(len(described.bench.parameters))
+    for source, was, now in zip(described.bench.base.load_model.sources, before, after, strict=True):
+        j = parameter_of(described, f"sources.{source.name}")
+        if j is not None and was > 0.0 and now > 0.0:
+            result[j] = np.log(now / was) / described.scale[j]
+    return result
+
+
+def _emitted(study: Study) -> np.ndarray:
+    """(n_sources,) J of the fitted runs, at the temperatures in the middle of the tables of losses that follow one."""
+    total = np.zeros(len(study.bench.base.load_model.sources))
+    for k in study.fitted:
+        drive = study.runs[k].run.drive
+        step = float(drive.time[1] - drive.time[0])
+        total += step * drive.power.sum(axis=0)
+        following = drive.losses.value[:, :, drive.losses.value.shape[2] // 2].sum(axis=0)
+        total[list(drive.losses.index)] += step * following
+    return total

@@ -160,7 +160,7 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
 def _part(name: str) -> str:
     """What a place belongs to: the first part of its name, or all of a name of the description."""
     head = name.split(".")[0]
-    return name.split(">")[0].split("<")[0] if head in KINDS else head
+    return name.split(">")[0].split("<")[0].split("*")[0] if head in KINDS else head
 
 
 def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tuple[Cause, ...]]:

@@ -1,0 +1,101 @@
+"""A signal declared wrongly is judged by the model that has it corrected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from twin.calibrate.measured import measured
+from twin.diagnose.accepted import jacobian
+from twin.diagnose.acted import slots_with, units_of
+from twin.diagnose.bench import make_bench
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.contest import misfit
+from twin.diagnose.search import search
+from twin.diagnose.search_declared import declared_candidates, declared_exactly, with_signal
+from twin.diagnose.study import Study, make_study
+from twin.diagnose.verdict import verdict_of
+from twin.machine.parameters import parameters
+
+
+@cache
+def logged(signal: str, factor: float) -> Study:
+    """The study of runs whose logs have a signal larger by a factor."""
+    runs = tuple(
+        replace(run, loads=replace(run.loads, columns={
+            name: values * (factor if name == signal else 1.0) for name, values in run.loads.columns.items()
+        }))
+        for run in small_case.runs()
+    )  # fmt: skip
+    machine = small_case.machine()
+    bench = make_bench(machine, parameters(machine), runs)
+    return make_study(
+        bench, [measured(bench.base, run, b.drive, b.name) for run, b in zip(runs, bench.runs, strict=True)], range(2)
+    )
+
+
+def outputs(study: Study, x: np.ndarray) -> np.ndarray:
+    return np.concatenate([study.outputs(k, x) for k in study.fitted])
+
+
+def of_another(signal: str) -> np.ndarray:
+    """(m,) of a machine whose parameters are not quite the declared ones, and a signal of which was twice as large as
+    the log says."""
+    study = logged(signal, 2.0)
+    rng = np.random.default_rng(4)
+    x, parts = 0.5 * rng.standard_normal(len(study.bench.parameters)), []
+    for k in study.fitted:
+        (b, s), (rows, _) = study.runs[k].shapes
+        sigma = np.repeat([small_case.NOISE / np.sqrt(5), small_case.TCP_NOISE], [b * s, 3 * rows])
+        parts.append(study.outputs(k, x) + sigma * rng.standard_normal(len(sigma)))
+    return np.concatenate(parts)
+
+
+@pytest.mark.parametrize(("signal", "factor"), [("spindle_current", 2.0), ("x_speed", 0.5), ("spindle_speed", 1.0)])
+def test_a_corrected_signal_is_what_a_log_of_it_would_have_given(signal, factor):
+    study, described = logged(signal, factor), small_case.study()
+    x = 0.5 * np.random.default_rng(1).standard_normal(len(study.bench.parameters))
+    corrected = outputs(with_signal(described, signal, factor), x)
+    np.testing.assert_allclose(corrected, outputs(study, x), rtol=1e-9, atol=1e-15)
+    assert np.allclose(corrected, outputs(described, x), rtol=1e-9) == (factor == 1.0)
+
+
+def test_the_right_factor_explains_most_where_straight_lines_prefer_another():
+    yard, y = small_case.yardstick(), of_another("spindle_speed")
+    fitted = yard.fitter(y)
+    exact = {h.name: h.statistic for h in declared_exactly(yard, y, fitted)}
+    line = {h.name: h.statistic for h in declared_candidates(yard, y, fitted)}
+    right = "signals.spindle_speed*2"
+    assert max(exact, key=lambda name: exact[name]) == right != max(line, key=lambda name: line[name])
+    numbers = int(np.isfinite(y).sum())
+    assert misfit(yard, fitted) - exact[right] < numbers + 4.0 * np.sqrt(2.0 * numbers)  # noise
+
+
+def test_it_is_named_and_its_other_factors_are_no_other_explanation():
+    found = search(small_case.yardstick(), of_another("spindle_speed"))
+    verdict, (cause,) = verdict_of(found, FAMILIES)
+    assert (verdict, cause.family, cause.place, cause.amplitude) == ("signal", "signal", "signals.spindle_speed", 2.0)
+    assert {r.place for r in cause.rivals} == {"signals.spindle_speed"}
+
+
+def test_a_loss_that_does_the_same_has_the_signal_for_a_rival():
+    """A current that one winding alone reads: no data tell twice the current from four times the resistance."""
+    verdict, (cause,) = verdict_of(search(small_case.yardstick(), of_another("spindle_current")), FAMILIES)
+    assert (verdict, cause.family, cause.place) == ("ambiguous", "loss_law", "sources.motor")
+    assert "signals.spindle_current" in {r.place for r in cause.rivals}
+
+
+def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
+    yard = small_case.yardstick()
+    study = yard.study
+    y = of_another("spindle_current")
+    h = declared_exactly(yard, y, yard.fitter(y))[0]
+    x = np.zeros(len(study.bench.parameters))
+    slots = [slots_with(study, yard.elements, units_of(study, h), k) for k in study.fitted]
+    anew = np.vstack([study.jacobian(k, x, s, [1.0])[:, : len(x)] for k, s in zip(study.fitted, slots, strict=True)])
+    np.testing.assert_allclose(jacobian(yard, x, [(h, 1.0)]), anew, rtol=1e-9, atol=1e-15)
+    assert not np.allclose(anew, yard.fitter.surrogate.at(x)[1], rtol=0.2)
