@@ -51,7 +51,8 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     relaxed = strained(yard, y, fitted, x0, covariance, glance)
     alarm = any(h.statistic > yard.thresholds[h.family] for h in glance[1])
     if alarm or relaxed or np.abs(x0).max(initial=0.0) > PULLED:  # without, nothing is said at all
-        declared = declared_exactly(yard, y, fitted)
+        exact = {h.name: h for h in declared_exactly(yard, y, fitted)}
+        declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
         glance = look(yard, fitted, declared)
     if relaxed and (ended := closed(yard, y, fitted, declared, glance, relaxed, x0)):
         return ended

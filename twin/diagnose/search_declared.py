@@ -40,8 +40,8 @@ def declared_candidates(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[
 
 
 def declared_exactly(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
-    """Likewise with the model that has the corrected signal: the best factor of each of the SIGNALS most promising, and
-    where that explains and where that explains half of what a signal must, CLOSELY of them; less does not count."""
+    """Likewise with the model that has the corrected signal, also those that explain nothing: the best factor of each of
+    the SIGNALS most promising, and where that explains half of what a signal must, CLOSELY of them."""
     before, found = misfit(yard, fitted), list[Hypothesis]()
     factors = dict[str, list[Hypothesis]]()
     for h, _ in _promising(yard, y):
@@ -51,9 +51,9 @@ def declared_exactly(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hyp
             corrected = with_signal(yard.study, name.removeprefix("signals."), float(h.name.split("*")[1]))
             least = 0.5 * yard.thresholds[h.family]
             statistic = before - _fitted_by(yard, y, corrected, before - least)
+            found.append(replace(h, statistic=max(statistic, 0.0)))
             if statistic < least:
                 break
-            found.append(replace(h, statistic=statistic))
     return found
 
 
