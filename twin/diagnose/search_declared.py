@@ -40,8 +40,8 @@ def declared_candidates(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[
 
 
 def declared_exactly(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
-    """Likewise with the model that has the corrected signal, also those that explain nothing: the best factor of each of
-    the SIGNALS most promising, and where that explains half of what a signal must, CLOSELY of them."""
+    """Likewise with the model that has the corrected signal, and also those that explain nothing: the best factor of
+    each of the SIGNALS most promising; where that explains half of what a signal must, CLOSELY of them."""
     before, found = misfit(yard, fitted), list[Hypothesis]()
     factors = dict[str, list[Hypothesis]]()
     for h, _ in _promising(yard, y):
