@@ -66,14 +66,14 @@ def jacobian(
     low, high = bounds(study)
     there, held = x.copy(), list[int]()
     corrected = [(h, amplitude) for h, amplitude in causes if h.batch.kind == "signal"]
-    beyond = bool(corrected)
+    anew = bool(corrected)
     for h, amplitude in causes:
         for j in freed(study, h):
             size = amplitude if h.batch.kind == "gain" else float(np.log1p(amplitude))
             there[j] = size / study.scale[j]
             held.append(j)
-            beyond |= h.batch.kind != "gain" and not low[j] <= there[j] <= high[j]
-    if not beyond:
+            anew |= h.batch.kind != "gain" and not low[j] <= there[j] <= high[j]
+    if not anew:
         J = yard.fitter.surrogate.at(there)[1]
     elif before is not None:
         J = before
