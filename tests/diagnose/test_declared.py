@@ -8,17 +8,20 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.calibrate import lumped_case
 from tests.diagnose import small_case
 from twin.calibrate.measured import measured
-from twin.diagnose.accepted import jacobian
+from twin.diagnose.accepted import Accepted, jacobian
 from twin.diagnose.acted import slots_with, units_of
+from twin.diagnose.batch import Hypothesis
 from twin.diagnose.bench import make_bench
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.contest import misfit
-from twin.diagnose.search import search
-from twin.diagnose.search_declared import declared_candidates, declared_exactly, with_signal
+from twin.diagnose.search import _reads, search
+from twin.diagnose.search_declared import declared_candidates, declared_exactly, misplaced_candidates, with_signal
 from twin.diagnose.study import Study, make_study
 from twin.diagnose.verdict import verdict_of
+from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 
 
@@ -47,12 +50,16 @@ def of_another(signal: str) -> np.ndarray:
     the log says."""
     study = logged(signal, 2.0)
     rng = np.random.default_rng(4)
-    x, parts = 0.5 * rng.standard_normal(len(study.bench.parameters)), []
+    return with_noise(study, outputs(study, 0.5 * rng.standard_normal(len(study.bench.parameters))), rng)
+
+
+def with_noise(study: Study, flat: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Outputs (m,) of the fitted runs as sensors and probes read them."""
+    sigma = []
     for k in study.fitted:
         (b, s), (rows, _) = study.runs[k].shapes
-        sigma = np.repeat([small_case.NOISE / np.sqrt(5), small_case.TCP_NOISE], [b * s, 3 * rows])
-        parts.append(study.outputs(k, x) + sigma * rng.standard_normal(len(sigma)))
-    return np.concatenate(parts)
+        sigma.append(np.repeat([small_case.NOISE / np.sqrt(5), small_case.TCP_NOISE], [b * s, 3 * rows]))
+    return flat + np.concatenate(sigma) * rng.standard_normal(len(flat))
 
 
 @pytest.mark.parametrize(("signal", "factor"), [("spindle_current", 2.0), ("x_speed", 0.5), ("spindle_speed", 1.0)])
@@ -89,6 +96,17 @@ def test_a_loss_that_does_the_same_has_the_signal_for_a_rival():
     assert "signals.spindle_current" in {r.place for r in cause.rivals}
 
 
+def test_the_source_that_reads_a_corrected_signal_has_no_other_loss_beside_it():
+    yard = small_case.yardstick()
+    y = of_another("spindle_current")
+    h = declared_exactly(yard, y, yard.fitter(y))[0]
+    accepted = [Accepted(h, (), np.ones(1), np.eye(1), h.statistic, 36.0, ())]
+    batch = next(b for b in yard.columns.batches if b.kind == "gain")
+    losses = [Hypothesis(batch, i, batch.histories[0], 50.0, (0.1,), 1.0) for i in range(len(batch.places))]
+    assert [h.name for h in losses if _reads(yard.study, h, accepted)] == ["sources.motor"]
+    assert not any(_reads(yard.study, h, []) for h in losses)
+
+
 def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
     yard = small_case.yardstick()
     study = yard.study
@@ -99,3 +117,23 @@ def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
     anew = np.vstack([study.jacobian(k, x, s, [1.0])[:, : len(x)] for k, s in zip(study.fitted, slots, strict=True)])
     np.testing.assert_allclose(jacobian(yard, x, [(h, 1.0)]), anew, rtol=1e-9, atol=1e-15)
     assert not np.allclose(anew, yard.fitter.surrogate.at(x)[1], rtol=0.2)
+
+
+def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description():
+    text = (lumped_case.FOLDER / "machine.toml").read_text("utf-8")
+    elsewhere = text.replace('surface = "bearing_front"', 'surface = "housing"')
+    assert elsewhere != text
+    machine = load_machine(lumped_case.FOLDER / "machine.toml", elsewhere)
+    study, yard = small_case.study(), small_case.yardstick()
+    other = replace(study, bench=make_bench(machine, parameters(machine), small_case.runs()))
+    x = 0.5 * np.random.default_rng(4).standard_normal(len(study.bench.parameters))
+    y = with_noise(study, outputs(other, x), np.random.default_rng(5))
+    fitted = yard.fitter(y)
+    best = max(misplaced_candidates(yard, y, fitted), key=lambda h: h.statistic)
+    assert best.name == "sources.front>housing"
+    assert best.statistic > 0.9 * (misfit(yard, fitted) - np.isfinite(y).sum())
+    verdict, (cause,) = verdict_of(search(yard, y), FAMILIES)
+    assert (verdict, cause.family, cause.place, cause.settings["surface"]) == (
+        "named", "misplaced_source", "sources.front", "housing"
+    )  # fmt: skip
+    assert cause.ci95[0] < 1.0 < cause.ci95[1]

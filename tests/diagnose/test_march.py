@@ -7,11 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.calibrate import lumped_case
 from tests.diagnose import small_case
 from twin.calibrate import march as plain
+from twin.calibrate.measured import measured
 from twin.diagnose.acted import Unit, slots_with
+from twin.diagnose.bank import nominal_run
+from twin.diagnose.bench import make_bench
+from twin.diagnose.elements import elements_of
 from twin.diagnose.march import INNER, loads_for, no_slots, states_of
-from twin.diagnose.study import K
+from twin.diagnose.study import K, Study, make_study
+from twin.machine.load import load_machine
+from twin.machine.parameters import parameters
 
 KINDS = [("heat", "housing"), ("film", "bed"), ("capacity", "slide"), ("contact", "x_screw")]
 
@@ -105,23 +112,35 @@ def test_derivatives_by_amplitudes_alone_are_the_same():
     assert first.shape == (len(y), 2)
 
 
-@pytest.mark.parametrize("share", [0.4, 1.0])
-def test_a_misplaced_source_emits_what_it_emits_where_it_is(share):
-    """At another gain than declared, and heating another node: as if the machine were built so."""
-    study = small_case.study()
-    bench, load = study.bench, study.bench.base.load_model
-    j = next(i for i, source in enumerate(load.sources) if not source.contact)
-    B = np.asarray(bench.system.B)
-    there = bench.B[next(i for i, p in enumerate(bench.places) if not np.any(bench.B[i] * B[:, j]))] - B[:, j]
-    slots = study.slots(0)
-    slots.B[0][:, j] = there
-    x = np.zeros(len(bench.parameters))
-    x[[p.path for p in bench.parameters].index(f"sources.{load.sources[j].name}.gain")] = 0.5
-    moved = B.copy()
-    moved[:, j] += share * there
-    other = replace(study, bench=replace(bench, system=replace(bench.system, B=moved)))
-    np.testing.assert_allclose(study.outputs(0, x, slots, [share]), other.outputs(0, x), rtol=1e-9, atol=1e-12)
+def of_warm_bearing(node: str) -> Study:
+    """The study of a machine whose front bearing heats a node, by a law that follows how warm that is."""
+    text = (lumped_case.FOLDER / "machine.toml").read_text("utf-8")
+    front = next(section for section in text.split("\n\n") if section.startswith("[sources.front]"))
+    oil = 'viscosity_40 = "22e-6 m^2/s", viscosity_100 = "5e-6 m^2/s"'
+    warm = f"""[sources.front]
+law = "bearing_friction_warm"
+surface = "{node}"
+parameters = {{ {oil}, f0 = 2.0, diameter = "90 mm", f1 = 0.0005, load = "800 N" }}
+signals = {{ speed = "spindle_speed" }}"""
+    machine = load_machine(lumped_case.FOLDER / "machine.toml", text.replace(front, warm))
+    bench = make_bench(machine, parameters(machine), small_case.runs())
+    plans = [measured(bench.base, run, b.drive, b.name) for run, b in zip(small_case.runs(), bench.runs, strict=True)]
+    return make_study(bench, plans, range(2))
+
+
+def test_a_misplaced_source_is_as_warm_as_where_it_is():
+    """At another gain than declared: as if the machine were described so."""
+    study, other = of_warm_bearing("bearing_front"), of_warm_bearing("housing")
+    elements = elements_of(study, [nominal_run(study, k) for k in range(3)])
+    x = np.zeros(len(study.bench.parameters))
+    x[[p.path for p in study.bench.parameters].index("sources.front.gain")] = 0.5
+    column = elements.index["moved", "front>housing", "always"]
+    always = tuple(np.ones(planned.run.drive.n_steps) for planned in study.runs)
+    slots = slots_with(study, elements, [Unit("moved", "sources.front>housing", column, always)], 0)
+    np.testing.assert_allclose(study.outputs(0, x, slots, [1.0]), other.outputs(0, x), rtol=1e-9, atol=1e-12)
     assert np.abs(study.outputs(0, x) - other.outputs(0, x)).max() > 1.0
+    slots.reads[:] = 0.0  # nor is it as warm as where it was described
+    assert np.abs(study.outputs(0, x, slots, [1.0]) - other.outputs(0, x)).max() > 0.1
 
 
 def test_read_is_what_outputs_say():

@@ -15,7 +15,7 @@ from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.search import search
 from twin.diagnose.search_look import look
-from twin.diagnose.search_strained import FAINT, PULLED, strained
+from twin.diagnose.search_strained import COVERS, PULLED, strained
 from twin.diagnose.verdict import (
     CALIBRATED,
     STRAINED,
@@ -108,10 +108,16 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
     fitted, half = yard.fitter(y), 0.5 * np.eye(len(x))
     glance = look(yard, fitted)
-    assert strained(yard, y, fitted, x, half, glance) is not None
-    much = replace(glance[1][0], statistic=10.0 / FAINT * glance[1][0].statistic)
-    assert strained(yard, y, fitted, x, half, (glance[0], [much], glance[2])) is None  # that would be left
+    freed = strained(yard, y, fitted, x, half, glance)
+    assert freed is not None
+    most = (1.0 - COVERS) * freed[1].statistic  # that its own wrong form may leave
+    sure = replace(glance[1][0], statistic=0.9 * most)
     module = sys.modules[strained.__module__]
+    monkeypatch.setattr(module, "FAINT", 0.9)  # of the misfit in this test, which is small
+    assert 0.9 * sure.statistic > glance[1][0].statistic
+    assert strained(yard, y, fitted, x, half, (glance[0], [sure], glance[2])) is not None
+    much = replace(sure, statistic=1.1 * most)
+    assert strained(yard, y, fitted, x, half, (glance[0], [much], glance[2])) is None  # that would be left
     gone = lambda *a: (fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
     monkeypatch.setattr(module, "refit", gone)
     assert strained(yard, y, fitted, x, half, glance) is None

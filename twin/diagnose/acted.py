@@ -150,10 +150,13 @@ def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) 
         elif unit.kind == "heat":
             p = [q.name for q in bench.places].index(unit.place)
             slots.forcing[:, :, s] = fine[:, :, None] * bench.B[p]
-        elif unit.kind == "moved":  # all that the source emits, and not what it would as described
+        elif unit.kind == "moved":  # all that the source emits there, as warm as it is there
             name = unit.place.removeprefix("sources.").split(">")[0]
             vector = elements.vectors[k][elements.columns[unit.column].vector]
-            slots.B[s][:, [q.name for q in load.sources].index(name)] = vector
+            j = [q.name for q in load.sources].index(name)
+            slots.B[s][:, j] = vector
+            if j in bench.layout.following_losses:  # mean temperature: what spreads heat over a surface, transposed
+                slots.reads[s, bench.layout.following_losses.index(j)] = vector
         else:  # a forcing that the bank knows: history of its column, or of its blocks, times its vector
             column = elements.columns[unit.column]
             vector, history = elements.vectors[k][column.vector], column.histories[k]

@@ -33,6 +33,7 @@ GONE = -0.7  # of a relative change, as a straight line
 WET = 60.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
 ENOUGH = 0.02  # of a size, that a pass moves it by when it has arrived
 LESS, SHARE = 1.0, 1e-3  # likelihood-ratio units and share of a statistic: a pass that changes less is the last
+HARDLY = 35.0  # W/(m^2 K), likewise: less than the error of form in 95 of 100 cases is no film of a warm liquid
 FROZEN = 0.0  # degC, below which no medium flows over a machine
 HELD = 2  # passes in which its heat and edges are found for that film, before all are free
 TRIAL = 4  # passes by which coolants are compared before the best of them are refitted
@@ -204,7 +205,7 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes:
             moved(study, yard.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
         )
         now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
-    if h.batch.kind == "coolant" and best.a[0] <= floor[0] and best.a[1] > 0.0:
+    if h.batch.kind == "coolant" and best.a[0] <= HARDLY and best.a[1] > 0.0:
         statistic = 0.0  # that is heat
     # what better parameters remove is not the cause's
     plain = np.concatenate([study.outputs(k, best.x) for k in study.fitted])

@@ -26,6 +26,7 @@ from jax import lax
 from twin.calibrate.effects import Effects, Factors, contact_names, factors_at
 from twin.calibrate.march import Places, Rows
 from twin.diagnose.ports_first import Factor, basis, factor, held, solved, turned, within
+from twin.rom import law_values
 from twin.rom.drive import Drive
 from twin.rom.following import FilmPlan, difference_place, film_state, read_table, temperature_place
 from twin.rom.model import MachineModel
@@ -62,6 +63,7 @@ class Slots:
     M: Array  # (K, r)
     E: Array  # (K, r, r)
     B: Array  # (K, r, n_sources) per W: where else the heat of sources goes
+    reads: Array  # (K, l, r): how else laws of sources that follow a temperature read it
     gate: Array  # (n, K): of A and M
     rise: Array  # (n, m, K) K: medium of M above the reference temperature
     forcing: Array  # (n, m, K, r)
@@ -75,9 +77,10 @@ class Slots:
 def no_slots(n: int, m: int, K: int, r: int, model: MachineModel) -> Slots:
     """Slots that do nothing, as numpy arrays to be filled."""
     load = model.load_model
+    following = sum(bool(law_values.states_of(source.use)) for source in load.sources)
     return Slots(
         A=np.zeros((K, r, r)), M=np.zeros((K, r)), E=np.zeros((K, r, r)),
-        B=np.zeros((K, r, len(load.sources))), gate=np.zeros((n, K)),
+        B=np.zeros((K, r, len(load.sources))), reads=np.zeros((K, following, r)), gate=np.zeros((n, K)),
         rise=np.zeros((n, m, K)), forcing=np.zeros((n, m, K, r)), film=np.zeros((n, K, len(load.films))),
         joint=np.zeros((n, K, len(load.joints))), contact=np.zeros((n, K, len(contact_names(model)))),
         environment=np.zeros((n, m, K, len(load.environments))), initial=np.zeros((K, r)),
@@ -87,8 +90,8 @@ def no_slots(n: int, m: int, K: int, r: int, model: MachineModel) -> Slots:
 def first_slots(slots: Slots, k: int) -> Slots:
     """The first k of them."""
     return Slots(
-        A=slots.A[:k], M=slots.M[:k], E=slots.E[:k], B=slots.B[:k], gate=slots.gate[:, :k], rise=slots.rise[:, :, :k],
-        forcing=slots.forcing[:, :, :k], film=slots.film[:, :k], joint=slots.joint[:, :k],
+        A=slots.A[:k], M=slots.M[:k], E=slots.E[:k], B=slots.B[:k], reads=slots.reads[:k], gate=slots.gate[:, :k],
+        rise=slots.rise[:, :, :k], forcing=slots.forcing[:, :, :k], film=slots.film[:, :k], joint=slots.joint[:, :k],
         contact=slots.contact[:, :k], environment=slots.environment[:, :, :k], initial=slots.initial[:k],
     )  # fmt: skip
 
@@ -186,6 +189,7 @@ class Operators:
     factors: jax.Array  # (q,) of these
     E: jax.Array  # (r, r), many: its derivatives left out
     B: jax.Array  # (r, n_sources)
+    reads: jax.Array  # (l, r): temperatures that sources follow
     M: jax.Array  # (K, r) of slots
 
     @classmethod
@@ -198,7 +202,8 @@ class Operators:
         factors = jnp.concatenate([f.capacity - 1.0, a])
         E = jnp.eye(len(Q)) + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
         B = jnp.asarray(system.B) + jnp.tensordot(a, Q.T @ jnp.asarray(slots.B), 1)
-        return cls(A, terms, factors, E, B, jnp.asarray(slots.M) @ Q)
+        reads = jnp.asarray(system.source_rows) + jnp.tensordot(a, jnp.asarray(slots.reads) @ Q, 1)
+        return cls(A, terms, factors, E, B, reads, jnp.asarray(slots.M) @ Q)
 
 
 def _step(
@@ -252,7 +257,7 @@ def _step(
         return rate * (fixed.E @ x + change @ (fixed.terms @ lax.stop_gradient(x)))
 
     tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
-    winding = T_ref + system.source_rows @ z
+    winding = T_ref + fixed.reads @ z
 
     def fine(x: jax.Array, i: jax.Array) -> tuple[jax.Array, jax.Array]:
         power = jnp.asarray(loads.power)[i] * f.source
@@ -289,8 +294,9 @@ def trajectory(
     loads = replace(loads, contact_heat=jnp.asarray(loads.contact_heat) @ Q)
     unused = jnp.zeros(len(loads.rate))
     steps = replace(
-        slots, A=unused, M=unused, E=unused, B=unused, initial=unused, forcing=jnp.asarray(slots.forcing) @ Q
-    )
+        slots, A=unused, M=unused, E=unused, B=unused, reads=unused, initial=unused,
+        forcing=jnp.asarray(slots.forcing) @ Q,
+    )  # fmt: skip
     one = partial(_step, layout, places, many, system, effects, f, a, fixed)
     _, states = lax.scan(one, z0 @ Q, (loads, steps))
     return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0]) @ Q.T])

@@ -102,8 +102,9 @@ def null(
         initial = form.start * rng.standard_normal() * body.one if not run.stated_start else np.zeros(body.n)
         initial = initial + form.start_apart * _body_starts(study, rng)
         filled = Slots(
-            A=_first(slots.A, A), M=_first(slots.M, M), E=_first(slots.E, E), B=slots.B, gate=_row(slots.gate, 1.0),
-            rise=_fill(slots.rise, rise), forcing=_fill(slots.forcing, forcing), film=_row(slots.film, wobble),
+            A=_first(slots.A, A), M=_first(slots.M, M), E=_first(slots.E, E), B=slots.B, reads=slots.reads,
+            gate=_row(slots.gate, 1.0), rise=_fill(slots.rise, rise), forcing=_fill(slots.forcing, forcing),
+            film=_row(slots.film, wobble),
             joint=_row(slots.joint, joint), contact=_row(slots.contact, contact),
             environment=_fill(slots.environment, fluctuation.reshape(n, INNER, -1)),
             initial=_first(slots.initial, initial),

@@ -18,7 +18,7 @@ from twin.diagnose.fitter import Fitted
 from twin.diagnose.growth import chilled, grown
 from twin.diagnose.hotter import hotter
 from twin.diagnose.refit import refit
-from twin.diagnose.search_declared import declared_candidates, declared_exactly
+from twin.diagnose.search_declared import declared_candidates, declared_exactly, misplaced_candidates
 from twin.diagnose.search_look import Search, Step, cosines, look
 from twin.diagnose.search_strained import COVERS, LATER, NEAR, PULLED, closed, strained
 from twin.diagnose.settled import settled
@@ -51,7 +51,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
     relaxed = strained(yard, y, fitted, x0, covariance, glance)
     alarm = any(h.statistic > yard.thresholds[h.family] for h in glance[1])
     if alarm or relaxed or np.abs(x0).max(initial=0.0) > PULLED:  # without, no cause is named
-        exact = {h.name: h for h in declared_exactly(yard, y, fitted)}
+        exact = {h.name: h for h in [*declared_exactly(yard, y, fitted), *misplaced_candidates(yard, y, fitted)]}
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
         glance = look(yard, fitted, declared)
     if relaxed and (ended := closed(yard, y, fitted, declared, glance, relaxed, x0)):
@@ -73,7 +73,7 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         passing = [
             h for h in ranked
             if alarm and h.statistic > NAMED * limits[h.family] and used + h.batch.q <= K
-            and (h.family, h.name) not in refused and not _again(h, accepted)
+            and (h.family, h.name) not in refused and not _again(h, accepted) and not _reads(yard.study, h, accepted)
         ]  # fmt: skip
         if not passing or len(accepted) >= most or fruitless >= TRIES or imitated:
             break
@@ -139,6 +139,15 @@ def _starts(seen: Sight, h: Hypothesis) -> list[Hypothesis]:
 def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
     return any(h.family == a.hypothesis.family and h.name == a.hypothesis.name and h.when.name == a.hypothesis.when.name
                for a in accepted)  # fmt: skip
+
+
+def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
+    """Whether it is the loss of a source that reads a corrected signal: what the exact factor leaves there is misfit of
+    a source that emits many times as much, and no cause beside it."""
+    names = [a.hypothesis.name for a in accepted if a.hypothesis.batch.kind == "signal"]
+    wrong = {name.removeprefix("signals.").split("*")[0] for name in names}
+    sources = study.bench.base.load_model.sources
+    return any(h.name == f"sources.{s.name}" and wrong & set(s.use.signals.values()) for s in sources)
 
 
 def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:

@@ -1,11 +1,14 @@
-"""Load signals declared wrongly, judged from the description and not from where a fit has ended.
+"""Changes of a size that is known, judged from the description and not from where a fit has ended.
 
 A current of twice what the log says is four times the heat of a motor, and calibration finds a gain of four. Beside
-that fit the right factor explains nothing more. So every factor is given a fit of its own, which begins at the
-description, and counts by how much less misfit it leaves than calibration without it.
+that fit the right factor explains nothing more. Nor does heat that enters at another face, all of it, when calibration
+has bent joints and capacities around it. So each of them is given a fit of its own, which begins at the description,
+and counts by how much less misfit it leaves than calibration without it.
 
 To first order that says which factors are worth a try, and not what they explain: with four times the heat a film or a
 joint near the motor counts four times as much. Those few are fitted with the model that has the corrected signal.
+Nor does it say what a bearing does that warms another face, and is as warm as that: such are told by the model with
+the heat there, whose parameters are fitted to first order. (`twin.diagnose.contest` fits them exactly.)
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnose.accepted import parameter_of
+from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import misfit
 from twin.diagnose.fitter import Fitted, bounds
@@ -32,8 +36,21 @@ EXACT = 3  # passes likewise of the model with a corrected signal
 def declared_candidates(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Exact factors of signals that leave less misfit than the fit without a cause does, to first order."""
     before, found = misfit(yard, fitted), []
-    for h, D in _promising(yard, y)[:CLOSELY]:
+    for h, D in _promising(yard, y, "signal")[:CLOSELY]:
         statistic = before - _fitted_with(yard, y, D)
+        if statistic > 0.0:
+            found.append(replace(h, statistic=statistic))
+    return found
+
+
+def misplaced_candidates(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
+    """Likewise of sources all of whose heat is elsewhere, with what they do there beside the described machine."""
+    study, before, found = yard.study, misfit(yard, fitted), []
+    for h, _ in _promising(yard, y, "moved")[:CLOSELY]:
+        units, x = units_of(study, h), np.zeros(len(fitted.x))
+        there = [study.outputs(k, x, slots_with(study, yard.elements, units, k), h.amplitude) for k in study.fitted]
+        change = yard.whiten(np.concatenate(there) - yard.fitter.surrogate.y0)
+        statistic = before - _fitted_with(yard, y, change)
         if statistic > 0.0:
             found.append(replace(h, statistic=statistic))
     return found
@@ -44,7 +61,7 @@ def declared_exactly(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hyp
     each of the SIGNALS most promising; where that explains half of what a signal must, CLOSELY of them."""
     before, found = misfit(yard, fitted), list[Hypothesis]()
     factors = dict[str, list[Hypothesis]]()
-    for h, _ in _promising(yard, y):
+    for h, _ in _promising(yard, y, "signal"):
         factors.setdefault(h.name.split("*")[0], []).append(h)
     for name, own in list(factors.items())[:SIGNALS]:
         for h in own[:CLOSELY]:
@@ -96,11 +113,12 @@ def _sum(drive: Drive, more: Drive, less: Drive, moving: list[int]) -> Drive:
     )
 
 
-def _promising(yard: Yardstick, y: np.ndarray) -> list[tuple[Hypothesis, np.ndarray]]:
-    """Factors and their white responses (m,), first those that leave least beside the description, to first order."""
+def _promising(yard: Yardstick, y: np.ndarray, kind: str) -> list[tuple[Hypothesis, np.ndarray]]:
+    """Those of a kind and their white responses (m,), first those that leave least beside the description, to first
+    order."""
     found = []
     for batch in yard.columns.batches:
-        if batch.kind != "signal":
+        if batch.kind != kind:
             continue
         D = yard.columns.raw[:, batch.columns[:, 0]].astype(float)
         f, J = yard.fitter.surrogate.at(np.zeros(len(yard.study.bench.parameters)))

@@ -133,9 +133,17 @@ def strained(
     far = sorted((h for h in found if h.statistic >= PULLED**2), key=lambda h: -h.statistic)
     seen, ranked, _ = glance
     least = FAINT * ranked[0].statistic if ranked else 0.0
-    # a film many times as large scores hardly anything by its derivative: it is freed whatever it scores
-    near = [h for h in far[:FAR] if h.batch.kind == "group" or _scored(yard, fitted, seen, h) > least]
-    freed_ones = [made for h in near if (made := _freed(yard, y, fitted, h))]
+    freed_ones, before = [], misfit(yard, fitted)
+    for h in far[:FAR]:
+        made = _freed(yard, y, fitted, h)
+        if made is None:
+            continue
+        # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
+        # leave as much as its own wrong form makes
+        likely = h.batch.kind == "group" or _scored(yard, fitted, seen, h) > least
+        sure = (1.0 - COVERS) * made[1].statistic > ranked[0].statistic and misfit(yard, made[0]) < before
+        if likely or sure:
+            freed_ones.append(made)
     return min(freed_ones, key=lambda made: misfit(yard, made[0]), default=None)
 
 

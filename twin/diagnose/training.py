@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,8 @@ DRAWS = 12
 ACTIVE = 10  # places with a film in one draw
 WARM = 3.0  # K: what a drawn heat would warm its surface by if only a film of 20 W/(m^2 K) took it away
 EVERY = 3  # steps between snapshots
+ALONE = 10.0  # W at one place, and when: shares of a run
+ON = ((0.08, 0.58, 1.0), (0.75, 1.0, 0.5))  # from, to, share of that
 LOST, TURN = 0.03, 6  # of a conductance that is left where it is lost; draws after which every contact has been lost
 
 
@@ -83,24 +85,45 @@ def trajectory(shared: Shared, draw: Draw) -> np.ndarray:
     values = values_of(shared.parameters, draw.seed)
     drive = shared.drives[draw.run]
     acting = drawn(shared.places, drive, drive.environment.mean(axis=1), draw.seed)
-    model = pruned(shared.rich, [p.name for p in shared.places], list(acting.film))
+    warmer = np.random.default_rng([draw.seed, 3, draw.run]).standard_normal(len(shared.rich.bodies))
+    return stepped(shared, drive, shared.starts[draw.run], values, acting, warmer * (draw.seed > 0))
+
+
+def alone(shared: Shared, place: str) -> np.ndarray:
+    """States (N, m) of the first run of the described machine with heat at one place alone."""
+    drive, on = shared.drives[0], np.zeros(shared.drives[0].n_steps)
+    for start, end, share in ON:
+        on[round(start * len(on)) : round(end * len(on))] = share
+    return stepped(shared, drive, shared.starts[0], {}, Acting({place: ALONE * on}), np.zeros(len(shared.rich.bodies)))
+
+
+def stepped(
+    shared: Shared, drive: Drive, start: float, values: Mapping[str, float], acting: Acting, warmer: np.ndarray
+) -> np.ndarray:
+    """States (N, m) from a uniform temperature, of every body so many K more."""
+    model = pruned(shared.rich, list(acting.power), list(acting.film))
     there = with_values(model, shared.parameters, values)
     base = with_values(shared.base, shared.parameters, values)
     own = rescaled(drive, shared.base.load_model, base.load_model)
     stepper = CoupledStepper(there, keep=TRAINING_KEEP, follow=TRAINING_FOLLOW)
-    start = stepper.uniform(shared.starts[draw.run])
-    if draw.seed:
-        rng = np.random.default_rng([draw.seed, 3, draw.run])
-        start = [x + rng.standard_normal() * b.one for x, b in zip(start, there.bodies, strict=True)]
-    states = [np.concatenate(start)]
-    for k, x, _ in stepper.run(with_acting(own, there.load_model, acting), start):
+    first = [x + by * b.one for x, b, by in zip(stepper.uniform(start), there.bodies, warmer, strict=True)]
+    states = [np.concatenate(first)]
+    for k, x, _ in stepper.run(with_acting(own, there.load_model, acting), first):
         if k % EVERY == EVERY - 1:
             states.append(np.concatenate(x))
     return np.column_stack(states)
 
 
-def snapshots(shared: Shared, draws: int = DRAWS, progress: Progress = silent) -> list[np.ndarray]:
-    """(N, m) of every run at the nominal values and at `draws` draws."""
-    items = [Draw(run, seed) for seed in range(draws + 1) for run in range(len(shared.drives))]
-    with progress("trajectories with places", len(items)) as advance:
-        return each(trajectory, shared, items, lambda d: advance(f"run {d.run + 1}, draw {d.seed}"))
+def snapshots(shared: Shared, draws: int = DRAWS, progress: Progress = silent) -> tuple[list[np.ndarray], ...]:
+    """(N, m) of every run at the nominal values; at `draws` draws; and what heat does at every place alone.
+
+    Draws heat all places at once, each by its area. The heat of a bearing at a small one is many times as much: a
+    window that knew places from draws alone would have the TCP off by a tenth of what that does, and more.
+    """
+    runs = range(len(shared.drives))
+    items = [Draw(run, seed) for seed in range(draws + 1) for run in runs]
+    names = [p.name for p in shared.places]
+    with progress("trajectories with places", len(items) + len(names)) as advance:
+        made = each(trajectory, shared, items, lambda d: advance(f"run {d.run + 1}, draw {d.seed}"))
+        heated = each(alone, shared, names, advance)
+    return made[: len(runs)], made[len(runs) :], [X - made[0] for X in heated]
