@@ -22,20 +22,24 @@ def some(states, ports, rank, seed):
 @pytest.mark.parametrize(("states", "ports", "rank"), [(9, 4, 4), (9, 4, 2), (5, 8, 5), (6, 6, 6), (7, 0, 0)])
 def test_it_solves_the_whole_system(states, ports, rank):
     c, P, gamma, b = some(states, ports, rank, states + ports)
-    Q = basis(P)
-    np.testing.assert_allclose(Q.T @ Q, np.eye(states), atol=1e-12)
-    R = (Q.T @ P)[:ports]
-    made = factor(held(within(Q, c[None])[0], ports), R @ gamma @ R.T)
+    ports_first = basis(P)
+    T, R = ports_first.T, ports_first.R
+    np.testing.assert_allclose((T.T @ P)[:ports], R, atol=1e-9)
+    np.testing.assert_allclose((T.T @ P)[ports:], 0.0, atol=1e-12)
+    assert bool(ports_first.plain) == (rank == ports)
+    if rank == ports:
+        np.testing.assert_allclose(R, np.eye(ports), atol=1e-12)
+    made = factor(held(within(T, c[None])[0], ports), ports_first.across(gamma))
     assert made.L.shape == (min(ports, states),) * 2
-    np.testing.assert_allclose(Q @ solved(made, Q.T @ b), np.linalg.solve(c + P @ gamma @ P.T, b), rtol=1e-9)
+    np.testing.assert_allclose(T @ solved(made, T.T @ b), np.linalg.solve(c + P @ gamma @ P.T, b), rtol=1e-9)
 
 
 def test_a_turned_machine_has_its_ports_first_and_reads_the_same():
     system = small_case.bench().system
-    Q = basis(system.P[0])
-    after = turned(system, Q)
+    T = basis(system.P[0]).T
+    after = turned(system, T)
     ports = system.P[0].shape[1]
     assert not np.any(np.asarray(after.P[0])[ports:])
-    z = np.random.default_rng(1).standard_normal(len(Q))
-    np.testing.assert_allclose(after.film_rows @ (Q.T @ z), system.film_rows @ z, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(Q @ (after.A0[0] @ (Q.T @ z)), system.A0[0] @ z, rtol=1e-9, atol=1e-9)
+    y = np.random.default_rng(1).standard_normal(len(T))
+    np.testing.assert_allclose(after.film_rows @ y, system.film_rows @ (T @ y), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(after.A0[0] @ y, T.T @ (system.A0[0] @ (T @ y)), rtol=1e-9, atol=1e-9)

@@ -25,7 +25,7 @@ from jax import lax
 
 from twin.calibrate.effects import Effects, Factors, contact_names, factors_at
 from twin.calibrate.march import Places, Rows
-from twin.diagnose.ports_first import Factor, basis, factor, held, solved, turned, within
+from twin.diagnose.ports_first import Basis, Factor, basis, factor, held, solved, turned, within
 from twin.rom import law_values
 from twin.rom.drive import Drive
 from twin.rom.following import FilmPlan, difference_place, film_state, read_table, temperature_place
@@ -133,15 +133,33 @@ def flows(places: Places, diagonal: Array, neighbour: Array, weight: Array, cont
     (c,); diagonal and neighbour (c, n_ports), weight (n_pairs, n_segments), as in `Loads`."""
     contact = jnp.asarray(contact)
     beside = (contact @ jnp.asarray(neighbour))[:-1, None]
-    pairs = [(p, first + s, c, k, s)
-             for k, (c, p, first, n) in enumerate(
-                 zip(places.contact_of_pair, places.pad, places.first, places.count, strict=True))
-             for s in range(n)]  # fmt: skip
-    pad, segment, c, k, s = np.array(pairs, dtype=int).reshape(-1, 5).T
+    pad, segment, c, k, s = _touching(places)
     w = -(contact[c] * jnp.asarray(weight)[k, s])[:, None]
     result = (contact @ jnp.asarray(diagonal))[:, None] * y
     result = result.at[:-1].add(beside * y[1:]).at[1:].add(beside * y[:-1])
     return result.at[np.concatenate([pad, segment])].add(jnp.concatenate([w * y[segment], w * y[pad]]))
+
+
+def gamma(places: Places, diagonal: Array, neighbour: Array, weight: Array, contact: Array) -> jax.Array:
+    """Gamma (n_ports, n_ports) W/K, as `flows`."""
+    contact = jnp.asarray(contact)
+    ports = np.arange(np.shape(diagonal)[1])
+    pad, segment, c, k, s = _touching(places)
+    beside = (contact @ jnp.asarray(neighbour))[:-1]
+    w = -contact[c] * jnp.asarray(weight)[k, s]
+    row = np.concatenate([ports, ports[:-1], ports[1:], pad, segment])
+    column = np.concatenate([ports, ports[1:], ports[:-1], segment, pad])
+    values = jnp.concatenate([contact @ jnp.asarray(diagonal), beside, beside, w, w])
+    return jnp.zeros((len(ports), len(ports))).at[row, column].add(values)
+
+
+def _touching(places: Places) -> np.ndarray:
+    """(5, n): pad and segment (ports), contact, pair and number of the segment in it, of all that may touch."""
+    pairs = [(p, first + s, c, k, s)
+             for k, (c, p, first, n) in enumerate(
+                 zip(places.contact_of_pair, places.pad, places.first, places.count, strict=True))
+             for s in range(n)]  # fmt: skip
+    return np.array(pairs, dtype=int).reshape(-1, 5).T
 
 
 def gammas(places: Places, loads: Loads, contact: np.ndarray, n_ports: int) -> np.ndarray:
@@ -149,9 +167,9 @@ def gammas(places: Places, loads: Loads, contact: np.ndarray, n_ports: int) -> n
     steps = int(np.prod(np.asarray(loads.diagonal).shape[:2]))
     if not n_ports:
         return np.zeros((steps, 0, 0))
-    many = jax.jit(jax.vmap(partial(flows, places), (0, 0, 0, None, None)))
+    many = jax.jit(jax.vmap(partial(gamma, places), (0, 0, 0, None)))
     flat = [np.asarray(v).reshape(steps, *v.shape[2:]) for v in (loads.diagonal, loads.neighbour, loads.weight)]
-    return np.asarray(many(*flat, contact, jnp.eye(n_ports)))
+    return np.asarray(many(*flat, contact))
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))
@@ -188,22 +206,24 @@ class Operators:
     terms: jax.Array  # (q, r, r): of E: of the model's capacities, then of slots
     factors: jax.Array  # (q,) of these
     E: jax.Array  # (r, r), many: its derivatives left out
+    ports: Basis
     B: jax.Array  # (r, n_sources)
     reads: jax.Array  # (l, r): temperatures that sources follow
     M: jax.Array  # (K, r) of slots
 
     @classmethod
     def of(
-        cls, system: System, effects: Effects, slots: Slots, f: Factors, a: jax.Array, Q: jax.Array, many: bool
+        cls, system: System, effects: Effects, slots: Slots, f: Factors, a: jax.Array, ports: Basis, many: bool
     ) -> Operators:
-        """At factors f and amplitudes a; system: turned by Q."""
-        A = jnp.concatenate([jnp.asarray(system.A[0]), within(Q, slots.A)])
-        terms = within(Q, jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)]))
+        """At factors f and amplitudes a; system: turned."""
+        T = ports.T
+        A = jnp.concatenate([jnp.asarray(system.A[0]), within(T, slots.A)])
+        terms = within(T, jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)]))
         factors = jnp.concatenate([f.capacity - 1.0, a])
-        E = jnp.eye(len(Q)) + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
-        B = jnp.asarray(system.B) + jnp.tensordot(a, Q.T @ jnp.asarray(slots.B), 1)
-        reads = jnp.asarray(system.source_rows) + jnp.tensordot(a, jnp.asarray(slots.reads) @ Q, 1)
-        return cls(A, terms, factors, E, B, reads, jnp.asarray(slots.M) @ Q)
+        E = T.T @ T + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
+        B = jnp.asarray(system.B) + jnp.tensordot(a, T.T @ jnp.asarray(slots.B), 1)
+        reads = jnp.asarray(system.source_rows) + jnp.tensordot(a, jnp.asarray(slots.reads) @ T, 1)
+        return cls(A, terms, factors, E, ports, B, reads, jnp.asarray(slots.M) @ T)
 
 
 def _step(
@@ -248,7 +268,6 @@ def _step(
     else:
         c, terms = matrix, jnp.zeros(())
     kept = held(lax.stop_gradient(matrix), P.shape[1])
-    R = P[: P.shape[1]]
 
     def capacity(x: jax.Array) -> jax.Array:
         if not many:
@@ -267,8 +286,8 @@ def _step(
         forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + fixed.B @ power + ports
         forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ fixed.M + a @ jnp.asarray(slots.forcing)[i]
         diagonal, neighbour, weight = (jnp.asarray(v)[i] for v in (loads.diagonal, loads.neighbour, loads.weight))
-        contacts = R @ flows(places, diagonal, neighbour, weight, lax.stop_gradient(contact), R.T)
-        now = factor(kept, contacts)
+        touching = gamma(places, diagonal, neighbour, weight, lax.stop_gradient(contact))
+        now = factor(kept, fixed.ports.across(touching))
         solve = partial(_solved, places, many, now, c, terms, contact, (diagonal, neighbour, weight), P)
         middle = solve(capacity(x) + forcing)
         after = solve(capacity(x + (1.0 - GAMMA) / GAMMA * (middle - x)) + forcing)
@@ -287,19 +306,20 @@ def trajectory(
     v = jnp.asarray(v)
     u, a = v[:n], v[n:]
     f = factors_at(effects, u)
-    Q = basis(system.P[0])
+    ports = basis(system.P[0])
+    T = ports.T
     z0 = jnp.asarray(start) + a @ jnp.asarray(slots.initial)
-    system = turned(system, Q)
-    fixed = Operators.of(system, effects, slots, f, a, Q, many)
-    loads = replace(loads, contact_heat=jnp.asarray(loads.contact_heat) @ Q)
+    system = turned(system, T)
+    fixed = Operators.of(system, effects, slots, f, a, ports, many)
+    loads = replace(loads, contact_heat=jnp.asarray(loads.contact_heat) @ T)
     unused = jnp.zeros(len(loads.rate))
     steps = replace(
         slots, A=unused, M=unused, E=unused, B=unused, reads=unused, initial=unused,
-        forcing=jnp.asarray(slots.forcing) @ Q,
+        forcing=jnp.asarray(slots.forcing) @ T,
     )  # fmt: skip
     one = partial(_step, layout, places, many, system, effects, f, a, fixed)
-    _, states = lax.scan(one, z0 @ Q, (loads, steps))
-    return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0]) @ Q.T])
+    _, states = lax.scan(one, jnp.linalg.solve(T, z0), (loads, steps))
+    return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0]) @ T.T])
 
 
 def outputs_of(

@@ -1,14 +1,16 @@
 """Coordinates in which contacts touch as few states as they have ports, and the factors of fine steps in them.
 
-With P = Q [R; 0] (QR) a matrix of a fine step becomes
+With z = T y, T^T P = [R; 0], a matrix of a fine step becomes
 
-    Q^T (c + P Gamma P^T) Q = [c_pp + R Gamma R^T   c_pf]
+    T^T (c + P Gamma P^T) T = [c_pp + R Gamma R^T   c_pf]
                               [c_fp                 c_ff]
 
 where only the first block follows the contacts. So c_ff and the Schur complement c_pp - c_pf c_ff^-1 c_fp are factored
 once for all fine steps of a coarse one, and every fine step factors a matrix of the size of the ports
-(Golub, Van Loan, Matrix Computations, 4th ed. 2013, chapters 3 to 5). E = 1 stays, as Q is orthogonal. (The ports'
-temperatures as coordinates would leave Gamma as it is, but need R^-1, and ports that move together have none.)
+(Golub, Van Loan, Matrix Computations, 4th ed. 2013, chapters 3 to 5).
+
+The first states are the temperatures of the ports, so that R = 1 and Gamma is added as it is: two products of matrices
+less in every fine step. Ports that move together, or nearly so, have no such coordinates; they keep an R.
 """
 
 from __future__ import annotations
@@ -19,31 +21,57 @@ import twin.run.jax_setup  # noqa: F401  isort: skip
 
 import jax
 import jax.numpy as jnp
-from jax.scipy.linalg import cho_solve
+from jax import lax
+from jax.scipy.linalg import cho_solve, solve_triangular
 
 from twin.run.system import Array, System
 
-
-def basis(P: Array) -> jax.Array:
-    """Q (r, r), orthogonal, with Q^T P zero below its first min(r, n_ports) rows; P (r, n_ports)."""
-    if not P.shape[1]:
-        return jnp.eye(P.shape[0])
-    return jnp.asarray(jnp.linalg.qr(jnp.asarray(P), mode="complete")[0])
+TOGETHER = 1e-6  # of the largest singular value of P: ports that differ by less move together
 
 
-def within(Q: jax.Array, many: Array) -> jax.Array:
-    """Q^T X Q of matrices X (k, r, r)."""
-    return jnp.asarray(Q.T @ (jnp.asarray(many) @ Q))
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Basis:
+    """Of r states and their ports; p = min(r, n_ports)."""
+
+    T: jax.Array  # (r, r)
+    R: jax.Array  # (p, n_ports)
+    plain: jax.Array  # bool: R = 1
+
+    def across(self, gamma: jax.Array) -> jax.Array:
+        """R Gamma R^T (p, p)."""
+        if self.R.shape[0] != self.R.shape[1]:
+            return self.R @ gamma @ self.R.T
+        return jnp.asarray(lax.cond(self.plain, lambda g: g, lambda g: self.R @ g @ self.R.T, gamma))
 
 
-def turned(system: System, Q: jax.Array) -> System:
-    """A machine of one body in coordinates Q^T z, as far as `twin.diagnose.march` reads it."""
+def basis(P: Array) -> Basis:
+    """For P (r, n_ports)."""
+    r, ports = P.shape
+    if not ports:
+        return Basis(jnp.eye(r), jnp.zeros((0, 0)), jnp.array(True))
+    Q, R = jnp.linalg.qr(jnp.asarray(P), mode="complete")
+    if ports > r:
+        return Basis(Q, R, jnp.array(False))
+    U, s, Vt = jnp.linalg.svd(R[:ports])
+    apart = s > TOGETHER * s[0]
+    own = (U / jnp.where(apart, s, jnp.where(s[0] > 0.0, s[0], 1.0))) @ Vt
+    return Basis(jnp.hstack([Q[:, :ports] @ own, Q[:, ports:]]), own.T @ R[:ports], apart.all())
+
+
+def within(T: jax.Array, many: Array) -> jax.Array:
+    """T^T X T of matrices X (k, r, r)."""
+    return jnp.asarray(T.T @ (jnp.asarray(many) @ T))
+
+
+def turned(system: System, T: jax.Array) -> System:
+    """A machine of one body in coordinates y, z = T y, as far as `twin.diagnose.march` reads it; its E is T^T T."""
     r, ports = system.P[0].shape
-    P = (Q.T @ jnp.asarray(system.P[0])).at[min(r, ports) :].set(0.0)
+    P = (T.T @ jnp.asarray(system.P[0])).at[min(r, ports) :].set(0.0)
     return replace(
-        system, A0=(within(Q, system.A0[0]),), A=(within(Q, system.A[0]),), P=(P,),
-        M=Q.T @ system.M, H=Q.T @ system.H, B=Q.T @ system.B,
-        source_rows=system.source_rows @ Q, film_rows=system.film_rows @ Q,
+        system, A0=(within(T, system.A0[0]),), A=(within(T, system.A[0]),), P=(P,),
+        M=T.T @ system.M, H=T.T @ system.H, B=T.T @ system.B,
+        source_rows=system.source_rows @ T, film_rows=system.film_rows @ T,
     )  # fmt: skip
 
 
@@ -53,7 +81,7 @@ class Held:
     """Of a coarse step: what contacts do not change. p states that contacts touch, f others."""
 
     L: jax.Array  # (f, f) of c_ff
-    W: jax.Array  # (f, p) c_ff^-1 c_fp
+    Y: jax.Array  # (f, p) L^-1 c_fp
     S: jax.Array  # (p, p) Schur complement
 
 
@@ -72,8 +100,8 @@ def held(c: jax.Array, ports: int) -> Held:
     if p == len(c):
         return Held(jnp.zeros((0, 0)), jnp.zeros((0, p)), c)
     L = jnp.linalg.cholesky(c[p:, p:])
-    W = cho_solve((L, True), c[p:, :p])
-    return Held(L, W, c[:p, :p] - c[:p, p:] @ W)
+    Y = solve_triangular(L, c[p:, :p], lower=True)
+    return Held(L, Y, c[:p, :p] - Y.T @ Y)
 
 
 def factor(held: Held, contacts: jax.Array) -> Factor:
@@ -86,8 +114,8 @@ def solved(factor: Factor, b: jax.Array) -> jax.Array:
     held, p = factor.held, len(factor.L)
     if p == len(b):
         return jnp.asarray(cho_solve((factor.L, True), b))
-    rest = cho_solve((held.L, True), b[p:])
+    rest = solve_triangular(held.L, b[p:], lower=True)
     if not p:
-        return jnp.asarray(rest)
-    first = cho_solve((factor.L, True), b[:p] - held.W.T @ b[p:])
-    return jnp.concatenate([first, rest - held.W @ first])
+        return jnp.asarray(solve_triangular(held.L, rest, trans=1, lower=True))
+    first = cho_solve((factor.L, True), b[:p] - held.Y.T @ rest)
+    return jnp.concatenate([first, solve_triangular(held.L, rest - held.Y @ first, trans=1, lower=True)])

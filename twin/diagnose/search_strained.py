@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy.linalg
 
 from twin.diagnose.accepted import Accepted, freed, parameter_of, readings_columns
 from twin.diagnose.acted import CONDUCTS, units_of
@@ -32,6 +33,7 @@ SAME = 0.998  # cosine likewise of what is read nowhere else
 DISTANT = 1.0  # logarithm of a source's factor, beyond which derivatives of the described machine say little
 FORM = 0.1  # of the logarithm of a source's factor, that a wrong form of the model takes
 FAINT = 0.2  # of what explains most: a declared number that scores less leaves that, whatever it is freed to
+ROUGHLY = 2.0  # times what a straight line says that data tell: a number that may come out so sure is freed
 FAR = 2  # numbers that are freed, each alone: the farthest may be another one's doing
 OTHERS = 12  # other explanations that are looked at
 
@@ -135,14 +137,14 @@ def strained(
     least = FAINT * ranked[0].statistic if ranked else 0.0
     freed_ones, before = [], misfit(yard, fitted)
     for h in far[:FAR]:
-        made = _freed(yard, y, fitted, h)
-        if made is None:
-            continue
         # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
         # leave as much as its own wrong form makes
         likely = h.batch.kind == "group" or _scored(yard, fitted, seen, h) > least
-        sure = (1.0 - COVERS) * made[1].statistic > ranked[0].statistic and misfit(yard, made[0]) < before
-        if likely or sure:
+        if not likely and ROUGHLY * (1.0 - COVERS) * _told_alone(yard, fitted, h) < ranked[0].statistic:
+            continue
+        made = _freed(yard, y, fitted, h)
+        sure = made and (1.0 - COVERS) * made[1].statistic > ranked[0].statistic and misfit(yard, made[0]) < before
+        if made and (likely or sure):
             freed_ones.append(made)
     return min(freed_ones, key=lambda made: misfit(yard, made[0]), default=None)
 
@@ -157,6 +159,17 @@ def _scored(yard: Yardstick, fitted: Fitted, seen: Sight, h: Hypothesis) -> floa
         P = fitted.projector(D)
         best = max(best, float(P @ yard.whiten(fitted.residual)) ** 2 / max(float(D @ P), 1e-30))
     return best
+
+
+def _told_alone(yard: Yardstick, fitted: Fitted, h: Hypothesis) -> float:
+    """Likelihood-ratio units by which data without its tolerance tell a fitted number from the declared one."""
+    j = parameter_of(yard.study, h.name)
+    if j is None:
+        return 0.0
+    unit = np.zeros(fitted.projector.N.shape[1])
+    unit[j] = 1.0
+    variance = float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j])
+    return float(fitted.x[j]) ** 2 * (1.0 / variance - 1.0)
 
 
 def _freed(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
