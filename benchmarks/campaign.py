@@ -43,7 +43,7 @@ SIZES = (1.0, 0.5, 2.0)
 MORE = (("outside", 20), ("null_law", 10))
 SEVERAL = (("pair", 10), ("two", 10), ("effect_and_sensor", 10))  # no figure of the goals
 FAST = 4  # rounds that all nulls are in
-FIRST = 5700  # seed of the first trial: none that anything was tuned on
+FIRST = 5800  # seed of the first trial: none that anything was tuned on
 
 Item = tuple[str, float, int]
 

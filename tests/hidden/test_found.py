@@ -17,6 +17,10 @@ from twin.diagnose.verdict import limits_at, limits_of
 
 ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few of CI
 LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a yardstick of their own
+AGAIN = (  # of families of which a drawn one is tried anyway: together some minutes
+    "joint", "zone", "forced_convection", "loss_law", "expansion", "capacity", "scale_expansion", "slip", "not_thermal",
+    "measurement",
+)  # fmt: skip
 # Not said as it should be: `make hidden` shows it, with the long ones.
 MISSED = ("coolant", "film_gain", "initial_state", "drawn_signal")
 SLOW = pytest.mark.slow
@@ -25,7 +29,7 @@ SLOW = pytest.mark.slow
 def _marked(names: Iterable[str]) -> list[Any]:
     return [
         pytest.param(name, marks=[SLOW, pytest.mark.xfail(strict=True)] if name in MISSED else
-                     [SLOW] if name in (*LONG, *ROUGH) else [])
+                     [SLOW] if name in (*LONG, *ROUGH, *AGAIN) else [])
         for name in names
     ]  # fmt: skip
 
