@@ -1,4 +1,4 @@
-"""A signal declared wrongly is judged by the model that has it corrected."""
+"""Signals declared wrongly, and sources elsewhere, are judged by the model that has them so."""
 
 from __future__ import annotations
 

@@ -112,6 +112,25 @@ def test_derivatives_by_amplitudes_alone_are_the_same():
     assert first.shape == (len(y), 2)
 
 
+@pytest.mark.parametrize("share", [0.4, 1.0])
+def test_a_misplaced_source_emits_what_it_emits_where_it_is(share):
+    """At another gain than declared, and heating another node: as if the machine were built so."""
+    study = small_case.study()
+    bench, load = study.bench, study.bench.base.load_model
+    j = next(i for i, source in enumerate(load.sources) if not source.contact)
+    B = np.asarray(bench.system.B)
+    there = bench.B[next(i for i, p in enumerate(bench.places) if not np.any(bench.B[i] * B[:, j]))] - B[:, j]
+    slots = study.slots(0)
+    slots.B[0][:, j] = there
+    x = np.zeros(len(bench.parameters))
+    x[[p.path for p in bench.parameters].index(f"sources.{load.sources[j].name}.gain")] = 0.5
+    moved = B.copy()
+    moved[:, j] += share * there
+    other = replace(study, bench=replace(bench, system=replace(bench.system, B=moved)))
+    np.testing.assert_allclose(study.outputs(0, x, slots, [share]), other.outputs(0, x), rtol=1e-9, atol=1e-12)
+    assert np.abs(study.outputs(0, x) - other.outputs(0, x)).max() > 1.0
+
+
 def of_warm_bearing(node: str) -> Study:
     """The study of a machine whose front bearing heats a node, by a law that follows how warm that is."""
     text = (lumped_case.FOLDER / "machine.toml").read_text("utf-8")

@@ -134,17 +134,16 @@ def strained(
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(yard.study.scale[j] ** -2.0)))
     far = sorted((h for h in found if h.statistic >= PULLED**2), key=lambda h: -h.statistic)
     seen, ranked, _ = glance
-    least = FAINT * ranked[0].statistic if ranked else 0.0
+    most = ranked[0].statistic if ranked else 0.0
     freed_ones, before = [], misfit(yard, fitted)
     for h in far[:FAR]:
         # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
         # leave as much as its own wrong form makes
-        likely = h.batch.kind == "group" or _scored(yard, fitted, seen, h) > least
-        if not likely and ROUGHLY * (1.0 - COVERS) * _told_alone(yard, fitted, h) < ranked[0].statistic:
+        likely = h.batch.kind == "group" or _scored(yard, fitted, seen, h) > FAINT * most
+        if not likely and ROUGHLY * (1.0 - COVERS) * _told_alone(yard, fitted, h) < most:
             continue
         made = _freed(yard, y, fitted, h)
-        sure = made and (1.0 - COVERS) * made[1].statistic > ranked[0].statistic and misfit(yard, made[0]) < before
-        if made and (likely or sure):
+        if made and (likely or ((1.0 - COVERS) * made[1].statistic > most and misfit(yard, made[0]) < before)):
             freed_ones.append(made)
     return min(freed_ones, key=lambda made: misfit(yard, made[0]), default=None)
 
@@ -163,9 +162,7 @@ def _scored(yard: Yardstick, fitted: Fitted, seen: Sight, h: Hypothesis) -> floa
 
 def _told_alone(yard: Yardstick, fitted: Fitted, h: Hypothesis) -> float:
     """Likelihood-ratio units by which data without its tolerance tell a fitted number from the declared one."""
-    j = parameter_of(yard.study, h.name)
-    if j is None:
-        return 0.0
+    (j,) = freed(yard.study, h)
     unit = np.zeros(fitted.projector.N.shape[1])
     unit[j] = 1.0
     variance = float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j])
