@@ -19,7 +19,7 @@ from twin.diagnose.growth import chilled, grown
 from twin.diagnose.hotter import hotter
 from twin.diagnose.refit import refit
 from twin.diagnose.search_declared import declared_candidates, declared_exactly, misplaced_candidates
-from twin.diagnose.search_look import Search, Step, cosines, look
+from twin.diagnose.search_look import Search, Step, cosines, look, scored
 from twin.diagnose.search_strained import COVERS, LATER, NEAR, PULLED, closed, strained
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight
@@ -47,13 +47,14 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
         fitted = yard.fitter(y)
     x0, covariance = settled(yard, y, ())
     declared = declared_candidates(yard, y, fitted)
-    glance = look(yard, fitted, declared)
+    known = scored(yard, fitted)
+    glance = look(yard, fitted, declared, known)
     relaxed = strained(yard, y, fitted, x0, covariance, glance)
     alarm = any(h.statistic > yard.thresholds[h.family] for h in glance[1])
     if alarm or relaxed or np.abs(x0).max(initial=0.0) > PULLED:  # without, no cause is named
         exact = {h.name: h for h in [*declared_exactly(yard, y, fitted), *misplaced_candidates(yard, y, fitted)]}
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
-        glance = look(yard, fitted, declared)
+        glance = look(yard, fitted, declared, known)
     if relaxed and (ended := closed(yard, y, fitted, declared, glance, relaxed, x0)):
         return ended
     accepted, steps = list[Accepted](), list[Step]()

@@ -42,13 +42,30 @@ class Search:
     covariance: np.ndarray  # (n, n) of x
 
 
-def look(yard: Yardstick, fitted: Fitted, more: Sequence[Hypothesis] = ()) -> tuple[Sight, list[Hypothesis], Step]:
-    """All hypotheses there and some more, the best of every family and place first."""
+@dataclass(frozen=True)
+class Scored:
+    """All hypotheses that a yardstick has, at one fit."""
+
+    seen: Sight
+    hypotheses: tuple[Hypothesis, ...]
+
+
+def scored(yard: Yardstick, fitted: Fitted) -> Scored:
+    """Their scores: what costs most of a look."""
     white = yard.whiten(fitted.residual)
     seen = sight(yard.columns, fitted.projector, white)
     lost = lost_candidates(yard.lost, yard.columns.batches, fitted.projector, white)
     sized = sized_candidates(yard, fitted.projector, white)
-    ranked = _distinct(sorted([*best(seen.ready, seen.g), *lost, *sized, *more], key=lambda h: -h.statistic))
+    return Scored(seen, (*best(seen.ready, seen.g), *lost, *sized))
+
+
+def look(
+    yard: Yardstick, fitted: Fitted, more: Sequence[Hypothesis] = (), known: Scored | None = None
+) -> tuple[Sight, list[Hypothesis], Step]:
+    """All hypotheses there and some more, the best of every family and place first. known: the scores at this fit."""
+    known = scored(yard, fitted) if known is None else known
+    seen = known.seen
+    ranked = _distinct(sorted([*known.hypotheses, *more], key=lambda h: -h.statistic))
     top = ranked[:10]
     return seen, ranked, Step(tuple(top), cosines(yard, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy.linalg
 
 from twin.diagnose.accepted import curved_change
 from twin.diagnose.batch import Hypothesis
@@ -25,14 +26,22 @@ SIZES = {
 
 def sized_candidates(yard: Yardstick, projector: Projector, white: np.ndarray) -> list[Hypothesis]:
     """Plays of TCP components, clocks of runs and lags of sensors that would explain white residuals (m,), at SIZES."""
-    found = []
-    for batch in yard.columns.batches:
-        for i in range(len(batch.places) if batch.kind in SIZES else 0):
-            for size in SIZES[batch.kind]:
-                h = Hypothesis(batch, i, batch.histories[0], 0.0, (size,), 0.0)
-                change = yard.whiten(curved_change(yard, h, size, None))
-                P = projector(change)
-                statistic = float(P @ (2.0 * white - change))
-                if statistic > 0.0:
-                    found.append(replace(h, statistic=statistic, information=float(P @ change) / size**2))
-    return found
+    tried = [
+        Hypothesis(batch, i, batch.histories[0], 0.0, (size,), 0.0)
+        for batch in yard.columns.batches
+        for i in range(len(batch.places) if batch.kind in SIZES else 0)
+        for size in SIZES[batch.kind]
+    ]
+    if not tried:
+        return []
+    D = yard.whiten(np.column_stack([curved_change(yard, h, h.amplitude[0], None) for h in tried]))
+    # all at once: N is large, and would be read twice for each of them
+    B = projector.N.T @ np.column_stack([D, white])
+    half = scipy.linalg.solve_triangular(projector.factor[0], B, lower=True)
+    explained = white @ D - half[:, -1] @ half[:, :-1]  # D^T Pi r
+    own = (D**2).sum(axis=0) - (half[:, :-1] ** 2).sum(axis=0)  # D^T Pi D
+    return [
+        replace(h, statistic=float(2.0 * g - F), information=float(F) / h.amplitude[0] ** 2)
+        for h, g, F in zip(tried, explained, own, strict=True)
+        if 2.0 * g > F
+    ]
