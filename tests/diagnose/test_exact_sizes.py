@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import Accepted, freed, parameter_of
+from twin.diagnose.accepted import Accepted, curved_change, freed, parameter_of
 from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import FAMILIES
@@ -201,3 +201,17 @@ def test_a_joint_that_conducts_nothing_any_more_keeps_its_evidence():
     assert found.amplitude[0] == pytest.approx(LOW, abs=0.01)
     assert found.amplitude[0] >= LOW
     assert 0.0 < found.covariance[0, 0] < 0.1
+
+
+def test_sizes_scored_together_are_scored_as_each_alone():
+    yard, study = small_case.yardstick(), small_case.study()
+    k, x = study.fitted[0], np.zeros(len(study.bench.parameters))
+    fitted = yard.fitter(clean() + 90.0 * late(study, {k: study.states(k, x)}, 90.0) + noise(12))
+    white = yard.whiten(fitted.residual)
+    found = sized_candidates(yard, fitted.projector, white)
+    assert found
+    for h in found:
+        change = yard.whiten(curved_change(yard, h, h.amplitude[0], None))
+        P = fitted.projector(change)
+        assert h.statistic == pytest.approx(float(P @ (2.0 * white - change)), rel=1e-6, abs=1e-6)
+        assert h.information == pytest.approx(float(P @ change) / h.amplitude[0] ** 2, rel=1e-6)
