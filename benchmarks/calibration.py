@@ -9,11 +9,11 @@ import numpy as np
 
 from benchmarks.recovery import artefact
 from benchmarks.recovery_truth import NOISE, truth
-from twin.calibrate.batch import batch
-from twin.calibrate.calibration import calibrate
-from twin.calibrate.options import Options
-from twin.calibrate.problem import problem
-from twin.calibrate.training import states_at
+from twin.calibrate.fit.batch import batch
+from twin.calibrate.fit.calibration import calibrate
+from twin.calibrate.fit.options import Options
+from twin.calibrate.fit.problem import problem
+from twin.calibrate.fit.training import states_at
 from twin.logs.run import Run
 
 SAMPLES, HOURS = 1000, 8.0

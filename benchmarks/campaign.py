@@ -22,7 +22,7 @@ from benchmarks.hidden_draw import FAMILIES as HIDDEN
 from benchmarks.hidden_draw import Trial, draw, part_of
 from benchmarks.hidden_parts import Hidden
 from twin.build.workers import each
-from twin.calibrate.measured import Measured, measured
+from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.gain import predicted

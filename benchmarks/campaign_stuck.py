@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.hidden_draw import Trial
-from twin.calibrate.measured import Measured
+from twin.calibrate.fit.measured import Measured
 from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.diagnosis import Cause
 from twin.diagnose.sight import Columns

@@ -9,9 +9,9 @@ import numpy as np
 
 from benchmarks.five_axis import compact, machine
 from benchmarks.recovery_truth import NOISE, SEEDS, draw, planted, truth
-from twin.calibrate.calibration import calibrate
-from twin.calibrate.fit import Fit
-from twin.calibrate.options import Options
+from twin.calibrate.fit.calibration import calibrate
+from twin.calibrate.fit.fit import Fit
+from twin.calibrate.fit.options import Options
 from twin.machine.parameters import parameters
 from twin.rom.artefact import Artefact
 

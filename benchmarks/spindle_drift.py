@@ -15,9 +15,9 @@ import numpy as np
 
 from tests.support.measured import VARIABLE, measured_data
 from tests.support.scripts import load_script
-from twin.calibrate.bootstrap import Difference, rms_difference
-from twin.calibrate.compare import channels
-from twin.calibrate.identify import Method, identify
+from twin.calibrate.score.bootstrap import Difference, rms_difference
+from twin.calibrate.score.compare import channels
+from twin.calibrate.transfer_function.identify import Method, identify
 from twin.cli.main import run as command
 from twin.errors import ModelError
 from twin.logs.read import read_run

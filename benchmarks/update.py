@@ -17,16 +17,16 @@ from pathlib import Path
 import numpy as np
 
 from twin.build.product import build_artefact
-from twin.calibrate.gain_filter import GainPrior
-from twin.calibrate.identify import identify
-from twin.calibrate.metrics import fit, p2p, rms
-from twin.calibrate.prequential import HoldLast, prequential
-from twin.calibrate.update import Updated
-from twin.calibrate.update_methods import Method, Options, update_run
-from twin.calibrate.update_plan import Plan
-from twin.calibrate.update_schedule import Schedule
-from twin.calibrate.update_series import live_through, live_through_003
-from twin.calibrate.update_tune import tune
+from twin.calibrate.score.metrics import fit, p2p, rms
+from twin.calibrate.score.prequential import HoldLast, prequential
+from twin.calibrate.transfer_function.identify import identify
+from twin.calibrate.update.gain_filter import GainPrior
+from twin.calibrate.update.methods import Method, Options, update_run
+from twin.calibrate.update.plan import Plan
+from twin.calibrate.update.program import Updated
+from twin.calibrate.update.schedule import Schedule
+from twin.calibrate.update.series import live_through, live_through_003
+from twin.calibrate.update.tune import tune
 from twin.errors import ArtefactError
 from twin.logs.read import read_run
 from twin.logs.run import Run, Tcp

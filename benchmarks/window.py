@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.campaign import machine
 from benchmarks.hidden_draw import draw
 from twin.build.workers import each
-from twin.calibrate.measured import measured
+from twin.calibrate.fit.measured import measured
 from twin.diagnose.acting import Acting
 from twin.diagnose.bench import Bench, fine_drive, make_bench, probed
 from twin.diagnose.march import INNER

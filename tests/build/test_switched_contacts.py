@@ -14,9 +14,9 @@ from twin.build.pipeline import rich_model
 from twin.build.rich_basis import RichOptions
 from twin.build.scenario import theta_bounds
 from twin.build.stepper import CoupledStepper, sensor_temperatures
-from twin.calibrate.effects import effects_of
-from twin.calibrate.march import loads_for, places_of, trajectory
-from twin.calibrate.window import merged
+from twin.calibrate.fit.effects import effects_of
+from twin.calibrate.fit.march import loads_for, places_of, trajectory
+from twin.calibrate.fit.window import merged
 from twin.errors import DescriptionError, LogError
 from twin.machine.check import check_machine
 from twin.machine.load import load_machine

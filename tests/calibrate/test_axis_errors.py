@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from twin.calibrate.axis_errors import Ranges, axis_errors, design_matrix, effect_size, rigid_motion
-from twin.calibrate.axis_errors_chain import Chain, chain_of, parse_chain
-from twin.calibrate.axis_errors_field import field_shares
-from twin.calibrate.axis_errors_fit import AxisErrorFit, fit_axis_errors, rows_needed
-from twin.calibrate.axis_errors_htm import measured_displacement
-from twin.calibrate.rtest_plan import Plan, rtest_plan
+from twin.calibrate.axis_errors.chain import Chain, chain_of, parse_chain
+from twin.calibrate.axis_errors.errors import Ranges, axis_errors, design_matrix, effect_size, rigid_motion
+from twin.calibrate.axis_errors.field import field_shares
+from twin.calibrate.axis_errors.fit import AxisErrorFit, fit_axis_errors, rows_needed
+from twin.calibrate.axis_errors.htm import measured_displacement
+from twin.calibrate.axis_errors.rtest_plan import Plan, rtest_plan
 from twin.errors import LogError, ModelError, TwinError
 from twin.rom.load_model import AxisWiring, Pair, Rail
 

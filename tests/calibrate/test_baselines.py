@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from twin.calibrate.baselines import baselines, learned, regression, transfer
-from twin.calibrate.pieces import Piece, Rows, input_names, on_grid, rows_of, split
-from twin.calibrate.transfer_function import first_order_lags
+from twin.calibrate.score.baselines import baselines, learned, regression, transfer
+from twin.calibrate.score.pieces import Piece, Rows, input_names, on_grid, rows_of, split
+from twin.calibrate.transfer_function.model import first_order_lags
 from twin.errors import LogError, ModelError
 from twin.logs.run import Run, Segment, Table
 

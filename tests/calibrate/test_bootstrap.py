@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from twin.calibrate.bootstrap import rms_difference
+from twin.calibrate.score.bootstrap import rms_difference
 
 
 def residuals(rng: np.random.Generator, n: int, scale: float) -> np.ndarray:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tests.calibrate import lumped_case
-from twin.calibrate.calibration import calibrate, chosen, windows
-from twin.calibrate.experiments import propose
-from twin.calibrate.fit import Stop, fit
-from twin.calibrate.options import Options
-from twin.calibrate.problem import problem
-from twin.calibrate.separation import separation
+from twin.calibrate.fit.calibration import calibrate, chosen, windows
+from twin.calibrate.fit.experiments import propose
+from twin.calibrate.fit.fit import Stop, fit
+from twin.calibrate.fit.options import Options
+from twin.calibrate.fit.problem import problem
+from twin.calibrate.fit.separation import separation
 from twin.errors import LogError, TwinError
 from twin.rom.apply import with_values
 from twin.run.replay import replay
@@ -177,7 +177,7 @@ def test_windows_slide():
 
 
 def test_nominal_values_of_a_calibrated_model_are_those_fitted(case, parameters):
-    from twin.calibrate.product import calibrated
+    from twin.calibrate.fit.product import calibrated
 
     _, _, result = case
     a = lumped_case.artefact()

@@ -7,7 +7,7 @@ import pytest
 import synthetic
 import synthetic_run
 
-from twin.calibrate.compare import channels, left_out
+from twin.calibrate.score.compare import channels, left_out
 from twin.errors import LogError
 from twin.logs.run import Run, Table, Tcp
 from twin.rom.artefact import Artefact, read_artefact

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twin.calibrate import gain_filter
-from twin.calibrate.gain_filter import GainPrior, GainState
-from twin.calibrate.update_series import live_through, live_through_003
+from twin.calibrate.update import gain_filter
+from twin.calibrate.update.gain_filter import GainPrior, GainState
+from twin.calibrate.update.series import live_through, live_through_003
 
 HOUR = 3600.0
 PRIOR = GainPrior()

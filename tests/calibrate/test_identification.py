@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from twin.calibrate.arx import fit_arx
-from twin.calibrate.identify import identify, rank_inputs
-from twin.calibrate.output_error import fit_oe
-from twin.calibrate.transfer_function import TransferFunction, first_order_lags
+from twin.calibrate.transfer_function.arx import fit_arx
+from twin.calibrate.transfer_function.identify import identify, rank_inputs
+from twin.calibrate.transfer_function.model import TransferFunction, first_order_lags
+from twin.calibrate.transfer_function.output_error import fit_oe
 from twin.errors import ModelError
 
 DT = 60.0

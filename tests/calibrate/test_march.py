@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.calibrate import lumped_case
-from twin.calibrate.batch import CHUNK, batch
-from twin.calibrate.options import Options
-from twin.calibrate.problem import problem
-from twin.calibrate.training import fields_of, states_at
+from twin.calibrate.fit.batch import CHUNK, batch
+from twin.calibrate.fit.options import Options
+from twin.calibrate.fit.problem import problem
+from twin.calibrate.fit.training import fields_of, states_at
 from twin.rom.load_model import LawUse
 
 
@@ -27,7 +27,7 @@ def case():
 
 def runtime(a, made, x):
     """The artefact's runtime at x, every factor exact."""
-    import twin.calibrate.training as training
+    import twin.calibrate.fit.training as training
 
     run = made.runs[0]
     one = np.concatenate([b.one for b in a.model.bodies])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from twin.calibrate.metrics import figures, fit, p2p, p2p_003, share
+from twin.calibrate.score.metrics import figures, fit, p2p, p2p_003, share
 
 
 def test_p2p_003_overstates_where_the_residual_keeps_its_sign():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from twin.calibrate.noise import CAP, Channels, Noise, estimated, white
+from twin.calibrate.fit.noise import CAP, Channels, Noise, estimated, white
 
 
 def ar1(rng, phi, sigma, n):

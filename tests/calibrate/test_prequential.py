@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.calibrate.metrics import figures
-from twin.calibrate.prequential import HoldLast, prequential
+from twin.calibrate.score.metrics import figures
+from twin.calibrate.score.prequential import HoldLast, prequential
 
 
 def measurements(n: int, seed: int, places: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

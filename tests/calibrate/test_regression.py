@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from twin.calibrate.regression import STRENGTHS, fit_ridge
+from twin.calibrate.score.regression import STRENGTHS, fit_ridge
 from twin.errors import ModelError
 
 

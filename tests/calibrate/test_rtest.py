@@ -9,12 +9,12 @@ import h5py
 import numpy as np
 import pytest
 
-from twin.calibrate.axis_errors import Ranges, axis_errors
-from twin.calibrate.axis_errors_chain import parse_chain
-from twin.calibrate.axis_errors_htm import measured_displacement
-from twin.calibrate.rtest import Readings, ball_columns, measurements, parts, readings
-from twin.calibrate.rtest_model import model_errors, read_pose_history
-from twin.calibrate.rtest_plan import Plan, planned, rtest_plan
+from twin.calibrate.axis_errors.chain import parse_chain
+from twin.calibrate.axis_errors.errors import Ranges, axis_errors
+from twin.calibrate.axis_errors.htm import measured_displacement
+from twin.calibrate.axis_errors.rtest import Readings, ball_columns, measurements, parts, readings
+from twin.calibrate.axis_errors.rtest_model import model_errors, read_pose_history
+from twin.calibrate.axis_errors.rtest_plan import Plan, planned, rtest_plan
 from twin.errors import LogError, TwinError
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp

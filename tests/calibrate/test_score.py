@@ -9,7 +9,7 @@ import pytest
 import synthetic
 import synthetic_run
 
-from twin.calibrate.score import HOLD_FIRST, MODEL, VECTOR, Settings, score
+from twin.calibrate.score.score import HOLD_FIRST, MODEL, VECTOR, Settings, score
 from twin.cli.score import command
 from twin.errors import TwinError
 from twin.logs.run import Run, Segment, Table, Tcp

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from twin.calibrate.separation import sentences, separation
+from twin.calibrate.fit.separation import sentences, separation
 
 
 def information(*rows):

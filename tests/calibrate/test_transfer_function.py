@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from twin.calibrate.direct_form import ConditioningWarning, conditioning, from_direct_form
-from twin.calibrate.transfer_function import TransferFunction, first_order_lags
+from twin.calibrate.transfer_function.direct_form import ConditioningWarning, conditioning, from_direct_form
+from twin.calibrate.transfer_function.model import TransferFunction, first_order_lags
 from twin.errors import ModelError
 
 # Table 2 as printed, um/K at 1 s: the digits are taken as exact decimals

@@ -10,14 +10,14 @@ import pytest
 
 from tests.support.scripts import load_script
 from twin.build.simulate import Noise, simulate_run
-from twin.calibrate.state_filter import machine_of
-from twin.calibrate.state_learn import sensors_at
-from twin.calibrate.state_tangent import KINDS, acts_of, cold, separate_loads, tangent_step
-from twin.calibrate.update import Measurement
-from twin.calibrate.update_live import read_gains, read_state, write_live
-from twin.calibrate.update_methods import Options, learnt, update_run
-from twin.calibrate.update_plan import Plan
-from twin.calibrate.update_schedule import Schedule
+from twin.calibrate.update.live import read_gains, read_state, write_live
+from twin.calibrate.update.methods import Options, learnt, update_run
+from twin.calibrate.update.plan import Plan
+from twin.calibrate.update.program import Measurement
+from twin.calibrate.update.schedule import Schedule
+from twin.calibrate.update.state_filter import machine_of
+from twin.calibrate.update.state_learn import sensors_at
+from twin.calibrate.update.state_tangent import KINDS, acts_of, cold, separate_loads, tangent_step
 from twin.errors import LogError, ModelError, TwinError
 from twin.logs.run import Run, Table
 from twin.logs.signals import signal_values

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from tests.calibrate.test_rtest import CENTRE, CHAIN, growth, hourly, result, run_of
-from twin.calibrate.axis_errors import Ranges
-from twin.calibrate.axis_errors_htm import measured_displacement
-from twin.calibrate.rtest import readings
-from twin.calibrate.rtest_plan import rtest_plan
+from twin.calibrate.axis_errors.errors import Ranges
+from twin.calibrate.axis_errors.htm import measured_displacement
+from twin.calibrate.axis_errors.rtest import readings
+from twin.calibrate.axis_errors.rtest_plan import rtest_plan
 from twin.cli.main import run
 from twin.logs.write import write_run
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.calibrate import lumped_case
-from twin.calibrate.measured import measured
+from twin.calibrate.fit.measured import measured
 from twin.diagnose.bank import Nominal, nominal_run, respond
 from twin.diagnose.bench import Bench, make_bench
 from twin.diagnose.catalogue import FAMILIES

@@ -10,7 +10,7 @@ import pytest
 
 from tests.calibrate import lumped_case
 from tests.diagnose import small_case
-from twin.calibrate.measured import measured
+from twin.calibrate.fit.measured import measured
 from twin.diagnose.accepted import Accepted, jacobian
 from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Hypothesis

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.calibrate.measured import measured
+from twin.calibrate.fit.measured import measured
 from twin.diagnose.damage import Damage, damaged
 from twin.diagnose.gain import _read
 from twin.diagnose.readings import late, play, readings_of

@@ -9,8 +9,8 @@ import pytest
 
 from tests.calibrate import lumped_case
 from tests.diagnose import small_case
-from twin.calibrate import march as plain
-from twin.calibrate.measured import measured
+from twin.calibrate.fit import march as plain
+from twin.calibrate.fit.measured import measured
 from twin.diagnose.acted import Unit, slots_with
 from twin.diagnose.bank import nominal_run
 from twin.diagnose.bench import make_bench

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.calibrate.noise import Channels
+from twin.calibrate.fit.noise import Channels
 from twin.diagnose.batch import Batch, History, best, prepared, score
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.growth import grown

@@ -12,7 +12,7 @@ from tests.hidden.load import MODEL
 from tests.hidden.trials import TRIALS, trial
 from twin.build.cache import folder
 from twin.build.project import orthonormalise, project
-from twin.calibrate.measured import measured
+from twin.calibrate.fit.measured import measured
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.coarse import coarse_model

@@ -15,8 +15,8 @@ import pytest
 from tests.support.scripts import load_script
 from twin.build.check_meshes import check_meshes
 from twin.build.simulate import simulate_run
-from twin.calibrate.output_error import fit_oe
-from twin.calibrate.transfer_function import TransferFunction
+from twin.calibrate.transfer_function.model import TransferFunction
+from twin.calibrate.transfer_function.output_error import fit_oe
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 

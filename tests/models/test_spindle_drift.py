@@ -11,7 +11,7 @@ import pytest
 
 from tests.support.measured import VARIABLE, measured_data
 from tests.support.scripts import load_script
-from twin.calibrate.compare import channels
+from twin.calibrate.score.compare import channels
 from twin.cli.main import run
 from twin.logs.read import read_run
 from twin.machine.load import load_machine

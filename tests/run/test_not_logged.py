@@ -11,8 +11,8 @@ import pytest
 from tests.support.lumped import SPINDLE, edited
 from twin.build.pipeline import BuildOptions, rich_model
 from twin.build.simulate import simulate_run
-from twin.calibrate.problem import Options, problem
-from twin.calibrate.score import MODEL, VECTOR, score
+from twin.calibrate.fit.problem import Options, problem
+from twin.calibrate.score.score import MODEL, VECTOR, score
 from twin.errors import LogError
 from twin.logs.check import check_run
 from twin.logs.read import read_run

@@ -48,10 +48,10 @@ def command(
 
     import twin.run.jax_setup
     from twin.atomic import atomic_path, check_file
-    from twin.calibrate.calibration import calibrate, chosen, windows
-    from twin.calibrate.fit import Iteration, Stop
-    from twin.calibrate.options import Options
-    from twin.calibrate.product import told, write_calibrated, write_report
+    from twin.calibrate.fit.calibration import calibrate, chosen, windows
+    from twin.calibrate.fit.fit import Iteration, Stop
+    from twin.calibrate.fit.options import Options
+    from twin.calibrate.fit.product import told, write_calibrated, write_report
     from twin.cli.calibrate_text import lines
     from twin.cli.quantity import positive
     from twin.errors import LogError, TwinError

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-    from twin.calibrate.axis_errors_chain import Chain
-    from twin.calibrate.rtest import Measurement, Readings
-    from twin.calibrate.rtest_model import ModelErrors
+    from twin.calibrate.axis_errors.chain import Chain
+    from twin.calibrate.axis_errors.rtest import Measurement, Readings
+    from twin.calibrate.axis_errors.rtest_model import ModelErrors
 
 
 @click.command(epilog="Example: twin rtest tests/calibrate/r_tests --chain w-C-B-Z-b-X-Y-t --at '2 h'")
@@ -45,8 +45,8 @@ def command(
     from pathlib import Path
 
     from twin.atomic import check_folder
-    from twin.calibrate.rtest import measurements, readings
-    from twin.calibrate.rtest_model import model_errors, read_pose_history
+    from twin.calibrate.axis_errors.rtest import measurements, readings
+    from twin.calibrate.axis_errors.rtest_model import model_errors, read_pose_history
     from twin.cli.quantity import option, positive
     from twin.cli.rtest_text import text
     from twin.errors import TwinError
@@ -91,7 +91,7 @@ def command(
 def _chain(text: str | None, artefact: str | None) -> Chain:
     from pathlib import Path
 
-    from twin.calibrate.axis_errors_chain import EXAMPLE, chain_of, parse_chain
+    from twin.calibrate.axis_errors.chain import EXAMPLE, chain_of, parse_chain
     from twin.errors import TwinError
     from twin.rom.artefact import read_artefact
 

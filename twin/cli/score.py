@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from twin.calibrate.score import Settings
+    from twin.calibrate.score.score import Settings
     from twin.logs.run import Run
 
 
@@ -47,8 +47,8 @@ def command(
 
     from twin import __version__
     from twin.atomic import check_folder
-    from twin.calibrate.score import Settings, score
-    from twin.calibrate.score_files import score_json, write_score
+    from twin.calibrate.score.files import score_json, write_score
+    from twin.calibrate.score.score import Settings, score
     from twin.cli.quantity import positive
     from twin.cli.score_text import score_text
     from twin.progress import bar, silent

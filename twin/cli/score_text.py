@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from twin.calibrate.baselines import NAMES
-from twin.calibrate.metrics import Figures
-from twin.calibrate.score import HOLD_FIRST, MODEL, VECTOR, Entry, Score
+from twin.calibrate.score.baselines import NAMES
+from twin.calibrate.score.metrics import Figures
+from twin.calibrate.score.score import HOLD_FIRST, MODEL, VECTOR, Entry, Score
 
 WORST = 5
 MOST_SEGMENTS = 12

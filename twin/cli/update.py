@@ -44,18 +44,18 @@ def command(
     Every row of the run's tcp.csv is predicted before it is used. The model itself stays as it is; the correction is
     kept beside it, with the standard deviation of what it leaves.
     """
-    from twin.calibrate.update_methods import Options, learnt, update_run  # isort: skip  first: it prepares JAX
+    from twin.calibrate.update.methods import Options, learnt, update_run  # isort: skip  first: it prepares JAX
 
     import json
     from pathlib import Path
 
     from twin import __version__
     from twin.atomic import check_folder
-    from twin.calibrate.update_files import summary, write_update
-    from twin.calibrate.update_live import write_live
-    from twin.calibrate.update_plan import Plan
-    from twin.calibrate.update_schedule import Schedule
-    from twin.calibrate.update_tune import tune
+    from twin.calibrate.update.files import summary, write_update
+    from twin.calibrate.update.live import write_live
+    from twin.calibrate.update.plan import Plan
+    from twin.calibrate.update.schedule import Schedule
+    from twin.calibrate.update.tune import tune
     from twin.cli.quantity import positive
     from twin.errors import TwinError
     from twin.logs.read import read_run

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.calibrate.effects import contact_names
+from twin.calibrate.fit.effects import contact_names
 from twin.diagnose import bells
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.diagnosis import Window

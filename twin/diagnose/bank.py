@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from twin.calibrate.effects import contact_names
+from twin.calibrate.fit.effects import contact_names
 from twin.diagnose.march import GAMMA, Loads, gammas
 from twin.diagnose.study import Study
 from twin.rom.following import FilmPlan, difference_place, film_state, read_table

@@ -18,10 +18,10 @@ from twin.build.full_model import FullModel, assemble
 from twin.build.pipeline import theta_bounds
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
-from twin.calibrate.march import Places as Contacts
-from twin.calibrate.march import places_of as contacts_of
-from twin.calibrate.problem import run_names
-from twin.calibrate.window import merged, window_basis
+from twin.calibrate.fit.march import Places as Contacts
+from twin.calibrate.fit.march import places_of as contacts_of
+from twin.calibrate.fit.problem import run_names
+from twin.calibrate.fit.window import merged, window_basis
 from twin.diagnose.march import INNER, Loads, loads_for
 from twin.diagnose.places import GHOST, Place, places_of, pruned, with_ghosts, with_places
 from twin.diagnose.training import Shared, snapshots

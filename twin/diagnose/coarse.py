@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.calibrate.training import states_at
+from twin.calibrate.fit.training import states_at
 from twin.diagnose.diagnosis import Cause
 from twin.diagnose.study import Study
 from twin.rom.model import MachineModel

@@ -11,8 +11,8 @@ import numpy as np
 
 from twin import __version__
 from twin.build.cache import cached, machine_hash
-from twin.calibrate.measured import Measured, measured
-from twin.calibrate.problem import run_names
+from twin.calibrate.fit.measured import Measured, measured
+from twin.calibrate.fit.problem import run_names
 from twin.diagnose.bench import Bench, drive_arrays, make_bench
 from twin.diagnose.catalogue import FAMILIES, VERSION, Family
 from twin.diagnose.channels_check import stuck_sensors
@@ -149,7 +149,7 @@ def _code() -> str:
     """Hash of the code that makes yardsticks, beside that of builds."""
     own = Path(__file__).parent
     files = [path for path in own.glob("*.py") if not path.name.startswith(AFTER)]
-    files += [path for layer in ("calibrate", "run") for path in (own.parent / layer).glob("*.py")]
+    files += [path for layer in ("calibrate", "run") for path in (own.parent / layer).rglob("*.py")]
     digest = hashlib.sha256()
     for path in sorted(files):
         digest.update(path.read_bytes())

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.calibrate.effects import contact_names
+from twin.calibrate.fit.effects import contact_names
 from twin.diagnose.bank import Column, Nominal
 from twin.diagnose.march import INNER, gammas
 from twin.diagnose.places import beside

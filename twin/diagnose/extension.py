@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from twin.build.product import build_artefact
-from twin.calibrate.problem import run_names
+from twin.calibrate.fit.problem import run_names
 from twin.diagnose.diagnose import Result
 from twin.diagnose.diagnosis import Cause, Diagnosis, Window
 from twin.diagnose.edits import extended_description, loads_with

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.calibrate.measured import Measured
+from twin.calibrate.fit.measured import Measured
 from twin.diagnose.accepted import stepped, with_shifts
 from twin.diagnose.diagnosis import Gain
 from twin.diagnose.readings import play, readings_of

@@ -1,7 +1,7 @@
 """The window model stepped through a run with hypotheses switched on: states and exact derivatives.
 
-As `twin.calibrate.march`, with three differences. Loads and moving contacts keep their own fine steps (60 s) inside a
-coarse one (300 s) of films and joints: contacts held for 300 s put nuts and the TCP off by more than the noise. A
+As `twin.calibrate.fit.march`, with three differences. Loads and moving contacts keep their own fine steps (60 s) inside
+a coarse one (300 s) of films and joints: contacts held for 300 s put nuts and the TCP off by more than the noise. A
 fine step is a two-stage SDIRK step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one matrix for
 both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold what the
 description lacks, each times an amplitude a_k that is differentiated like a parameter:
@@ -23,8 +23,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from twin.calibrate.effects import Effects, Factors, contact_names, factors_at
-from twin.calibrate.march import Places, Rows
+from twin.calibrate.fit.effects import Effects, Factors, contact_names, factors_at
+from twin.calibrate.fit.march import Places, Rows
 from twin.diagnose.ports_first import Basis, Factor, basis, factor, held, solved, turned, within
 from twin.rom import law_values
 from twin.rom.drive import Drive
@@ -45,7 +45,7 @@ class Loads:
     rate: Array  # (n,) 1/s of the fine steps
     theta: Array  # (n, n_theta) W/(m^2 K): convection of films that read the log alone, then joints
     film_table: Array  # (n, k, 65) W/(m^2 K) over DIFFERENCES
-    diagonal: Array  # (n, m, c, n_ports) W/K, as `twin.calibrate.march.Loads`
+    diagonal: Array  # (n, m, c, n_ports) W/K, as `twin.calibrate.fit.march.Loads`
     neighbour: Array  # (n, m, c, n_ports)
     weight: Array  # (n, m, n_pairs, n_segments)
     environment: Array  # (n, m, n_environments) degC
@@ -327,7 +327,7 @@ def outputs_of(
     slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
     """Means of sensors over bins (b s,) [degC], then TCP rows (k 3,) [m]."""
-    from twin.calibrate.march import displacements, temperatures
+    from twin.calibrate.fit.march import displacements, temperatures
 
     states = trajectory(layout, places, many, system, effects, loads, slots, start, v)
     mean_of, column = bins

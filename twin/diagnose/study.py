@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import jax.numpy as jnp
 import numpy as np
 
-from twin.calibrate.effects import Effects, effects_of
-from twin.calibrate.march import Rows, displacements
-from twin.calibrate.measured import Measured
+from twin.calibrate.fit.effects import Effects, effects_of
+from twin.calibrate.fit.march import Rows, displacements
+from twin.calibrate.fit.measured import Measured
 from twin.diagnose.bench import Bench, BenchRun
 from twin.diagnose.march import INNER, Slots, by_amplitudes, first_slots, jacobian, no_slots, outputs, states_of
 from twin.errors import TwinError

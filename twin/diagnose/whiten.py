@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from twin.calibrate.noise import Channels
+from twin.calibrate.fit.noise import Channels
 from twin.diagnose.study import Study
 
 

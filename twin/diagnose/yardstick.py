@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.workers import each
-from twin.calibrate.noise import Channels, estimated
+from twin.calibrate.fit.noise import Channels, estimated
 from twin.diagnose.bank import Nominal, nominal_run, respond
 from twin.diagnose.catalogue import Family
 from twin.diagnose.elements import Elements, elements_of, slim

@@ -1,0 +1,171 @@
+"""Parameters fitted to runs: bounded least squares with priors, stopped by minimum, iterations or time.
+
+Minimise  sum (W (y_measured - y(x)))^2 + sum x^2  within bounds, x in prior standard deviations, by the trust-region
+reflective method (Branch, Coleman, Li, SIAM J. Sci. Comput. 21, 1999; scipy.optimize.least_squares) with Jacobians
+through the window model. Paper 000, Fig. 5: compare at the sensors, change parameters inside physical bounds, stop at
+the minimum or at the maximum of iterations, so that the run time is bounded.
+
+Afterwards residuals are whitened with what they were seen to be (`twin.calibrate.fit.noise`) and the fit is repeated;
+covariance, pulls and intervals belong to that last one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from twin.calibrate.fit.evaluated import Evaluated, floors, information, noise_at, whitened_jacobian
+from twin.calibrate.fit.noise import Noise, estimated, white
+from twin.calibrate.fit.problem import Problem
+
+WHITENINGS = 2  # fits with estimated noise after the first one
+TOLERANCE = 1e-5  # relative change of the cost, and of the parameters
+
+
+@dataclass(frozen=True)
+class Stop:
+    """When a fit ends, besides at its minimum."""
+
+    iterations: int = 30  # of all passes together
+    seconds: float = np.inf
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """A state on the way: every one can be used as it is."""
+
+    number: int
+    cost: float  # half the sum of squares, prior included
+    x: np.ndarray  # (n,)
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """n parameters, those of initial states included; x in prior standard deviations."""
+
+    problem: Problem
+    x: np.ndarray  # (n,)
+    covariance: np.ndarray  # (n, n) of x, prior included
+    information: np.ndarray  # (n, n) of the data alone: J^T J
+    noise: tuple[tuple[Noise, Noise], ...]  # per run: of the sensors (s), of dx, dy, dz
+    history: tuple[Iteration, ...]
+    stopped: str  # "minimum", "iterations", "time", "interrupted"
+    residual: tuple[tuple[np.ndarray, np.ndarray], ...] = field(repr=False, default=())  # per run (b, s) K, (k, 3) m
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """(n,) posterior standard deviations of x."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def at_bound(self) -> np.ndarray:
+        """(n,) bool"""
+        low, high = self.problem.bounds
+        return (self.x < low + 1e-3) | (self.x > high - 1e-3)
+
+
+class _Over(Exception):
+    """The time or the iterations are used up."""
+
+
+def fit(
+    problem: Problem,
+    stop: Stop = Stop(),
+    start: np.ndarray | None = None,
+    report: Callable[[Iteration], None] = lambda _: None,
+    known: tuple[tuple[Noise, Noise], ...] | None = None,
+) -> Fit:
+    """The parameters that explain the runs best within bounds and priors. Ctrl-C ends it with the best state so far.
+
+    known: the noise per run, where an earlier fit of the same runs has estimated it already.
+
+    Raises nothing: a fit that ends early says so in `stopped`, and its covariance holds for where it is.
+    """
+    began = time.perf_counter()
+    low, high = problem.bounds
+    x = np.clip(np.zeros(len(problem.scale)) if start is None else start, low + 1e-9, high - 1e-9)
+    limits = [floors(problem, run) for run in problem.runs]
+    whitenings = WHITENINGS if known is None else 0
+    history: list[Iteration] = []
+    stopped = "minimum"
+
+    def count(cost: float, x: np.ndarray) -> None:
+        history.append(Iteration(len(history), cost, x.copy(), time.perf_counter() - began))
+        report(history[-1])
+        if len(history) >= stop.iterations:
+            raise _Over("iterations")
+        if time.perf_counter() - began > stop.seconds:
+            raise _Over("time")
+
+    best = x
+    evaluated = Evaluated(problem)
+    noise = known if known is not None else noise_at(evaluated, [(white(s), white(w)) for s, w in limits], x)
+    k = 0
+    try:
+        for k in range(whitenings + 1):
+            best = _minimise(evaluated, noise, best, (low, high), count, loose=k < whitenings)
+            if k < whitenings:
+                noise = _seen(evaluated, noise, limits, best)
+    except _Over as over:
+        stopped, best = str(over), history[-1].x
+    except KeyboardInterrupt:
+        stopped, best = "interrupted", (history[-1].x if history else x)
+    if stopped != "minimum" and known is None and k < whitenings:  # intervals need the noise that is there
+        noise = _seen(evaluated, noise, limits, best)
+    seen_by_data = information(evaluated, noise, best)
+    covariance = np.linalg.inv(seen_by_data + np.eye(len(best)))
+    return Fit(
+        problem, best, (covariance + covariance.T) / 2, seen_by_data, noise, tuple(history), stopped,
+        tuple(evaluated.plain_residuals(best)),
+    )  # fmt: skip
+
+
+def _seen(
+    evaluated: Evaluated,
+    noise: tuple[tuple[Noise, Noise], ...],
+    limits: list[tuple[np.ndarray, np.ndarray]],
+    x: np.ndarray,
+) -> tuple[tuple[Noise, Noise], ...]:
+    """The noise that the residuals at x show, at least that of the instruments, with errors of form at x."""
+    channels = [
+        (estimated(sensors.without_form(T), floor[0]), estimated(tcp.without_form(w), floor[1]))
+        for (T, w), (sensors, tcp), floor in zip(evaluated.residuals(x), noise, limits, strict=True)
+    ]
+    return noise_at(evaluated, channels, x)
+
+
+def _minimise(
+    evaluated: Evaluated,
+    noise: tuple[tuple[Noise, Noise], ...],
+    x: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    count: Callable[[float, np.ndarray], None],
+    loose: bool,
+) -> np.ndarray:
+    def residual(x: np.ndarray) -> np.ndarray:
+        parts = [
+            part.ravel()
+            for (T, w), (sensors, tcp) in zip(evaluated.residuals(x), noise, strict=True)
+            for part in (sensors.whiten(T), tcp.whiten(w))
+        ]
+        return np.concatenate([*parts, x])
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        return np.vstack([-whitened_jacobian(evaluated, noise, x), np.eye(len(x))])
+
+    # one Gauss-Newton step less in passes whose noise is not yet final
+    tolerance = 100 * TOLERANCE if loose else TOLERANCE
+
+    def callback(intermediate_result: object) -> None:
+        count(float(getattr(intermediate_result, "cost")), np.asarray(getattr(intermediate_result, "x")))  # noqa: B009
+
+    found = least_squares(
+        residual, x, jacobian, bounds=bounds, method="trf", ftol=tolerance, xtol=tolerance, gtol=None,
+        callback=callback,
+    )  # fmt: skip
+    return np.asarray(found.x)

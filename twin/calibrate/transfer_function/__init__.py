@@ -1,0 +1,1 @@
+"""Transfer functions of paper 003 and their identification."""

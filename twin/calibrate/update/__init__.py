@@ -1,0 +1,1 @@
+"""Correction on the machine by sparse TCP measurements and by temperatures."""
