@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import jax.numpy as jnp
 
+from twin.physics.grouped import Value, grouped
 from twin.physics.powers import power
 
 LAMINAR, TURBULENT = 2300.0, 1e4
@@ -47,7 +50,32 @@ def _reynolds(flow, diameter, viscosity):
     return 4.0 * jnp.abs(flow) / (jnp.pi * diameter * viscosity)
 
 
-def coolant_channel(flow, diameter, channel_length, area, still, density, heat_capacity, conductivity, viscosity):
+@dataclass(frozen=True)
+class Channel:
+    """A channel and the film on its walls."""
+
+    diameter: Value  # m
+    channel_length: Value  # m
+    area: Value  # m^2
+    still: Value  # W/(m^2 K)
+
+
+@dataclass(frozen=True)
+class Coolant:
+    """What flows through a channel."""
+
+    density: Value  # kg/m^3
+    heat_capacity: Value  # J/(kg K)
+    conductivity: Value  # W/(m K)
+    viscosity: Value  # m^2/s
+
+    @property
+    def prandtl(self) -> Value:
+        return self.viscosity * self.density * self.heat_capacity / self.conductivity
+
+
+@grouped
+def coolant_channel(flow, channel: Channel, coolant: Coolant):
     """h of the wall of a coolant channel against the coolant's inlet temperature.
 
     h = h_still + rho c V (1 - exp(-NTU)) / A, NTU = h_wall pi d L / (rho c V), h_wall = Nu k / d by Gnielinski.
@@ -61,17 +89,18 @@ def coolant_channel(flow, diameter, channel_length, area, still, density, heat_c
     the cooler of paper 004 eq (4), which knows neither flow nor inlet temperature (erratum E-004-4).
     """
     volume = jnp.abs(flow)
-    pr = viscosity * density * heat_capacity / conductivity
-    nu = tube(_reynolds(flow, diameter, viscosity), pr, diameter / channel_length)
-    wall = nu * conductivity * jnp.pi * channel_length  # W/K
-    stream = density * heat_capacity * volume  # W/K
+    pr = coolant.prandtl
+    nu = tube(_reynolds(flow, channel.diameter, coolant.viscosity), pr, channel.diameter / channel.channel_length)
+    wall = nu * coolant.conductivity * jnp.pi * channel.channel_length  # W/K
+    stream = coolant.density * coolant.heat_capacity * volume  # W/K
     moving = stream > 0.0
     units = jnp.where(moving, wall / jnp.where(moving, stream, 1.0), 0.0)
-    return still - stream * jnp.expm1(-units) / area
+    return channel.still - stream * jnp.expm1(-units) / channel.area
 
 
-def coolant_channel_holds(flow, diameter, channel_length, area, still, density, heat_capacity, conductivity, viscosity):
+@grouped
+def coolant_channel_holds(flow, channel: Channel, coolant: Coolant):
     """Re < 1e6, 0.1 <= Pr <= 1000, d <= L."""
-    pr = viscosity * density * heat_capacity / conductivity
-    fluid = (pr >= 0.1) & (pr <= 1000.0) & (diameter <= channel_length)
-    return fluid & (_reynolds(flow, diameter, viscosity) < 1e6)
+    pr = coolant.prandtl
+    fluid = (pr >= 0.1) & (pr <= 1000.0) & (channel.diameter <= channel.channel_length)
+    return fluid & (_reynolds(flow, channel.diameter, coolant.viscosity) < 1e6)

@@ -6,9 +6,12 @@ Yovanovich's exponent 0.95; gas part: Yovanovich, DeVaal and Hegazy 1982.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import jax
 import jax.numpy as jnp
 
+from twin.physics.grouped import Value, grouped
 from twin.physics.powers import power
 
 # Relative pressures p/H of contacts, between which the separation has been fitted.
@@ -77,18 +80,61 @@ def gas_conductance(gas_conductivity, sigma, rarefaction_length, relative_separa
     return gas_conductivity * factor / (rarefaction_length + relative_separation * sigma)
 
 
-def _pressure(pressure, bolts, torque, pitch, flank_diameter, friction, hole_diameter, head_diameter, area):
-    bolted = (bolts > 0.0) & (area > 0.0) & (pitch > 0.0)
-    force = bolt_force(torque, jnp.where(bolted, pitch, 1.0), flank_diameter, friction, hole_diameter, head_diameter)
-    from_bolts = jnp.where(bolted, bolts * force / jnp.where(area > 0.0, area, 1.0), 0.0)
-    return jnp.where(pressure > 0.0, pressure, from_bolts)
+@dataclass(frozen=True)
+class Surfaces:
+    """Two surfaces in contact."""
+
+    conductivity_1: Value  # W/(m K)
+    conductivity_2: Value
+    roughness_1: Value  # m rms
+    roughness_2: Value
+    slope_1: Value  # 1, mean of the profile
+    slope_2: Value
+    hardness: Value  # Pa, contact hardness of the softer one
+
+    @property
+    def roughness(self) -> Value:
+        """sigma [m rms] of the gap between them."""
+        return jnp.sqrt(self.roughness_1**2 + self.roughness_2**2)
 
 
-def bolted_joint(
-    conductivity_1, conductivity_2, roughness_1, roughness_2, slope_1, slope_2, hardness, pressure, bolts, torque,
-    pitch, flank_diameter, bolt_friction, hole_diameter, head_diameter, area, gas_conductivity, rarefaction_length,
-    factor,
-):  # fmt: skip
+@dataclass(frozen=True)
+class Clamping:
+    """What presses a joint together: a pressure, or where that is 0 bolts over an area."""
+
+    pressure: Value  # Pa
+    bolts: Value  # 1
+    torque: Value  # N m, and the geometry of one bolt as in bolt_force
+    pitch: Value  # m
+    flank_diameter: Value  # m
+    bolt_friction: Value  # 1
+    hole_diameter: Value  # m
+    head_diameter: Value  # m
+    area: Value  # m^2 that the bolts press on
+
+    @property
+    def contact_pressure(self) -> Value:
+        """Pressure [Pa] given, or (0) that of the bolts; 0 with neither."""
+        bolted = (self.bolts > 0.0) & (self.area > 0.0) & (self.pitch > 0.0)
+        pitch = jnp.where(bolted, self.pitch, 1.0)
+        force = bolt_force(
+            self.torque, pitch, self.flank_diameter, self.bolt_friction, self.hole_diameter, self.head_diameter
+        )
+        from_bolts = jnp.where(bolted, self.bolts * force / jnp.where(self.area > 0.0, self.area, 1.0), 0.0)
+        return jnp.where(self.pressure > 0.0, self.pressure, from_bolts)
+
+
+@dataclass(frozen=True)
+class Gap:
+    """What fills a joint between the spots of contact."""
+
+    gas_conductivity: Value  # W/(m K)
+    rarefaction_length: Value  # m, B
+    factor: Value  # 1, f_g; 0: by gap_factor
+
+
+@grouped
+def bolted_joint(surfaces: Surfaces, clamping: Clamping, gap: Gap):
     """h_c = h_s + h_g of a joint under a pressure [Pa], given or (0) that of its bolts over `area` [m^2].
 
     Solid and gas parts by solid_conductance and gas_conductance; factor f_g given, or (0) by gap_factor. An oiled or
@@ -96,27 +142,23 @@ def bolted_joint(
     bolts there is no joint: 0, which a description is refused for.
     Source: paper 004 eqs (7)-(10) with errata E-004-5 and E-004-8.
     """
-    p = _pressure(pressure, bolts, torque, pitch, flank_diameter, bolt_friction, hole_diameter, head_diameter, area)
-    solid = solid_conductance(conductivity_1, conductivity_2, roughness_1, roughness_2, slope_1, slope_2, p, hardness)
-    sigma = jnp.sqrt(roughness_1**2 + roughness_2**2)
-    gap = separation(p, hardness)
-    thin = jnp.maximum(rarefaction_length, 0.01 * sigma)  # the fitted range of f_g ends there
-    f_g = jnp.where(factor > 0.0, factor, gap_factor(sigma, thin, gap))
-    gas = gas_conductance(gas_conductivity, sigma, rarefaction_length, gap, f_g)
+    p = clamping.contact_pressure
+    solid = solid_conductance(
+        surfaces.conductivity_1, surfaces.conductivity_2, surfaces.roughness_1, surfaces.roughness_2,
+        surfaces.slope_1, surfaces.slope_2, p, surfaces.hardness,
+    )  # fmt: skip
+    sigma = surfaces.roughness
+    planes = separation(p, surfaces.hardness)
+    thin = jnp.maximum(gap.rarefaction_length, 0.01 * sigma)  # the fitted range of f_g ends there
+    f_g = jnp.where(gap.factor > 0.0, gap.factor, gap_factor(sigma, thin, planes))
+    gas = gas_conductance(gap.gas_conductivity, sigma, gap.rarefaction_length, planes, f_g)
     return jnp.where(p > 0.0, solid + gas, 0.0)
 
 
-def bolted_joint_holds(
-    conductivity_1, conductivity_2, roughness_1, roughness_2, slope_1, slope_2, hardness, pressure, bolts, torque,
-    pitch, flank_diameter, bolt_friction, hole_diameter, head_diameter, area, gas_conductivity, rarefaction_length,
-    factor,
-):  # fmt: skip
+@grouped
+def bolted_joint_holds(surfaces: Surfaces, clamping: Clamping, gap: Gap):
     """1e-6 <= p/H <= 2.3e-2; with f_g by gap_factor also B/sigma >= 0.01 and 2 <= lambda <= 4."""
-    relative = (
-        _pressure(pressure, bolts, torque, pitch, flank_diameter, bolt_friction, hole_diameter, head_diameter, area)
-        / hardness
-    )
-    sigma = jnp.sqrt(roughness_1**2 + roughness_2**2)
-    gap = separation(relative, 1.0)
-    fitted = (rarefaction_length >= 0.01 * sigma) & (gap >= 2.0) & (gap <= 4.0)
-    return (relative >= LEAST) & (relative <= MOST) & ((factor > 0.0) | fitted)
+    relative = clamping.contact_pressure / surfaces.hardness
+    planes = separation(relative, 1.0)
+    fitted = (gap.rarefaction_length >= 0.01 * surfaces.roughness) & (planes >= 2.0) & (planes <= 4.0)
+    return (relative >= LEAST) & (relative <= MOST) & ((gap.factor > 0.0) | fitted)

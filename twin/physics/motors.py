@@ -6,7 +6,11 @@ is declared with its signal (erratum E-000-4). Copper heats at standstill: a ver
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import jax.numpy as jnp
+
+from twin.physics.grouped import Value, grouped
 
 COPPER = 0.00393  # 1/K, at 20 degC
 
@@ -80,17 +84,41 @@ def servo_motor_holds(current, speed, temperature, resistance, coefficient, hyst
     return winding_holds(temperature)
 
 
-def axis_motor(current, speed, temperature, resistance, coefficient, lead, hysteresis, eddy, friction_torque):
+@dataclass(frozen=True)
+class Winding:
+    """What the current of a motor flows through."""
+
+    temperature: Value  # degC
+    resistance: Value  # ohm, of a phase at 20 degC
+    coefficient: Value  # 1/K
+
+
+@dataclass(frozen=True)
+class Turning:
+    """What a motor loses by turning, and how far it moves its axis."""
+
+    lead: Value  # m per revolution
+    hysteresis: Value  # W s
+    eddy: Value  # W s^2
+    friction_torque: Value  # N m
+
+
+@grouped
+def axis_motor(current, speed, winding: Winding, turning: Turning):
     """Losses of the motor of a screw-driven axis, by axis speed: servo_motor at n = v / lead.
 
     speed v [m/s] of the axis, lead [m] of screw and gear together per motor revolution; the rest as servo_motor.
     """
-    return servo_motor(current, speed / lead, temperature, resistance, coefficient, hysteresis, eddy, friction_torque)
+    return servo_motor(
+        current, speed / turning.lead, winding.temperature, winding.resistance, winding.coefficient,
+        turning.hysteresis, turning.eddy, turning.friction_torque,
+    )  # fmt: skip
 
 
-def axis_motor_holds(current, speed, temperature, resistance, coefficient, lead, hysteresis, eddy, friction_torque):
+@grouped
+def axis_motor_holds(current, speed, winding: Winding, turning: Turning):
     """Winding temperature in the range of linear resistance."""
-    return winding_holds(temperature)
+    return winding_holds(winding.temperature)
 
 
 def motor_torque(torque, speed, temperature, resistance, coefficient, torque_constant, hysteresis, eddy):
