@@ -6,6 +6,8 @@ treated as on a meshed rail, and everything downstream (drive, stepper, reductio
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -22,6 +24,7 @@ from twin.build.lumped_body import (
     unit,
 )
 from twin.build.ports import ContactPorts, switch_of
+from twin.build.terms import Term, columns, joint_term
 from twin.build.thermal import machine_model
 from twin.build.wiring import load_model
 from twin.errors import DescriptionError
@@ -115,67 +118,63 @@ def stations(machine: Machine, bar_name: str, along: np.ndarray) -> tuple[float,
 
 
 def _body(machine: Machine, body: LumpedBody, ports: ContactPorts, load: LoadModel) -> AffineBody:
-    one = np.ones(body.n)
     capacities = np.concatenate([capacity(machine, member) for member in body.members])
-    height = heights(machine, body)
-    A, theta, M, H = [], [], [], []
-    for k, film in enumerate(load.films):
-        areas = film_areas(machine, machine.films[film.name], body)
-        if areas.any():
-            A.append(sp.csr_array(sp.diags_array(areas)))
-            theta.append(k)
-            M.append(areas)
-            H.append(areas * height)
-    for j, joint in enumerate(load.joints):
-        contact = machine.contacts[joint.name]
-        if contact.surfaces is not None and contact.surfaces[0] in body:
-            gap = row(machine, body, contact.surfaces[0]) - row(machine, body, contact.surfaces[1])
-            # a total [W/K] is the coefficient itself
-            A.append(
-                sp.csr_array(np.outer(gap, gap)) * (1.0 if contact.total is not None else float(contact.area or 0.0))
-            )
-            theta.append(len(load.films) + j)
-            M.append(np.zeros(body.n))
-            H.append(np.zeros(body.n))
-    B, sources = [], []
-    for i, source in enumerate(load.sources):
-        place = machine.sources[source.name].surface
-        if place is not None and place in body:
-            B.append(row(machine, body, place))
-            sources.append(i)
-    P = [(i, _port(machine, body, ports, i)) for i, owner in enumerate(ports.parts) if owner in body]
-    rows = {}
-    for name, sensor in machine.sensors.items():
-        if sensor.part is not None and sensor.part in body:
-            bar = machine.bars.get(sensor.part)
-            weights = at(bar, np.asarray(sensor.position)) if bar and sensor.position else mean(machine, sensor.part)
-            rows[name] = row(machine, body, sensor.part, weights)
+    terms = [*_film_terms(machine, body, load), *_joint_terms(machine, body, load)]
+    heated = {i: place for i, s in enumerate(load.sources) if (place := machine.sources[s.name].surface) is not None}
+    B = {i: row(machine, body, place) for i, place in heated.items() if place in body}
+    P = {i: _port(machine, body, ports, i) for i, owner in enumerate(ports.parts) if owner in body}
+    rows = _sensor_rows(machine, body)
     structural = [name for name, s in machine.sensors.items() if s.environment is None]
     graded = any(e.gradient != 0.0 for e in load.environments)
     return AffineBody(
         name=body.name,
         E=sp.csr_array(sp.diags_array(capacities)),
         A0=conduction(machine, body),
-        A=tuple(A),
-        theta=tuple(theta),
-        M=_columns(M, body.n),
-        B=_columns(B, body.n),
-        sources=tuple(sources),
-        P=_columns([p for _, p in P], body.n),
-        ports=tuple(i for i, _ in P),
+        A=tuple(t.matrix for t in terms),
+        theta=tuple(t.coefficient for t in terms),
+        M=columns([t.area for t in terms], body.n),
+        B=columns(list(B.values()), body.n),
+        sources=tuple(B),
+        P=columns(list(P.values()), body.n),
+        ports=tuple(P),
         C=np.array(list(rows.values())).reshape(-1, body.n),
         sensors=tuple(structural.index(name) for name in rows),
         G=np.zeros((0, 3, body.n)),
-        one=one,
+        one=np.ones(body.n),
         energy=capacities,
-        H=_columns(H, body.n) if graded else None,
+        H=columns([t.moment for t in terms], body.n) if graded else None,
         members=body.members,
         first=body.first,
     )
 
 
-def _columns(columns: list[np.ndarray], n: int) -> np.ndarray:
-    return np.column_stack(columns) if columns else np.zeros((n, 0))
+def _film_terms(machine: Machine, body: LumpedBody, load: LoadModel) -> Iterator[Term]:
+    height = heights(machine, body)
+    for k, film in enumerate(load.films):
+        areas = film_areas(machine, machine.films[film.name], body)
+        if areas.any():
+            yield Term(k, sp.csr_array(sp.diags_array(areas)), areas, areas * height)
+
+
+def _joint_terms(machine: Machine, body: LumpedBody, load: LoadModel) -> Iterator[Term]:
+    for j, joint in enumerate(load.joints):
+        contact = machine.contacts[joint.name]
+        if contact.surfaces is not None and contact.surfaces[0] in body:
+            gap = row(machine, body, contact.surfaces[0]) - row(machine, body, contact.surfaces[1])
+            # a total [W/K] is the coefficient itself
+            area = 1.0 if contact.total is not None else float(contact.area or 0.0)
+            yield joint_term(len(load.films) + j, sp.csr_array(np.outer(gap, gap)) * area)
+
+
+def _sensor_rows(machine: Machine, body: LumpedBody) -> dict[str, np.ndarray]:
+    """Weights (n,) of every sensor on the body."""
+    rows = {}
+    for name, sensor in machine.sensors.items():
+        if sensor.part is not None and sensor.part in body:
+            bar = machine.bars.get(sensor.part)
+            weights = at(bar, np.asarray(sensor.position)) if bar and sensor.position else mean(machine, sensor.part)
+            rows[name] = row(machine, body, sensor.part, weights)
+    return rows
 
 
 def _port(machine: Machine, body: LumpedBody, ports: ContactPorts, number: int) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from twin.build.ports import ContactPorts, contact_ports, port_averages
 from twin.build.probe import probe
 from twin.build.surface import mass, patch
 from twin.build.tanks import with_tanks
+from twin.build.terms import Term, columns, joint_term
 from twin.build.wiring import load_model
 from twin.errors import DescriptionError, Problem, TwinError
 from twin.machine.bodies import split_surface
@@ -122,41 +123,22 @@ def _body(
     A0 = sp.csr_array(sp.block_diag([a for _, a in parts], format="csr"))
     one = np.ones(body.n)
     own = {part.name for part in body.parts}
-
-    A, theta, M, H = [], [], [], []
     height = body.nodes[:, "xyz".index(machine.machine.vertical)]
-    for k, film in enumerate(load.films):
-        surfaces = [(p, s) for p, s in films[film.name] if p in own]
-        if surfaces:
-            A.append(_film_matrix(body, surfaces))
-            theta.append(k)
-            M.append(A[-1] @ one)
-            H.append(A[-1] @ height)
-    for j, joint in enumerate(load.joints):
-        pair = machine.contacts[joint.name].surfaces
-        if pair is not None and split_surface(pair[0])[0] in own:
-            A.append(interface(body, *pair, where=f"contacts.{joint.name}").matrix)
-            theta.append(len(load.films) + j)
-            M.append(np.zeros(body.n))
-            H.append(np.zeros(body.n))
-
-    B, sources = [], []
-    for i, source in enumerate(load.sources):
-        surface = machine.sources[source.name].surface
-        if surface is not None and split_surface(surface)[0] in own:
-            B.append(_spread(body, surface))
-            sources.append(i)
+    terms = [*_film_terms(body, films, load, height), *_joint_terms(machine, body, load)]
+    heated = {i: place for i, s in enumerate(load.sources) if (place := machine.sources[s.name].surface) is not None}
+    B = {i: _spread(body, surface) for i, surface in heated.items() if split_surface(surface)[0] in own}
     P, port_numbers = port_averages(body, ports)
     sensors = _structural(machine)
+    graded = any(e.gradient for e in load.environments)
     bare = AffineBody(
         name=body.name,
         E=E,
         A0=A0,
-        A=tuple(A),
-        theta=tuple(theta),
-        M=np.column_stack(M) if M else np.zeros((body.n, 0)),
-        B=np.column_stack(B) if B else np.zeros((body.n, 0)),
-        sources=tuple(sources),
+        A=tuple(t.matrix for t in terms),
+        theta=tuple(t.coefficient for t in terms),
+        M=columns([t.area for t in terms], body.n),
+        B=columns(list(B.values()), body.n),
+        sources=tuple(B),
         P=P,
         ports=port_numbers,
         C=np.array(list(rows.values())) if rows else np.zeros((0, body.n)),
@@ -164,11 +146,29 @@ def _body(
         G=np.zeros((0, 3, body.n)),
         one=one,
         energy=E @ one,
-        H=np.column_stack(H) if H and any(e.gradient for e in load.environments) else None,
+        H=columns([t.moment for t in terms], body.n) if terms and graded else None,
         members=tuple(part.name for part in body.parts),
         first=tuple(int(offset) for offset in body.offsets),
     )
     return with_tanks(machine, body, bare)
+
+
+def _film_terms(body: BodyMesh, films: FilmSurfaces, load: LoadModel, height: np.ndarray) -> Iterator[Term]:
+    """height (n,) m of the nodes."""
+    own = {part.name for part in body.parts}
+    for k, film in enumerate(load.films):
+        surfaces = [(p, s) for p, s in films[film.name] if p in own]
+        if surfaces:
+            matrix = _film_matrix(body, surfaces)
+            yield Term(k, matrix, matrix @ np.ones(body.n), matrix @ height)
+
+
+def _joint_terms(machine: Machine, body: BodyMesh, load: LoadModel) -> Iterator[Term]:
+    own = {part.name for part in body.parts}
+    for j, joint in enumerate(load.joints):
+        pair = machine.contacts[joint.name].surfaces
+        if pair is not None and split_surface(pair[0])[0] in own:
+            yield joint_term(len(load.films) + j, interface(body, *pair, where=f"contacts.{joint.name}").matrix)
 
 
 def _structural(machine: Machine) -> tuple[str, ...]:
