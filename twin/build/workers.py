@@ -18,7 +18,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, BinaryIO, Generic, TypeVar
 
 from twin.errors import ModelError
 
@@ -52,58 +52,71 @@ def each(
     sent to every helper once. Everything is pickled. progress: called here, in the order of completion. long: s of work
     left that are worth a helper (0: at once). Exceptions of a piece are raised here; helpers are gone in any case.
     """
-    results: dict[int, R] = {}
+    work = _Work(function, shared, items)
     began = time.perf_counter()
-    todo = iter(range(len(items)))
-    lock = threading.Lock()
-    failed: list[BaseException] = []
-    finished: list[int] = []  # by helpers, not yet reported
-
-    def take() -> int | None:
-        with lock:
-            return None if failed else next(todo, None)
-
-    def serve(helper: _Helper) -> None:
-        try:
-            helper.send((function.__module__, function.__qualname__, shared))
-            while (i := take()) is not None:
-                results[i] = helper.ask(items[i])
-                finished.append(i)
-        except BaseException as e:
-            failed.append(e)
-
-    helpers: list[_Helper] = []
-    threads: list[threading.Thread] = []
-
-    def call_helpers(left: int) -> None:
-        """As many as there are cores and pieces of work besides this process and its next piece."""
-        helpers.extend(_Helper() for _ in range(min(workers(), left) - 1))
-        threads.extend(threading.Thread(target=serve, args=(helper,), daemon=True) for helper in helpers)
-        for thread in threads:
-            thread.start()
-
     try:
         if long <= 0.0:
-            call_helpers(len(items))
-        while (i := take()) is not None:
-            results[i] = function(shared, items[i])
+            work.call_helpers(len(items))
+        while (i := work.take()) is not None:
+            work.results[i] = function(shared, items[i])
             progress(items[i])
             ahead = len(items) - i - 1
-            if not helpers and ahead > 1 and (time.perf_counter() - began) / (i + 1) * ahead > long:
-                call_helpers(ahead)
-            while finished:
-                progress(items[finished.pop(0)])
-        for thread in threads:
+            if not work.helpers and ahead > 1 and (time.perf_counter() - began) / (i + 1) * ahead > long:
+                work.call_helpers(ahead)
+            work.report(progress)
+        work.wait()
+        work.report(progress)
+    finally:
+        for helper in work.helpers:
+            helper.close()
+    if work.failed:
+        raise work.failed[0]
+    return [work.results[i] for i in range(len(items))]
+
+
+class _Work(Generic[T, R]):
+    """Pieces of work that this process and its helpers take one after the other."""
+
+    def __init__(self, function: Callable[[Any, T], R], shared: Any, items: Sequence[T]) -> None:
+        self._function, self._shared, self._items = function, shared, items
+        self._todo, self._lock = iter(range(len(items))), threading.Lock()
+        self._finished: list[int] = []  # by helpers, not yet reported
+        self._threads: list[threading.Thread] = []
+        self.helpers: list[_Helper] = []
+        self.results: dict[int, R] = {}
+        self.failed: list[BaseException] = []
+
+    def take(self) -> int | None:
+        """The next piece; None where none is left, or one has failed."""
+        with self._lock:
+            return None if self.failed else next(self._todo, None)
+
+    def call_helpers(self, left: int) -> None:
+        """As many as there are cores and pieces of work besides this process and its next piece."""
+        self.helpers.extend(_Helper() for _ in range(min(workers(), left) - 1))
+        self._threads.extend(threading.Thread(target=self._serve, args=(h,), daemon=True) for h in self.helpers)
+        for thread in self._threads:
+            thread.start()
+
+    def _serve(self, helper: _Helper) -> None:
+        try:
+            helper.send((self._function.__module__, self._function.__qualname__, self._shared))
+            while (i := self.take()) is not None:
+                self.results[i] = helper.ask(self._items[i])
+                self._finished.append(i)
+        except BaseException as e:
+            self.failed.append(e)
+
+    def report(self, progress: Callable[[T], None]) -> None:
+        """What helpers have finished since the last report, in this thread."""
+        while self._finished:
+            progress(self._items[self._finished.pop(0)])
+
+    def wait(self) -> None:
+        """Until the helpers have finished."""
+        for thread in self._threads:
             while thread.is_alive():
                 thread.join(0.2)  # in turns: an interrupt must get through
-        while finished:
-            progress(items[finished.pop(0)])
-    finally:
-        for helper in helpers:
-            helper.close()
-    if failed:
-        raise failed[0]
-    return [results[i] for i in range(len(items))]
 
 
 class _Helper:
