@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -87,6 +88,19 @@ def _named_triangles(data: meshio.Mesh) -> dict[str, np.ndarray]:
     without a name (VTU, Medit) become "surface_<tag>".
     """
     corners = [c.data[:, :3] if c.type.startswith("triangle") else None for c in data.cells]
+    pieces = _of_cell_sets(data, corners)
+    for name, triangles in _of_tags(data, corners):
+        if name not in data.cell_sets:
+            pieces.setdefault(name, []).append(triangles)
+    for name, entry in data.field_data.items():
+        if len(entry) == 2 and entry[1] == 2:
+            pieces.setdefault(name, [])  # named in the file, but without triangles
+    empty = np.zeros((0, 3), dtype=int)
+    return {name: np.vstack([empty, *found]) for name, found in pieces.items()}
+
+
+def _of_cell_sets(data: meshio.Mesh, corners: list[np.ndarray | None]) -> dict[str, list[np.ndarray]]:
+    """Triangles of every cell set that is a surface: those without any unless they are of a volume, line or point."""
     solid = [c.type.startswith("tetra") for c in data.cells]
     pieces: dict[str, list[np.ndarray]] = {}
     for name, per_block in data.cell_sets.items():
@@ -97,19 +111,18 @@ def _named_triangles(data: meshio.Mesh) -> dict[str, np.ndarray]:
         elsewhere = name in data.field_data and data.field_data[name][1] != 2  # a named volume, line or point
         if sum(map(len, chosen)) or not (in_solid or elsewhere):
             pieces[name] = chosen
+    return pieces
+
+
+def _of_tags(data: meshio.Mesh, corners: list[np.ndarray | None]) -> Iterator[tuple[str, np.ndarray]]:
+    """Triangles of one tag in one block, under each of its names."""
     tags, names = _surface_tags(data)
     for c, tag in zip(corners, tags, strict=True):
         if c is None or tag is None:
             continue
         for value in np.unique(tag):
             for name in names.get(int(value), [f"surface_{value}"]):
-                if name not in data.cell_sets:
-                    pieces.setdefault(name, []).append(c[tag == value])
-    for name, entry in data.field_data.items():
-        if len(entry) == 2 and entry[1] == 2:
-            pieces.setdefault(name, [])  # named in the file, but without triangles
-    empty = np.zeros((0, 3), dtype=int)
-    return {name: np.vstack([empty, *found]) for name, found in pieces.items()}
+                yield name, c[tag == value]
 
 
 def _surface_tags(data: meshio.Mesh) -> tuple[list[np.ndarray | None], dict[int, list[str]]]:
