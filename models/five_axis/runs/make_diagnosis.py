@@ -145,9 +145,8 @@ def log_of(day: Day) -> list[Column]:
     time = np.arange(0.0, DURATION + SAMPLING / 2, SAMPLING)
     noise = 0.03 * np.random.default_rng(day.seed + 100).standard_normal((len(time), 3))
     current = np.sqrt(means(m.spindle_current**2))
-    room, enclosure, wind = air(day, time, current)
     spindle = means(m.spindle_speed), current
-    return columns_of(time, m.path, m.speed, m.current, noise, spindle, room, enclosure, wind)
+    return columns_of(time, m.path, m.speed, m.current, noise, spindle, air(day, time, current))
 
 
 def thinned(columns: list[Column]) -> list[Column]:

@@ -77,7 +77,7 @@ def main() -> None:
     )
     spindle_current = np.sqrt(means((SPINDLE_CURRENT * cutting) ** 2 + (2.0 * testing) ** 2))
     spindle = means(SPINDLE_SPEED * cutting), spindle_current
-    columns = columns_of(time, path, speed, current, noise, spindle, room, enclosure, wind)
+    columns = columns_of(time, path, speed, current, noise, spindle, (room, enclosure, wind))
     folder = Path(__file__).parent / "identification"
     folder.mkdir(exist_ok=True)
     (folder / "loads.csv").write_text(table(columns), encoding="utf-8")

@@ -149,9 +149,8 @@ def log_of(experiment: Experiment) -> list[Column]:
     time = np.arange(0.0, DURATION + SAMPLING / 2, SAMPLING)
     rng = np.random.default_rng(0)
     noise = 0.03 * rng.standard_normal((len(time), 3))
-    room, enclosure, wind = air(experiment, time)
     spindle = means(100.0 * orienting), means(2.0 * testing)
-    return columns_of(time, path, speed, current, noise, spindle, room, enclosure, wind)
+    return columns_of(time, path, speed, current, noise, spindle, air(experiment, time))
 
 
 def columns_of(
@@ -161,15 +160,14 @@ def columns_of(
     current: np.ndarray,
     noise: np.ndarray,
     spindle: tuple[np.ndarray, np.ndarray],
-    room: np.ndarray,
-    enclosure: np.ndarray,
-    wind: np.ndarray,
+    shop: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> list[Column]:
     """The columns of a log: header, values at time (n,) s, decimals.
 
     path (m, 5), speed (m, 3) [m/s] and current (m, 3) [A] at the resolution FINE; noise (n, 3) [A]; spindle: its speed
-    [1/min] and current [A], (n,) each; room, enclosure [degC] and wind [m/s], (n,) each.
+    [1/min] and current [A], (n,) each; shop: its air and that behind the enclosure [degC] and wind [m/s], (n,) each.
     """
+    room, enclosure, wind = shop
     logged = path[:: round(SAMPLING / FINE)]
     columns = [("time [s]", time, 0)]
     columns += [(f"{a}_position [mm]", 1e3 * logged[:, k], 1) for k, a in enumerate("xyz")]
