@@ -36,11 +36,13 @@ def command(
     """Step the full model of MACHINE through the loads of RUN; writes temperatures and TCP rows to OUTPUT."""
     from pathlib import Path
 
+    from twin.build.remesh import remesh
     from twin.build.simulate import Noise, simulate_run
     from twin.cli.quantity import positive
     from twin.cli.sound import require_sound
     from twin.errors import LogError
     from twin.logs.write import refuse_to_destroy, write_run
+    from twin.machine.load import load_machine
     from twin.progress import bar
 
     noise = Noise(
@@ -54,10 +56,10 @@ def command(
         raise LogError("is the run that is read", output, "choose another folder with -o")
     refuse_to_destroy(Path(output))  # now, not after hours
     require_sound(Path(machine))
+    described = load_machine(Path(machine))
     result, balance = simulate_run(
-        Path(machine),
+        described if mesh_size is None else remesh(described, mesh_size),
         Path(run),
-        mesh_size=mesh_size,
         dt=step,
         substeps=substeps,
         hours=hours,
