@@ -181,29 +181,39 @@ def _clean(
     time = np.asarray(time, dtype=float)
     if time.ndim != 1 or len(time) == 0 or not np.all(np.diff(time) > 0.0) or not np.all(np.isfinite(time)):
         raise LogError("times do not increase strictly", "loads", "run `twin check` on the run folder")
-    uses = [source.use for source in load_model.sources] + [film.use for film in load_model.films]
-    needed = {name for use in uses for name in use.signals.values()}
-    needed |= {a.position for a in load_model.axes} | {e.signal for e in load_model.environments if e.signal}
-    needed |= {c.switch for c in load_model.joints + load_model.pairs if c.switch}
-    needed |= {e.switch for e in load_model.environments if e.switch}
+    needed = _needed(load_model)
     defaults = {s.name: s.default for s in load_model.signals if s.default is not None and s.name not in signals}
     absent = sorted(name for name in needed if name not in signals and name not in defaults)
     if absent:
         raise LogError(f"missing signals: {', '.join(absent)}", "loads", "log them, or run `twin check` to see columns")
     values, missing = {name: np.full(len(time), value) for name, value in defaults.items()}, {}
     for name in sorted((needed - set(defaults)) | {s.name for s in load_model.signals if s.name in signals}):
-        raw = np.asarray(signals[name], dtype=float)
-        if raw.shape != time.shape:
-            raise LogError(f"{raw.size} values for {time.size} times", f"loads: {name}", "give one value per time")
-        lost = ~np.isfinite(raw)
-        if lost.all():
-            if name not in needed:
-                continue
+        filled, lost = _filled(name, np.asarray(signals[name], dtype=float), time)
+        if filled is not None:
+            values[name], missing[name] = filled, lost
+        elif name in needed:
             raise LogError("no valid value at all", f"loads: {name}", "check the sensor or the column's unit")
-        last = np.maximum.accumulate(np.where(lost, -1, np.arange(len(raw))))
-        values[name] = raw[np.where(last < 0, np.argmin(lost), last)]  # before the first value: that first value
-        missing[name] = lost
     return time, values, missing, sorted(needed & set(defaults))
+
+
+def _needed(load_model: LoadModel) -> set[str]:
+    """Signals that laws, positions, environments and switches read."""
+    uses = [source.use for source in load_model.sources] + [film.use for film in load_model.films]
+    needed = {name for use in uses for name in use.signals.values()}
+    needed |= {a.position for a in load_model.axes} | {e.signal for e in load_model.environments if e.signal}
+    needed |= {c.switch for c in load_model.joints + load_model.pairs if c.switch}
+    return needed | {e.switch for e in load_model.environments if e.switch}
+
+
+def _filled(name: str, raw: np.ndarray, time: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+    """A signal with each gap at the value before it, the first at the one after, and where; None without any value."""
+    if raw.shape != time.shape:
+        raise LogError(f"{raw.size} values for {time.size} times", f"loads: {name}", "give one value per time")
+    lost = ~np.isfinite(raw)
+    if lost.all():
+        return None, lost
+    last = np.maximum.accumulate(np.where(lost, -1, np.arange(len(raw))))
+    return raw[np.where(last < 0, np.argmin(lost), last)], lost
 
 
 def _pad_coordinate(pair: Pair, position: np.ndarray) -> np.ndarray:
