@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -29,26 +30,40 @@ def read_segments(value: Any, where: str, first: float, last: float) -> tuple[Se
         raise LogError("segments is no list of tables", where, _EXAMPLE)
     problems: list[Problem] = []
     segments = [s for k, entry in enumerate(value) if (s := _segment(k, entry, where, problems))]
-    for s in segments:
-        what = ""
-        if not s.start < s.end:
-            what = f"is empty: it starts at {s.start:g} s and ends at {s.end:g} s"
-        elif s.start < min(first, 0.0) or s.start >= last or s.end > last + 0.5 * (s.end - s.start):
-            what = f"{s.start:g} .. {s.end:g} s lies outside the loads, {first:g} .. {last:g} s"
-        if what:
-            remedy = "times count from the start of the run: mend start and end"
-            problems.append(Problem(f"segment '{s.name}' {what}", where, remedy))
+    problems += [p for s in segments if (p := _misplaced(s, where, first, last))]
     segments.sort(key=lambda s: (s.start, s.end))
-    for a, b in pairwise([s for s in segments if s.start < s.end]):
-        if b.start < a.end:
-            what = f"segments '{a.name}' and '{b.name}' overlap between {b.start:g} and {min(a.end, b.end):g} s"
-            problems.append(Problem(what, where, "end the one where the other starts, or sooner"))
-    names = [s.name for s in segments]
-    for name in sorted({n for n in names if names.count(n) > 1}):
-        problems.append(Problem(f"{names.count(name)} segments are called '{name}'", where, "give each its own name"))
+    problems += [*_overlaps(segments, where), *_namesakes(segments, where)]
     if problems:
         raise LogError.collect(problems)
     return tuple(segments)
+
+
+def _misplaced(segment: Segment, where: str, first: float, last: float) -> Problem | None:
+    """An empty segment, or one outside the loads."""
+    start, end = segment.start, segment.end
+    if not start < end:
+        what = f"is empty: it starts at {start:g} s and ends at {end:g} s"
+    elif start < min(first, 0.0) or start >= last or end > last + 0.5 * (end - start):
+        what = f"{start:g} .. {end:g} s lies outside the loads, {first:g} .. {last:g} s"
+    else:
+        return None
+    return Problem(
+        f"segment '{segment.name}' {what}", where, "times count from the start of the run: mend start and end"
+    )
+
+
+def _overlaps(segments: list[Segment], where: str) -> Iterator[Problem]:
+    """segments in the order of time."""
+    for a, b in pairwise([s for s in segments if s.start < s.end]):
+        if b.start < a.end:
+            what = f"segments '{a.name}' and '{b.name}' overlap between {b.start:g} and {min(a.end, b.end):g} s"
+            yield Problem(what, where, "end the one where the other starts, or sooner")
+
+
+def _namesakes(segments: list[Segment], where: str) -> Iterator[Problem]:
+    for name, n in sorted(Counter(s.name for s in segments).items()):
+        if n > 1:
+            yield Problem(f"{n} segments are called '{name}'", where, "give each its own name")
 
 
 def _segment(k: int, entry: Mapping[str, Any], where: str, problems: list[Problem]) -> Segment | None:
