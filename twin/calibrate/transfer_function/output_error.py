@@ -29,14 +29,13 @@ def fit_oe(
     hold: Hold = "linear",
     direct: bool = False,
     starts: Sequence[int] = (0,),
-    slowest: float | None = None,
 ) -> TransferFunction:
     """Transfer function of `order` poles from inputs u (n, m) or (n,) to y (n,), sampled every dt [s].
 
     pairs: how many of them are conjugate pairs (thermal ones are real: 0). hold: the inputs between samples. direct: a
     free direct effect of u(k) on y(k) as well. NaN in y: not measured; y may be as sparse as R-tests are. starts: first
-    rows of tests, at rest there. y and u are deviations from that rest. slowest: bound of time constants [s], by
-    default ten times the longest test.
+    rows of tests, at rest there. y and u are deviations from that rest. Time constants are sought up to ten times the
+    longest test.
 
     Raises ModelError where fewer values were measured than there are unknowns.
     """
@@ -51,7 +50,7 @@ def fit_oe(
     if len(target) < unknowns + 1:
         raise ModelError(f"{len(target)} values for {unknowns} unknowns", "", "lower the order, or use fewer inputs")
     longest = dt * max(b - a for a, b in tests)
-    low, high = 0.1 * dt, slowest if slowest is not None else 10.0 * longest
+    low, high = 0.1 * dt, 10.0 * longest
     real = order - 2 * pairs
     scale = float(np.linalg.norm(target)) or 1.0
 
