@@ -93,29 +93,39 @@ def _syntax_remedy(text: str, message: str) -> str:
 
 def _schema_problems(data: dict[str, Any]) -> tuple[list[tuple[Keys, Problem]], dict[str, Any]]:
     """What the types refuse, and the description without it: unknown keys left out, broken entries None."""
-    try:
-        Machine.model_validate({k: v for k, v in data.items() if k != "folder"})
-        found: dict[Keys, Problem] = {}
-    except ValidationError as error:
-        found = {}
-        for detail in error.errors(include_url=False, include_context=False):
-            keys, problem = schema_problem(detail, data)
-            found.setdefault(keys, problem)  # every branch of a union complains; the first will do
+    found = _refused(data)
     if not any(isinstance(data.get(key), dict) and data[key] for key in ("nodes", "bars")):
         found |= {(key,): missing_section(key) for key in _OF_PARTS if key not in data or data[key] == {}}
         place = {section: i for i, section in enumerate(Machine.model_fields)}
         found = dict(sorted(found.items(), key=lambda item: place.get(item[0][0] if item[0] else "", -1)))
     if "folder" in data:
         found["folder",] = Problem("unknown key 'folder'", "folder", "remove it")
-    sound = deepcopy(data)
     unknown = [keys for keys in found if _has(data, keys) and keys[-1] not in (known_keys(keys[:-1]) or [keys[-1]])]
+    mistyped = {(*keys[:-1], _meant(keys, data)) for keys in unknown}
+    told = [(keys, p) for keys, p in found.items() if keys not in mistyped or keys in unknown]
+    return told, _sound(data, unknown, [keys for keys in found if keys not in unknown])
+
+
+def _refused(data: dict[str, Any]) -> dict[Keys, Problem]:
+    """What the types refuse, one problem per place."""
+    found: dict[Keys, Problem] = {}
+    try:
+        Machine.model_validate({k: v for k, v in data.items() if k != "folder"})
+    except ValidationError as error:
+        for detail in error.errors(include_url=False, include_context=False):
+            keys, problem = schema_problem(detail, data)
+            found.setdefault(keys, problem)  # every branch of a union complains; the first will do
+    return found
+
+
+def _sound(data: dict[str, Any], unknown: list[Keys], broken: list[Keys]) -> dict[str, Any]:
+    """A copy without unknown keys, and with None for broken entries."""
+    sound = deepcopy(data)
     for keys in unknown:
         _get(sound, keys[:-1]).pop(keys[-1])
-    for keys in found:
-        if keys not in unknown:
-            _mark_broken(sound, keys)
-    mistyped = {(*keys[:-1], _meant(keys, data)) for keys in unknown}
-    return [(keys, p) for keys, p in found.items() if keys not in mistyped or keys in unknown], sound
+    for keys in broken:
+        _mark_broken(sound, keys)
+    return sound
 
 
 _OF_PARTS = ("materials", "parts", "tcp", "supports")  # sections that only lumped machines can do without

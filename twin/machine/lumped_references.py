@@ -170,26 +170,30 @@ def _moving(contact: description.Contact, where: str, machine: Machine) -> Itera
         yield Problem("'surfaces' in a moving contact", f"{where}.surfaces", "write pairs = [['bar', 'node']]")
     if not contact.pairs:
         yield Problem("a moving contact without pairs", where, "give pairs = [['bar', 'node']]: rail or screw, and pad")
-    axis = machine.axes.get(contact.axis or "")
     elsewhere = {r: c.axis for c in machine.contacts.values() if c is not None for r, _ in c.pairs}
     for rail, pad in contact.pairs:
         if elsewhere[rail] != contact.axis:
             remedy = "a rail or screw belongs to one axis: give each axis its bar"
             yield Problem(f"bar '{rail}' is of axis '{elsewhere[rail]}' too", f"{where}.pairs", remedy)
-        yield from _place(rail, f"{where}.pairs", machine, whole=True, ends=False, nodes=False)
-        if pad not in machine.nodes:
-            remedy = did_you_mean(pad, machine.nodes, "nodes")
-            yield Problem(f"no node '{pad}'", f"{where}.pairs", f"a pair is a bar and the node on it; {remedy}")
-        elif (node := machine.nodes[pad]) is not None and node.position is None:
-            remedy = "where it is at axis positions zero: position = [0.1, 0, 0.2]"
-            yield Problem(f"'{pad}' runs on '{rail}' but has no position", f"nodes.{pad}", remedy)
-        bar = machine.bars.get(rail)
-        if bar is None or axis is None:
-            continue
-        lengths = np.linalg.norm(bar.direction) * np.linalg.norm(axis.direction)  # zero is reported elsewhere
-        if np.linalg.norm(np.cross(bar.direction, axis.direction)) > PARALLEL * lengths:
-            remedy = f"its direction {list(bar.direction)} must be that of axis '{contact.axis}', or its opposite"
-            yield Problem(f"bar '{rail}' is not parallel to the axis", f"{where}.pairs", remedy)
+        yield from _pair(rail, pad, contact.axis or "", f"{where}.pairs", machine)
+
+
+def _pair(rail: str, pad: str, axis_name: str, where: str, machine: Machine) -> Iterator[Problem]:
+    """A bar along the axis, and a node with a position on it."""
+    yield from _place(rail, where, machine, whole=True, ends=False, nodes=False)
+    if pad not in machine.nodes:
+        remedy = did_you_mean(pad, machine.nodes, "nodes")
+        yield Problem(f"no node '{pad}'", where, f"a pair is a bar and the node on it; {remedy}")
+    elif (node := machine.nodes[pad]) is not None and node.position is None:
+        remedy = "where it is at axis positions zero: position = [0.1, 0, 0.2]"
+        yield Problem(f"'{pad}' runs on '{rail}' but has no position", f"nodes.{pad}", remedy)
+    bar, axis = machine.bars.get(rail), machine.axes.get(axis_name)
+    if bar is None or axis is None:
+        return
+    lengths = np.linalg.norm(bar.direction) * np.linalg.norm(axis.direction)  # zero is reported elsewhere
+    if np.linalg.norm(np.cross(bar.direction, axis.direction)) > PARALLEL * lengths:
+        remedy = f"its direction {list(bar.direction)} must be that of axis '{axis_name}', or its opposite"
+        yield Problem(f"bar '{rail}' is not parallel to the axis", where, remedy)
 
 
 def _sources(machine: Machine) -> Iterator[Problem]:
@@ -206,31 +210,39 @@ def _films(machine: Machine) -> Iterator[Problem]:
         if film is None:
             continue
         where = f"films.{name}.surfaces"
-        graded = any(
-            e is not None and e.gradient != 0
-            for e in (machine.environment.get(film.environment), machine.environment.get(film.radiant or ""))
-        )
         if film.area is not None and len(film.surfaces) != 1:
             remedy = "an area is that of one node or bar: make a film of each"
             yield Problem(f"'area' of a film of {len(film.surfaces)} surfaces", f"films.{name}.area", remedy)
+        graded = _graded(film, machine)
         for place in film.surfaces:
             found = list(_place(place, where, machine, whole=True, ends=False))
             yield from found
             if found:
                 continue
-            node, bar = machine.nodes.get(place), machine.bars.get(place)
             if film.area is None:
                 if not film.additional and owner.setdefault(place, name) != name:
                     remedy = 'give one of them its part of the area: area = "0.05 m^2"'
                     yield Problem(f"'{place}' is also in films.{owner[place]}, with its whole area", where, remedy)
-                if node is not None and node.area is None:
-                    yield Problem(f"node '{place}' has a film but no area", f"nodes.{place}", 'add area = "0.1 m^2"')
-                if bar is not None and bar.perimeter is None:
-                    remedy = 'add perimeter = "100 mm"'
-                    yield Problem(f"bar '{place}' has a film but no perimeter", f"bars.{place}", remedy)
+                yield from _without_area(place, machine)
+            node = machine.nodes.get(place)
             if graded and node is not None and node.position is None:
                 remedy = "the air is warmer above: give position = [0, 0, 0.8]"
                 yield Problem(f"node '{place}' has no height", f"nodes.{place}", remedy)
+
+
+def _graded(film: description.Film, machine: Machine) -> bool:
+    """Whether what a film exchanges heat with changes over the height."""
+    around = (machine.environment.get(film.environment), machine.environment.get(film.radiant or ""))
+    return any(e is not None and e.gradient != 0 for e in around)
+
+
+def _without_area(place: str, machine: Machine) -> Iterator[Problem]:
+    node, bar = machine.nodes.get(place), machine.bars.get(place)
+    if node is not None and node.area is None:
+        yield Problem(f"node '{place}' has a film but no area", f"nodes.{place}", 'add area = "0.1 m^2"')
+    if bar is not None and bar.perimeter is None:
+        remedy = 'add perimeter = "100 mm"'
+        yield Problem(f"bar '{place}' has a film but no perimeter", f"bars.{place}", remedy)
 
 
 def _sensors(machine: Machine) -> Iterator[Problem]:

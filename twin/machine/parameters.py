@@ -180,47 +180,64 @@ def _declared(machine: Machine) -> tuple[list[_Declared], list[Problem]]:
 
 def _told(p: Parameter, entry: ParameterEntry, where: str) -> _Declared:
     """A parameter as a table has it; what the table leaves out stays. Raises DescriptionError."""
-    problems = []
-
-    def si(key: str, value: float | str, unit: str, example: str) -> float:
-        try:
-            return to_si(value, unit)
-        except ValueError as e:
-            relative = key == "tolerance" and p.scale == "log"
-            what = f"the tolerance {value!r} is not relative" if relative else str(e)
-            problems.append(Problem(f"{p.path}: {what}", f"{where}.{key}", f"write {key} = {example}"))
-            return math.nan
-
-    sigma, low, high = p.sigma, p.low, p.high
+    problems: list[Problem] = []
     if entry.tolerance is not None:
-        example, dimension, largest = _tolerances(p)
-        tolerance = si("tolerance", entry.tolerance, dimension, example)
-        if not 0.0 < tolerance <= largest and not problems:
-            shown = f"({100 * tolerance:g} %)" if dimension == "1" else dimension
-            what = f"{p.path}: a tolerance of {tolerance:g} {shown}"
-            remedy = f"write tolerance = {example}; what is certain is fixed = true"
-            problems.append(Problem(what, f"{where}.tolerance", remedy))
-        sigma = math.log1p(tolerance) if p.scale == "log" and tolerance > 0.0 else tolerance
-        if p.scale == "linear" and p.component >= 0:  # its bounds are made of its tolerance
-            low, high = min(low, p.nominal - TCP_BOUND * sigma), max(high, p.nominal + TCP_BOUND * sigma)
+        p = _with_tolerance(p, entry.tolerance, where, problems)
     unit = "" if p.unit == "1" else f" {p.unit}"
     shown = f'"{p.nominal:g}{unit}"' if unit else f"{p.nominal:g}"
-    low = low if entry.low is None else si("low", entry.low, p.unit, f"{shown} or less")
-    high = high if entry.high is None else si("high", entry.high, p.unit, f"{shown} or more")
+    if entry.low is not None:
+        p = replace(p, low=_si(p, f"{where}.low", entry.low, p.unit, f"{shown} or less", problems))
+    if entry.high is not None:
+        p = replace(p, high=_si(p, f"{where}.high", entry.high, p.unit, f"{shown} or more", problems))
     if not problems and (entry.low is not None or entry.high is not None):
-        at = f"{where}.{'low' if entry.low is not None else 'high'}"
-        if not low < high:
-            remedy = "give both, low < high" if None in (entry.low, entry.high) else "give low < high"
-            problems.append(Problem(f"{p.path}: the bounds {low:g} .. {high:g}{unit} are empty", at, remedy))
-        elif not low <= p.nominal <= high:
-            what = f"{p.path} is {p.nominal:g}{unit}, outside its bounds {low:g} .. {high:g}{unit}"
-            problems.append(Problem(what, at, "widen the bounds, or mend the value in the description"))
-        elif p.scale == "log" and low <= 0.0 <= high:
-            what = f"{p.path}: bounds {low:g} .. {high:g}{unit} of a factor include zero"
-            problems.append(Problem(what, at, f"keep them on the side of {p.nominal:g}"))
+        problems += _bounds_problems(p, entry, where)
     if problems:
         raise DescriptionError.collect(problems)
-    return _Declared(replace(p, sigma=sigma, low=low, high=high), fitted=not entry.fixed and sigma > 0.0)
+    return _Declared(p, fitted=not entry.fixed and p.sigma > 0.0)
+
+
+def _si(p: Parameter, place: str, value: float | str, unit: str, example: str, problems: list[Problem]) -> float:
+    """A number of the table in SI; NaN with what is wrong added to `problems`."""
+    key = place.rpartition(".")[2]
+    try:
+        return to_si(value, unit)
+    except ValueError as e:
+        relative = key == "tolerance" and p.scale == "log"
+        what = f"the tolerance {value!r} is not relative" if relative else str(e)
+        problems.append(Problem(f"{p.path}: {what}", place, f"write {key} = {example}"))
+        return math.nan
+
+
+def _with_tolerance(p: Parameter, given: float | str, where: str, problems: list[Problem]) -> Parameter:
+    """The parameter with the sigma of a tolerance; what is wrong with the tolerance is added to `problems`."""
+    example, dimension, largest = _tolerances(p)
+    tolerance = _si(p, f"{where}.tolerance", given, dimension, example, problems)
+    if not 0.0 < tolerance <= largest and not problems:
+        shown = f"({100 * tolerance:g} %)" if dimension == "1" else dimension
+        what = f"{p.path}: a tolerance of {tolerance:g} {shown}"
+        remedy = f"write tolerance = {example}; what is certain is fixed = true"
+        problems.append(Problem(what, f"{where}.tolerance", remedy))
+    sigma = math.log1p(tolerance) if p.scale == "log" and tolerance > 0.0 else tolerance
+    if p.scale == "linear" and p.component >= 0:  # its bounds are made of its tolerance
+        far = TCP_BOUND * sigma
+        return replace(p, sigma=sigma, low=min(p.low, p.nominal - far), high=max(p.high, p.nominal + far))
+    return replace(p, sigma=sigma)
+
+
+def _bounds_problems(p: Parameter, entry: ParameterEntry, where: str) -> Iterator[Problem]:
+    """The first that is wrong with the bounds."""
+    unit = "" if p.unit == "1" else f" {p.unit}"
+    at = f"{where}.{'low' if entry.low is not None else 'high'}"
+    bounds = f"{p.low:g} .. {p.high:g}{unit}"
+    if not p.low < p.high:
+        remedy = "give both, low < high" if None in (entry.low, entry.high) else "give low < high"
+        yield Problem(f"{p.path}: the bounds {bounds} are empty", at, remedy)
+    elif not p.low <= p.nominal <= p.high:
+        what = f"{p.path} is {p.nominal:g}{unit}, outside its bounds {bounds}"
+        yield Problem(what, at, "widen the bounds, or correct the value in the description")
+    elif p.scale == "log" and p.low <= 0.0 <= p.high:
+        what = f"{p.path}: bounds {bounds} of a factor include zero"
+        yield Problem(what, at, f"keep them on the side of {p.nominal:g}")
 
 
 def _tolerances(p: Parameter) -> tuple[str, str, float]:

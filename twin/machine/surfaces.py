@@ -19,53 +19,70 @@ def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> 
     `surfaces` holds the named surfaces of every part's mesh. A fixed contact may share its surface with others; what
     they leave uncovered exchanges no heat. Raises DescriptionError with all unknown, unused and doubly used surfaces.
     """
-    problems: list[Problem] = []
-    uses: dict[tuple[str, str], list[str]] = {(p, s): [] for p, names in surfaces.items() for s in names}
-
-    def claim(surface: str, use: str, where: str) -> tuple[str, str] | None:
-        part, name = split_surface(surface)
-        if (part, name) not in uses:
-            problems.append(unknown_surface(surface, where, surfaces))
-            return None
-        if use and use not in uses[part, name]:
-            uses[part, name].append(use)
-        return part, name
-
+    uses = _Uses(surfaces)
     for part_name, part in machine.parts.items():
         for name in part.adiabatic:
-            claim(f"{part_name}.{name}", "the adiabatic list", f"parts.{part_name}.adiabatic")
+            uses.claim(f"{part_name}.{name}", "the adiabatic list", f"parts.{part_name}.adiabatic")
     for contact_name, contact in machine.contacts.items():
         for surface in contact.surfaces or ():
-            claim(surface, "fixed contacts", f"contacts.{contact_name}.surfaces")
+            uses.claim(surface, "fixed contacts", f"contacts.{contact_name}.surfaces")
     result: dict[str, list[tuple[str, str]]] = {name: [] for name in machine.films}
     rest: dict[str, str] = {}  # part -> film that takes what is left of it
     for film_name, film in machine.films.items():
         where = f"films.{film_name}.surfaces"
         for surface in film.surfaces:
             part_name, name = split_surface(surface)
-            if name != "*" or film.additional:
-                key = claim(surface, "" if film.additional else f"films.{film_name}", where)
-                if key and key not in result[film_name]:
-                    result[film_name].append(key)
-            elif part_name not in surfaces:
-                problems.append(unknown_surface(surface, where, surfaces))
-            elif rest.setdefault(part_name, film_name) != film_name:
-                remedy = f"leave '{surface}' to one of them and name the surfaces of the other"
-                problems.append(Problem(f"'{surface}' is also in films.{rest[part_name]}", where, remedy))
-    for (part_name, name), users in uses.items():
-        if not users and part_name in rest:
-            result[rest[part_name]].append((part_name, name))
-        elif len(users) != 1:
-            problems.append(
-                Problem(
-                    f"surface '{part_name}.{name}' belongs to {' and '.join(users) or 'no film'}",
-                    f"parts.{part_name}",
-                    "put each surface into exactly one of: a film, a fixed contact, the part's adiabatic list",
-                )
-            )
-    if problems:
-        raise DescriptionError.collect(problems)
+            if name == "*" and not film.additional:
+                uses.claim_rest(rest, surface, film_name, where)
+                continue
+            key = uses.claim(surface, "" if film.additional else f"films.{film_name}", where)
+            if key and key not in result[film_name]:
+                result[film_name].append(key)
+    for part_name, name in uses.left_to(rest):
+        result[rest[part_name]].append((part_name, name))
+    if uses.problems:
+        raise DescriptionError.collect(uses.problems)
     return {name: tuple(found) for name, found in result.items()}
+
+
+class _Uses:
+    """What every named surface is used for, and what is wrong with that."""
+
+    def __init__(self, surfaces: Mapping[str, Collection[str]]) -> None:
+        self._surfaces = surfaces
+        self._users: dict[tuple[str, str], list[str]] = {(p, s): [] for p, names in surfaces.items() for s in names}
+        self.problems: list[Problem] = []
+
+    def claim(self, surface: str, use: str, where: str) -> tuple[str, str] | None:
+        """(part, surface), now with a use more unless that is ""; None for one that no mesh has."""
+        part, name = split_surface(surface)
+        if (part, name) not in self._users:
+            self.problems.append(unknown_surface(surface, where, self._surfaces))
+            return None
+        if use and use not in self._users[part, name]:
+            self._users[part, name].append(use)
+        return part, name
+
+    def claim_rest(self, rest: dict[str, str], surface: str, film: str, where: str) -> None:
+        """ "part.*" for a film: `rest` is part -> film, and one film has it."""
+        part, _ = split_surface(surface)
+        if part not in self._surfaces:
+            self.problems.append(unknown_surface(surface, where, self._surfaces))
+        elif rest.setdefault(part, film) != film:
+            remedy = f"leave '{surface}' to one of them and name the surfaces of the other"
+            self.problems.append(Problem(f"'{surface}' is also in films.{rest[part]}", where, remedy))
+
+    def left_to(self, rest: Collection[str]) -> list[tuple[str, str]]:
+        """Surfaces without a use, of the parts in `rest`; others must have one use."""
+        left = []
+        for (part, name), users in self._users.items():
+            if not users and part in rest:
+                left.append((part, name))
+            elif len(users) != 1:
+                what = f"surface '{part}.{name}' belongs to {' and '.join(users) or 'no film'}"
+                remedy = "put each surface into exactly one of: a film, a fixed contact, the part's adiabatic list"
+                self.problems.append(Problem(what, f"parts.{part}", remedy))
+        return left
 
 
 def unknown_surface(surface: str, where: str, surfaces: Mapping[str, Collection[str]]) -> Problem:

@@ -61,17 +61,9 @@ def parse_chain(text: str, where: str = "--chain") -> Chain:
     axis: the probe must not turn, and what a linear axis' error does would change with the angle.
     """
     remedy = f"write it from workpiece over bed to tool, for example {EXAMPLE}"
-    links = [link.strip() for link in text.split("-")]
-    wrong = [link for link in links[1:-1] if link != "b" and not re.fullmatch("[XYZABC]'?", link)]
-    if len(links) < 3 or links[0] != "w" or links[-1] != "t" or links.count("b") != 1 or wrong:
+    axes = _axes(text)
+    if axes is None:
         raise ModelError(f"'{text}' is no kinematic chain", where, remedy)
-    bed = links.index("b")
-    axes = [
-        ChainAxis(link[0], 1 if k > bed else -1, -1 if link.endswith("'") else 1)
-        for k, link in enumerate(links)
-        if k not in (0, bed, len(links) - 1)
-    ]
-    axes.reverse()  # from the tool to the workpiece
     letters = [a.letter for a in axes]
     if len(set(letters)) < len(letters):
         raise ModelError(f"an axis stands twice in '{text}'", where, remedy)
@@ -83,6 +75,22 @@ def parse_chain(text: str, where: str = "--chain") -> Chain:
         what = f"in '{text}' a rotary axis carries the tool or a linear axis"
         raise ModelError(what, where, "this is for machines whose rotary axes are those of the table")
     return Chain(linear, rotary)
+
+
+def _axes(text: str) -> list[ChainAxis] | None:
+    """The axes of a chain from the tool to the workpiece; None where w, b, t or other letters stand wrong."""
+    links = [link.strip() for link in text.split("-")]
+    if len(links) < 3 or links[0] != "w" or links[-1] != "t" or links.count("b") != 1:
+        return None
+    bed = links.index("b")
+    axes = []
+    for k, link in enumerate(links[1:-1], start=1):
+        if k == bed:
+            continue
+        if not re.fullmatch("[XYZABC]'?", link):
+            return None
+        axes.append(ChainAxis(link[0], 1 if k > bed else -1, -1 if link.endswith("'") else 1))
+    return axes[::-1]
 
 
 def chain_of(artefact: Artefact) -> Chain:
