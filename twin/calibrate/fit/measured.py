@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.errors import LogError
-from twin.logs.run import Run
+from twin.logs.run import Run, Table
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 from twin.rom.poses import Kind, pose_weights
@@ -71,21 +71,9 @@ def measured(
     skipped: list[str] = []
     edges = drive.time
     table = run.temperatures
-    air = {name for name, _ in model.ambient_sensors}
     sensors = [s for s in model.sensors if table is not None and s in table.columns and s not in exclude]
     if table is not None:
-        unknown = [c for c in table.columns if c not in model.sensors and c not in air]
-        if unknown:
-            skipped.append(f"{len(unknown)} columns that are no sensor of the machine: {', '.join(unknown)}")
-        time = table.time
-        inside = (time >= edges[0]) & (time <= edges[-1])
-        if not inside.all():
-            skipped.append(f"{int((~inside).sum())} rows of temperatures outside the loads' time")
-        values = np.column_stack([table.columns[s] for s in sensors]) if sensors else np.zeros((len(time), 0))
-        centre, mean_of, temperature, count = _bins(edges, time[inside], values[inside], bin_length)
-        lost = int((~np.isfinite(temperature) & (count > 0)).sum())
-        if lost:
-            skipped.append(f"{lost} of {temperature.size} bin means with too few samples, or samples to one side")
+        centre, mean_of, temperature, count = _temperatures(model, table, sensors, edges, bin_length, skipped)
     else:
         centre, mean_of = np.zeros(0), np.zeros((0, len(edges)))
         temperature = count = np.zeros((0, 0))
@@ -115,6 +103,26 @@ def measured(
         skipped=tuple(skipped),
         position=position,
     )
+
+
+def _temperatures(
+    model: MachineModel, table: Table, sensors: list[str], edges: np.ndarray, bin_length: float, skipped: list[str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What `_bins` makes of the sensors' columns; what is left out is added to `skipped`."""
+    air = {name for name, _ in model.ambient_sensors}
+    unknown = [c for c in table.columns if c not in model.sensors and c not in air]
+    if unknown:
+        skipped.append(f"{len(unknown)} columns that are no sensor of the machine: {', '.join(unknown)}")
+    time = table.time
+    inside = (time >= edges[0]) & (time <= edges[-1])
+    if not inside.all():
+        skipped.append(f"{int((~inside).sum())} rows of temperatures outside the loads' time")
+    values = np.column_stack([table.columns[s] for s in sensors]) if sensors else np.zeros((len(time), 0))
+    centre, mean_of, temperature, count = _bins(edges, time[inside], values[inside], bin_length)
+    lost = int((~np.isfinite(temperature) & (count > 0)).sum())
+    if lost:
+        skipped.append(f"{lost} of {temperature.size} bin means with too few samples, or samples to one side")
+    return centre, mean_of, temperature, count
 
 
 def _bins(

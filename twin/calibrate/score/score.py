@@ -113,25 +113,17 @@ def score(
             told.append(about)
             advanced(name)
     with_tcp = {part: [t for t in tests if t.part == part and len(t.piece.rows)] for part in parts}
-    names = input_names([t.piece.run for part in parts for t in with_tcp[part]], settings.inputs)
-    pieces = {part: [t.piece for t in with_tcp[part]] for part in parts}
-    found: tuple[Baseline, ...] = ()
-    if pieces["scored"] or pieces["sealed"]:
-        found = baselines(pieces["train"], pieces["scored"], pieces["sealed"], names, settings.dt, settings.interval)
+    found = _baselines(with_tcp, settings)
     predictions = _predictions([*with_tcp["scored"], *with_tcp["sealed"]], found)
     entries: list[Entry] = []
     best, difference = {}, {}
     for part in ("scored", "sealed"):
         entries += _temperatures([t for t in tests if t.part == part], part, settings.temperature_sigma)
         entries += _tcp(with_tcp[part], part, predictions)
-        pooled = {
-            e.method: e.figures.rms
-            for e in entries
-            if (e.part, e.run, e.output) == (part, "", VECTOR) and e.method != MODEL
-        }
-        if pooled:
-            best[part] = min(pooled, key=lambda method: pooled[method])
-            difference[part] = _difference(with_tcp[part], predictions, best[part])
+        rival = _best_baseline(entries, part)
+        if rival is not None:
+            best[part] = rival
+            difference[part] = _difference(with_tcp[part], predictions, rival)
     known = tuple((b.name, b.how) for b in found)
     return Score(tuple(entries), tuple(told), known, air, best, difference)
 
@@ -171,6 +163,25 @@ def _replayed(
     references = sum(t.piece.reference is not None for t in tests)
     elsewhere = total - inside - about.tcp_rows - about.tcp_incomplete - references
     return tests, RunTold(name, part, run.synthetic, about, flagged, steps, max(elsewhere, 0))
+
+
+def _baselines(with_tcp: dict[str, list[_Test]], settings: Settings) -> tuple[Baseline, ...]:
+    """Baselines fitted to "train" and predicting "scored" and "sealed"; none where neither has TCP rows."""
+    pieces = {part: [t.piece for t in tests] for part, tests in with_tcp.items()}
+    names = input_names([piece.run for found in pieces.values() for piece in found], settings.inputs)
+    if not pieces["scored"] and not pieces["sealed"]:
+        return ()
+    return baselines(pieces["train"], pieces["scored"], pieces["sealed"], names, settings.dt, settings.interval)
+
+
+def _best_baseline(entries: Sequence[Entry], part: str) -> str | None:
+    """The baseline of the smallest rms over all TCP vectors of a part."""
+    pooled = {
+        e.method: e.figures.rms
+        for e in entries
+        if (e.part, e.run, e.output) == (part, "", VECTOR) and e.method != MODEL
+    }
+    return min(pooled, key=lambda method: pooled[method]) if pooled else None
 
 
 def _predictions(tests: Sequence[_Test], found: Sequence[Baseline]) -> dict[tuple[str, int], np.ndarray]:
