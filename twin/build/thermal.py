@@ -122,11 +122,9 @@ def _body(
     E = sp.csr_array(sp.block_diag([e for e, _ in parts], format="csr"))
     A0 = sp.csr_array(sp.block_diag([a for _, a in parts], format="csr"))
     one = np.ones(body.n)
-    own = {part.name for part in body.parts}
     height = body.nodes[:, "xyz".index(machine.machine.vertical)]
     terms = [*_film_terms(body, films, load, height), *_joint_terms(machine, body, load)]
-    heated = {i: place for i, s in enumerate(load.sources) if (place := machine.sources[s.name].surface) is not None}
-    B = {i: _spread(body, surface) for i, surface in heated.items() if split_surface(surface)[0] in own}
+    B = _source_loads(machine, body, load)
     P, port_numbers = port_averages(body, ports)
     sensors = _structural(machine)
     graded = any(e.gradient for e in load.environments)
@@ -169,6 +167,13 @@ def _joint_terms(machine: Machine, body: BodyMesh, load: LoadModel) -> Iterator[
         pair = machine.contacts[joint.name].surfaces
         if pair is not None and split_surface(pair[0])[0] in own:
             yield joint_term(len(load.films) + j, interface(body, *pair, where=f"contacts.{joint.name}").matrix)
+
+
+def _source_loads(machine: Machine, body: BodyMesh, load: LoadModel) -> dict[int, np.ndarray]:
+    """Number of a source on the body -> its heat of 1 W at the nodes, (n,)."""
+    own = {part.name for part in body.parts}
+    heated = {i: place for i, s in enumerate(load.sources) if (place := machine.sources[s.name].surface) is not None}
+    return {i: _spread(body, surface) for i, surface in heated.items() if split_surface(surface)[0] in own}
 
 
 def _structural(machine: Machine) -> tuple[str, ...]:

@@ -93,11 +93,7 @@ def _syntax_remedy(text: str, message: str) -> str:
 
 def _schema_problems(data: dict[str, Any]) -> tuple[list[tuple[Keys, Problem]], dict[str, Any]]:
     """What the types refuse, and the description without it: unknown keys left out, broken entries None."""
-    found = _refused(data)
-    if not any(isinstance(data.get(key), dict) and data[key] for key in ("nodes", "bars")):
-        found |= {(key,): missing_section(key) for key in _OF_PARTS if key not in data or data[key] == {}}
-        place = {section: i for i, section in enumerate(Machine.model_fields)}
-        found = dict(sorted(found.items(), key=lambda item: place.get(item[0][0] if item[0] else "", -1)))
+    found = _with_missing_sections(_refused(data), data)
     if "folder" in data:
         found["folder",] = Problem("unknown key 'folder'", "folder", "remove it")
     unknown = [keys for keys in found if _has(data, keys) and keys[-1] not in (known_keys(keys[:-1]) or [keys[-1]])]
@@ -116,6 +112,15 @@ def _refused(data: dict[str, Any]) -> dict[Keys, Problem]:
             keys, problem = schema_problem(detail, data)
             found.setdefault(keys, problem)  # every branch of a union complains; the first will do
     return found
+
+
+def _with_missing_sections(found: dict[Keys, Problem], data: dict[str, Any]) -> dict[Keys, Problem]:
+    """Those of a machine of meshed parts besides, and all in the order of the description; a lumped one needs none."""
+    if any(isinstance(data.get(key), dict) and data[key] for key in ("nodes", "bars")):
+        return found
+    every = found | {(key,): missing_section(key) for key in _OF_PARTS if key not in data or data[key] == {}}
+    place = {section: i for i, section in enumerate(Machine.model_fields)}
+    return dict(sorted(every.items(), key=lambda item: place.get(item[0][0] if item[0] else "", -1)))
 
 
 def _sound(data: dict[str, Any], unknown: list[Keys], broken: list[Keys]) -> dict[str, Any]:
