@@ -56,17 +56,23 @@ def transmissions(draw: st.DrawFn) -> list[tuple[int, bool]]:
     return draw(st.permutations(copies))
 
 
-@settings(max_examples=300)
-@given(transmissions())
-def test_counts_are_exact_and_records_appear_once(sent: list[tuple[int, bool]]):
-    """Through the frames themselves: a damaged copy has one byte of its values flipped."""
-    made = blocks(26)
+def arriving(made: list[Block], sent: list[tuple[int, bool]]) -> list[bytes]:
+    """What arrives of a transmission: a damaged copy has one byte of its values flipped."""
     frames = []
     for s, sound in sent:
         frame = bytearray(encode(made[s]))
         if not sound:
             frame[-12] ^= 0x40
         frames.append(bytes(frame))
+    return frames
+
+
+@settings(max_examples=300)
+@given(transmissions())
+def test_counts_are_exact_and_records_appear_once(sent: list[tuple[int, bool]]):
+    """Through the frames themselves."""
+    made = blocks(26)
+    frames = arriving(made, sent)
     sound = [s for s, good in sent if good]
     arrived = set(sound)
     if not arrived:

@@ -318,6 +318,18 @@ DAMAGES = [
 ]  # fmt: skip
 
 
+def assert_told_as_it_must(damage: Damage, problems: list[Problem], told: list[Problem], wrong: dict) -> None:
+    """told: those of `problems` that speak of the damage; wrong: what the run holds that is not true."""
+    if damage.must == "harmless":
+        assert not wrong, wrong
+        assert problems == []
+    elif damage.must == "refused":
+        assert any(not p.warning for p in told), problems
+    else:
+        assert told, problems
+        assert all(p.remedy for p in told)
+
+
 @pytest.mark.parametrize("damage", DAMAGES, ids=lambda d: d.name)
 def test_every_damage_comes_out_as_it_must(tmp_path, damage):
     outcomes: Counter[str] = Counter()
@@ -331,14 +343,7 @@ def test_every_damage_comes_out_as_it_must(tmp_path, damage):
             if damage.tables in p.where and any(s in f"{p.where} {p.what}" for s in damage.says or ("",))
         ]  # fmt: skip
         wrong = {} if run is None else differences(run, truth(seed % BASES, tmp_path))
-        if damage.must == "harmless":
-            assert not wrong, wrong
-            assert problems == []
-        elif damage.must == "refused":
-            assert any(not p.warning for p in told), problems
-        else:
-            assert told, (seed, problems)
-            assert all(p.remedy for p in told)
+        assert_told_as_it_must(damage, problems, told, wrong)
         outcomes["refused" if any(not p.warning for p in problems) else "flagged" if problems else "silent"] += 1
     expected = {"harmless": "silent", "refused": "refused"}.get(damage.must)
     assert outcomes["silent"] == (SEEDS if damage.must == "harmless" else 0)
@@ -365,6 +370,20 @@ def insert(data: bytearray, k: int, rng: Rng) -> None:
     data[k:k] = bytes([int(rng.choice(list(b"0123456789.,;-e \n\x00\xff")))])
 
 
+def assert_one_plausible_cell(wrong: dict, name: str, true: Run, run: Run) -> None:
+    """What differs is one cell of the table `name`, and within three spreads of its column."""
+    ((table, channel), rows), *more = wrong.items()
+    assert not more
+    assert rows.tolist() != [-1]
+    assert len(rows) == 1, (channel, rows)
+    assert table == name
+    if name != "tcp" and channel != "time":
+        was, now = (getattr(r, name).columns[channel] for r in (true, run))
+        assert was.min() - 3.5 * np.ptp(was) <= now[rows[0]] <= was.max() + 3.5 * np.ptp(was)
+    elif channel == "time":
+        assert name == "tcp" or rows[0] == ROWS - 1  # the beat of other tables gives a wrong time away
+
+
 @pytest.mark.parametrize("how", [flip, overwrite, digit, delete, insert])
 def test_one_random_byte(tmp_path, how):
     """What stays silent is one cell with a plausible number, within three spreads of its column: docs/run_folder.md."""
@@ -388,16 +407,7 @@ def test_one_random_byte(tmp_path, how):
             outcomes["no number changed"] += 1
         else:
             outcomes["silent"] += 1
-            ((table, channel), rows), *more = wrong.items()
-            assert not more
-            assert rows.tolist() != [-1]
-            assert len(rows) == 1, (channel, rows)
-            assert table == name
-            if name != "tcp" and channel != "time":
-                was, now = (getattr(r, name).columns[channel] for r in (true, run))
-                assert was.min() - 3.5 * np.ptp(was) <= now[rows[0]] <= was.max() + 3.5 * np.ptp(was)
-            elif channel == "time":
-                assert name == "tcp" or rows[0] == ROWS - 1  # the beat of other tables gives a wrong time away
+            assert_one_plausible_cell(wrong, name, true, run)
     assert outcomes["told"] > 0.3 * RANDOM_SEEDS, outcomes
     assert outcomes["silent"] < 0.6 * RANDOM_SEEDS, outcomes
 
