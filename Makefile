@@ -32,11 +32,12 @@ setup: $(READY) ## make .venv with the pinned dependencies and this package
 	@echo "ready: $(BIN)/twin --help"
 
 .PHONY: check
-check: $(READY) ## style, format, types and the import rules
+check: $(READY) ## style, format, types, the import rules and the size of functions
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --cache-dir .cache/import_linter
+	$(BIN)/python -m pytest -q tests/test_complexity.py
 
 .PHONY: test
 test: $(READY) ## the fast tests
