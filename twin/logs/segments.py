@@ -47,9 +47,8 @@ def _misplaced(segment: Segment, where: str, first: float, last: float) -> Probl
         what = f"{start:g} .. {end:g} s lies outside the loads, {first:g} .. {last:g} s"
     else:
         return None
-    return Problem(
-        f"segment '{segment.name}' {what}", where, "times count from the start of the run: mend start and end"
-    )
+    remedy = "times count from the start of the run: correct start and end"
+    return Problem(f"segment '{segment.name}' {what}", where, remedy)
 
 
 def _overlaps(segments: list[Segment], where: str) -> Iterator[Problem]:
