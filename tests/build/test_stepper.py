@@ -7,8 +7,9 @@ import pytest
 import scipy.linalg
 
 from tests.build.two_bodies import load_model, model
+from twin.build.body_matrix import system_matrix
 from twin.build.scenario import draw
-from twin.build.stepper import CoupledStepper, contact_matrix, system_matrix
+from twin.build.stepper import CoupledStepper, contact_matrix
 
 
 def monolithic(machine, drive, step, rate):
