@@ -1,14 +1,13 @@
 """One time step of the reduced machine: a pure function of state and loads, in double precision.
 
-Implicit Euler in coordinates with E = 1, several substeps of length h = 1/rate with the same loads and one factor:
+Coordinates with E = 1; several substeps with the same loads and one factor, each by the stages of a tableau
+(`twin.rom.tableau`; implicit Euler has one):
 
-    S z_new = rate z + sum_k (theta_k M_k (T_out,k - T_ref) + H_k lift_k) + B q + P q_port
-              - sum_k (theta_k - held_k) A_k z
-    S = rate + A0 + sum_k held_k A_k + P Gamma P^T
+    S Z = rate base + sum_k (theta_k M_k (T_out,k - T_ref) + H_k lift_k) + B q + P q_port
+          - sum_k (theta_k - held_k) A_k Z
+    S = rate + A0 + sum_k held_k A_k + P Gamma P^T        (`twin.run.matrix`)
 
-Paper 000 eqs (4)-(6) with the films implicit (erratum E-000-3). Gamma, the dwell-time mean of g d d^T over all pads
-(`twin.rom.contact`), is tridiagonal on every rail, diagonal on pads, and of rank one between a rail and a pad: it is
-assembled by body, never as an n_ports x n_ports product.
+Paper 000 eqs (4)-(6) with the films implicit (erratum E-000-3).
 
 theta follows surface temperature and speed in every step (`twin.rom.following`). The factor is kept until a conductance
 or a dwell weight changes, or theta leaves the values held in it by a share of FOLLOW. What is left of theta goes to the
