@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse
@@ -58,6 +59,8 @@ class CoupledStepper:
         self.model, self._tableau = model, tableau
         self._cache: tuple[list[_Factored], ...] = tuple([] for _ in model.bodies)  # latest last
         self._keep, self._follow = keep, follow
+        ends = np.cumsum([0, *(b.n for b in model.bodies)]).tolist()
+        self._rows = [slice(a, b) for a, b in pairwise(ends)]
         n_films, n_theta = len(model.load_model.films), len(model.load_model.theta_names)
         self._film_rows = tuple(body.film_rows for body in model.bodies)
         self._dense = tuple(None if scipy.sparse.issparse(b.E) else DenseTerms(b, n_films) for b in model.bodies)
@@ -162,19 +165,25 @@ class CoupledStepper:
             return lambda x: D @ x
         return lambda x: np.sum([d * (a @ x) for d, a in zip(more, body.A, strict=True) if d != 0.0], axis=0)
 
-    def solve(self, rhs: list[np.ndarray], factors: list[_Factored], gamma: np.ndarray) -> list[np.ndarray]:
-        """Solve (rate E + A + P Gamma P^T) x = rhs for all bodies, with rate and A of the factors."""
+    def across(self, factors: list[_Factored], gamma: np.ndarray) -> np.ndarray:
+        """1 + Q Gamma (n_ports, n_ports): what port temperatures solve with the bodies of these factors in contact."""
+        Q = np.zeros(gamma.shape)
+        for body, f in zip(self.model.bodies, factors, strict=True):
+            Q[np.ix_(body.ports, body.ports)] = f.Q
+        return np.asarray(np.eye(len(gamma)) + Q @ gamma)
+
+    def solve(
+        self, rhs: list[np.ndarray], factors: list[_Factored], gamma: np.ndarray, across: np.ndarray
+    ) -> list[np.ndarray]:
+        """Solve (rate E + A + P Gamma P^T) x = rhs for all bodies, with rate and A of the factors; across: of both."""
         bodies = self.model.bodies
         y = [f.solve(r) for f, r in zip(factors, rhs, strict=True)]
-        n_ports = gamma.shape[0]
-        if n_ports == 0:
+        if not len(gamma):
             return y
-        Q, t = np.zeros((n_ports, n_ports)), np.zeros(n_ports)
-        for body, f, yb in zip(bodies, factors, y, strict=True):
-            ports = list(body.ports)
-            Q[np.ix_(ports, ports)] = f.Q
-            t[ports] = body.port_rows @ yb
-        q = gamma @ np.linalg.solve(np.eye(n_ports) + Q @ gamma, t)
+        t = np.zeros(len(gamma))
+        for body, yb in zip(bodies, y, strict=True):
+            t[list(body.ports)] = body.port_rows @ yb
+        q = gamma @ np.linalg.solve(across, t)
         return [yb - f.X @ q[list(body.ports)] for body, f, yb in zip(bodies, factors, y, strict=True)]
 
     def run(
@@ -185,7 +194,6 @@ class CoupledStepper:
         States per body (n_b,) K.
         """
         tableau, contacts = self._tableau, contact_entries(self.model.load_model, drive)
-        borders = np.cumsum([b.n for b in self.model.bodies])[:-1]
         x = list(start)
         for step in range(first, drive.n_steps):
             dt = drive.time[step + 1] - drive.time[step]
@@ -194,8 +202,8 @@ class CoupledStepper:
             gamma = dense(np, self._contacts, contacts.at(step))
             forcing = np.concatenate(self.forcing(loads))
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
-            solve = partial(self._solve_twice, borders, factors, gamma, rest)
-            capacity = partial(self._capacity, borders, factors)
+            solve = partial(self._solve_twice, factors, gamma, self.across(factors, gamma), rest)
+            capacity = partial(self._capacity, factors)
             after = before = np.concatenate(x)
             own, seen = np.zeros_like(before), np.zeros_like(before)  # means over the step
             for _ in range(substeps):
@@ -203,29 +211,34 @@ class CoupledStepper:
                 for weight, (at, saw) in zip(tableau.weights, made, strict=True):
                     own, seen = own + weight * at / substeps, seen + weight * saw / substeps
                 after = made[-1][0]
-            x = np.split(after, borders)
-            yield step, x, self._heat(loads, factors, dt, *(np.split(v, borders) for v in (after - before, seen, own)))
+            x = self._parts(after)
+            yield step, x, self._heat(loads, factors, dt, *map(self._parts, (after - before, seen, own)))
 
-    def _capacity(self, borders: np.ndarray, factors: list[_Factored], x: np.ndarray) -> np.ndarray:
+    def _parts(self, x: np.ndarray) -> list[np.ndarray]:
+        """The bodies' states (n_b,) of all states one after the other (N,)."""
+        return [x[part] for part in self._rows]
+
+    def _capacity(self, factors: list[_Factored], x: np.ndarray) -> np.ndarray:
         """rate E x of all bodies, one after the other (N,)."""
-        parts = zip(factors, np.split(x, borders), strict=True)
+        parts = zip(factors, self._parts(x), strict=True)
         return np.concatenate([factor.rate * self._stored(b, xb) for b, (factor, xb) in enumerate(parts)])
 
     def _solve_twice(
         self,
-        borders: np.ndarray,
         factors: list[_Factored],
         gamma: np.ndarray,
+        across: np.ndarray,
         rest: Sequence[Callable[[np.ndarray], np.ndarray] | None],
         right: np.ndarray,
         near: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """The solution (N,), and the state at which it took what the factors leave out: `near`, then what that gave."""
-        known, seen = np.split(right, borders), near
+        known, seen = self._parts(right), near
         for _ in range(1 if all(r is None for r in rest) else 2):
             seen = near
-            parts = zip(known, rest, np.split(seen, borders), strict=True)
-            near = np.concatenate(self.solve([k if r is None else k - r(s) for k, r, s in parts], factors, gamma))
+            parts = zip(known, rest, self._parts(seen), strict=True)
+            rhs = [k if r is None else k - r(s) for k, r, s in parts]
+            near = np.concatenate(self.solve(rhs, factors, gamma, across))
         return near, seen
 
     def _stored(self, b: int, x: np.ndarray) -> np.ndarray:
@@ -263,24 +276,23 @@ class CoupledStepper:
         radiation rises steeply with temperature. Raises ModelError where none is found.
         """
         gamma = contact_matrix(self.model, drive, step)
-        borders = np.cumsum([b.n for b in self.model.bodies])[:-1]
         capacity = sum(float(b.one @ b.energy) for b in self.model.bodies)
 
         def turn(flat: np.ndarray) -> np.ndarray:
-            x = np.split(flat, borders)
+            x = self._parts(flat)
             loads = self.loads(drive, step, x)
             factors = self.factors(loads.theta, 0.0, min(self._follow, FOLLOW))
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
             f = self.forcing(loads)
             rhs = [fb if r is None else fb - r(xb) for fb, r, xb in zip(f, rest, x, strict=True)]
-            return np.concatenate(self.solve(rhs, factors, gamma))
+            return np.concatenate(self.solve(rhs, factors, gamma, self.across(factors, gamma)))
 
         def size(flat: np.ndarray) -> float:
-            stored = [abs(float(p @ self._stored(b, p))) for b, p in enumerate(np.split(flat, borders))]
+            stored = [abs(float(p @ self._stored(b, p))) for b, p in enumerate(self._parts(flat))]
             return float(np.sqrt(sum(stored) / capacity))
 
         start = float(drive.environment[step, 0]) if drive.environment.shape[1] else self.model.reference_temperature
-        return np.split(fixed_point(turn, np.concatenate(self.uniform(start)), size, tolerance, most), borders)
+        return self._parts(fixed_point(turn, np.concatenate(self.uniform(start)), size, tolerance, most))
 
     def uniform(self, temperature: float) -> list[np.ndarray]:
         """The state of a machine at one temperature [degC]."""

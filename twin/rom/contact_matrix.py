@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -98,13 +99,11 @@ def scaled(xp: Any, places: ContactPlaces, apart: ContactEntries, factor: Array)
 
 def dense(xp: Any, places: ContactPlaces, entries: ContactEntries) -> Array:
     """Gamma (n_ports, n_ports) [W/K] of one step."""
-    ports = np.arange(places.n_ports)
-    pad, segment, pair, place = _touching(places)
+    _, _, pair, place = _touching(places)
     beside, facing = entries.neighbour[:-1], -entries.weight[pair, place]
-    row = np.concatenate([ports, ports[:-1], ports[1:], pad, segment])
-    column = np.concatenate([ports, ports[1:], ports[:-1], segment, pad])
     values = xp.concatenate([entries.diagonal, beside, beside, facing, facing])
-    return add(xp, xp.zeros((len(ports), len(ports))), (row, column), values)
+    n = places.n_ports
+    return add(xp, xp.zeros(n * n), _flat(places), values).reshape(n, n)
 
 
 def product(xp: Any, places: ContactPlaces, entries: ContactEntries, temperatures: Array) -> Array:
@@ -140,6 +139,16 @@ def projected(xp: Any, places: ContactPlaces, apart: ContactEntries, P: Array) -
     return result
 
 
+@lru_cache(maxsize=8)
+def _flat(places: ContactPlaces) -> np.ndarray:
+    """Where in Gamma, as a flat index, the numbers go that `dense` lines up."""
+    n, ports = places.n_ports, np.arange(places.n_ports)
+    pad, segment, _, _ = _touching(places)
+    row = np.concatenate([ports, ports[:-1], ports[1:], pad, segment])
+    return row * n + np.concatenate([ports, ports[1:], ports[:-1], segment, pad])
+
+
+@lru_cache(maxsize=8)
 def _touching(places: ContactPlaces) -> np.ndarray:
     """(4, n): port of pad and of segment, pair, and number of the segment on its rail, of all that may touch."""
     pairs = [
