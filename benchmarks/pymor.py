@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.build.body_matrix import system_matrix
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis, sample_points
 from twin.build.scenario import theta_bounds
-from twin.build.stepper import system_matrix
 from twin.rom.load_model import LoadModel
 from twin.rom.model import AffineBody
 

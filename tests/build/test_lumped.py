@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from tests.support.lumped import SPINDLE, film, source, write
+from twin.build.body_matrix import system_matrix
 from twin.build.full_model import FullModel, assemble
 from twin.build.lumped import lumped_bodies, lumped_ports
 from twin.build.lumped_structure import integral
 from twin.build.scenario import draw
-from twin.build.stepper import CoupledStepper, sensor_temperatures, system_matrix
+from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.machine.load import load_machine
 from twin.rom.drive import Drive, evaluate
 

@@ -9,11 +9,12 @@ import pytest
 import scipy.sparse
 
 from tests.build.two_bodies import load_model, model
+from twin.build.body_matrix import system_matrix
 from twin.build.compress import Tolerances, balanced, check_stability, galerkin, trajectories
 from twin.build.project import orthonormalise, project
 from twin.build.rich_basis import RichOptions, rich_basis, sample_points
 from twin.build.scenario import draw, theta_bounds
-from twin.build.stepper import CoupledStepper, sensor_temperatures, system_matrix, tcp_at_poses
+from twin.build.stepper import CoupledStepper, sensor_temperatures, tcp_at_poses
 from twin.errors import ModelError
 from twin.rom.load_model import EnvironmentWiring, Signal
 

@@ -7,8 +7,9 @@ import pytest
 import scipy.linalg
 
 from tests.build.two_bodies import load_model, model
+from twin.build.body_matrix import system_matrix
 from twin.build.scenario import draw
-from twin.build.stepper import CoupledStepper, contact_matrix, system_matrix
+from twin.build.stepper import CoupledStepper, contact_matrix
 
 
 def monolithic(machine, drive, step, rate):
@@ -65,5 +66,6 @@ def test_steady_state_is_where_stepping_ends():
         forcing = stepper.forcing(stepper.loads(drive, drive.n_steps - 1, x))
         rhs = [b.E @ xb / 60 + f for b, xb, f in zip(machine.bodies, x, forcing, strict=True)]
         gamma = contact_matrix(machine, drive, drive.n_steps - 1)
-        x = stepper.solve(rhs, stepper.factors(drive.theta[-1], 1 / 60), gamma)
+        factors = stepper.factors(drive.theta[-1], 1 / 60)
+        x = stepper.solve(rhs, factors, gamma, stepper.across(factors, gamma))
     assert np.allclose(np.concatenate(x), np.concatenate(steady), rtol=1e-9, atol=1e-9)

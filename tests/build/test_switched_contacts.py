@@ -15,13 +15,14 @@ from twin.build.rich_basis import RichOptions
 from twin.build.scenario import theta_bounds
 from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.calibrate.fit.effects import effects_of
-from twin.calibrate.fit.march import loads_for, places_of, trajectory
+from twin.calibrate.fit.march import loads_for, trajectory
 from twin.calibrate.fit.window import merged
 from twin.errors import DescriptionError, LogError
 from twin.machine.check import check_machine
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 from twin.rom.apply import with_values
+from twin.rom.contact_matrix import ContactPlaces
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import FOLLOW
 from twin.rom.load_model import LoadModel
@@ -164,8 +165,8 @@ def test_the_window_model_takes_switched_contacts(machine, models, value):
     effects = effects_of(small, chosen, [])
     start = 4.0 * small.bodies[0].one
     states = trajectory(
-        prepared.layout, places_of(small), False, prepared.system, effects, loads_for(small, drive, 2),
-        prepared.from_artefact(start), np.full(len(chosen), np.log(value)),
+        prepared.layout, ContactPlaces.of(small.load_model), False, prepared.system, effects,
+        loads_for(small, drive, 2), prepared.from_artefact(start), np.full(len(chosen), np.log(value)),
     )  # fmt: skip
     there = with_values(model, chosen, {p.path: value * p.nominal for p in chosen})
     ready = prepare(there)

@@ -8,12 +8,13 @@ import scipy.sparse.linalg
 
 from tests.support.descriptions import edited
 from tests.support.lumped import edited as edited_lumped
+from twin.build.body_matrix import system_matrix
 from twin.build.check_meshes import check_meshes
 from twin.build.full_model import FullModel, assemble
 from twin.build.pipeline import rich_model
 from twin.build.rich_basis import RichOptions
 from twin.build.scenario import draw
-from twin.build.stepper import CoupledStepper, sensor_temperatures, system_matrix, tcp_at_poses
+from twin.build.stepper import CoupledStepper, sensor_temperatures, tcp_at_poses
 from twin.errors import DescriptionError
 from twin.machine.description import Scale, Tank
 from twin.machine.load import load_machine

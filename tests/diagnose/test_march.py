@@ -15,7 +15,8 @@ from twin.diagnose.acted import Unit, slots_with
 from twin.diagnose.bank import nominal_run
 from twin.diagnose.bench import make_bench
 from twin.diagnose.elements import elements_of
-from twin.diagnose.march import INNER, loads_for, no_slots, states_of
+from twin.diagnose.march import INNER, loads_for, states_of
+from twin.diagnose.slots import no_slots
 from twin.diagnose.study import K, Study, make_study
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters

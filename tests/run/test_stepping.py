@@ -11,8 +11,9 @@ from dense_reference import Dense, gamma
 from twin.rom.contact import station_weights
 from twin.rom.drive import evaluate
 from twin.rom.load_model import EnvironmentWiring
+from twin.run.matrix import system_blocks
 from twin.run.replay import march
-from twin.run.stepping import advance, inputs_of, system_blocks
+from twin.run.stepping import advance, inputs_of
 from twin.run.system import prepare
 
 MODEL = synthetic.machine(n_bodies=4)
@@ -50,7 +51,7 @@ def test_system_matrix_equals_the_dense_one(model):
     prepared, dense = prepare(model), Dense(model, DRIVE)
     inputs = inputs_of(model.load_model, DRIVE, 4, follow=0.0)
     one_step = jax.tree.map(lambda a: a[9], inputs)
-    blocks = system_blocks(prepared.layout, prepared.system, one_step, one_step.theta)
+    blocks = system_blocks(prepared.layout, prepared.system, one_step.rate, one_step.contacts, one_step.theta)
     offsets = prepared.layout.offsets
     S = np.zeros((model.n, model.n))
     for (i, j), block in blocks.items():

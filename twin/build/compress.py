@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
+from twin.build.body_matrix import system_matrix
 from twin.build.project import project
 from twin.build.scenario import Scenario, theta_bounds
-from twin.build.stepper import CoupledStepper, sensor_temperatures, system_matrix
+from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.build.workers import each
 from twin.errors import ModelError
 from twin.rom.model import AffineBody, MachineModel

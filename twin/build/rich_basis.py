@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
+from twin.build.body_matrix import system_matrix
 from twin.build.factorize import factorize
 from twin.build.project import orthonormalise
-from twin.build.stepper import system_matrix
 from twin.build.workers import workers
 from twin.rom.model import AffineBody
 

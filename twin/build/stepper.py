@@ -1,10 +1,10 @@
-"""Implicit Euler for coupled bodies, full (sparse) or rich (dense): one factor per body, contacts by Schur complement.
+"""The integrator of the host: coupled bodies, full (sparse) or rich (dense), one factor per body, any tableau.
 
-    (E/h + A(theta) + P Gamma P^T) x_new = E x/h + M theta (T_out - T_ref) + B q + P q_port
+    (r E + A(theta) + P Gamma P^T) X = r E base + M theta (T_out - T_ref) + B q + P q_port    (`twin.rom.tableau`)
 
 Paper 000 eqs (4)-(6) with the films implicit (erratum E-000-3: the lagged form is stable only for dt < 2 rho c d/h).
-The axis position changes Gamma only, so a moving axis costs no factorisation: with S = E/h + A(theta) per body,
-X = S^-1 P and Q = P^T X, the port temperatures solve (1 + Q Gamma) t = P^T S^-1 r, and x_new = S^-1 r - X Gamma t.
+The axis position changes Gamma only, so a moving axis costs no factorisation: with S = r E + A(theta) per body,
+Y = S^-1 P and Q = P^T Y, the port temperatures solve (1 + Q Gamma) t = P^T S^-1 b, and X = S^-1 b - Y Gamma t.
 Assembling and factorising the coupled matrix at every position was rejected: 720 steps would be 720 factorisations.
 
 Coefficients that follow surface temperature and speed change in every step. A factor is kept while they stay within
@@ -15,82 +15,32 @@ what was solved and stays exact, and it is stable as |theta - held| < held.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse
 
-from twin.build.factorize import factorize
+from twin.build.body_matrix import DenseTerms, solver_of
 from twin.build.fixed_point import fixed_point
+from twin.build.heat import Heat
+from twin.rom.contact_matrix import ContactPlaces, contact_entries, dense
 from twin.rom.drive import Drive
-from twin.rom.following import FOLLOW, FilmPlan, difference_place, film_state, read_table, temperature_place
-from twin.rom.load_model import Pair, Rail
-from twin.rom.model import AffineBody, MachineModel, Matrix
+from twin.rom.following import FOLLOW, FilmPlan
+from twin.rom.model import MachineModel
+from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, step_loads
+from twin.rom.tableau import IMPLICIT_EULER, Tableau, stages
 
-LEAST = 1e-6  # W: a balance is not judged against less than that
+Loads = StepLoads  # the name that benchmarks.hidden_store imports
 
 
 def contact_matrix(model: MachineModel, drive: Drive, step: int) -> np.ndarray:
-    """Gamma (n_ports, n_ports) W/K of one step: q_port = -Gamma T_port; symmetric, rows sum to zero."""
+    """Gamma (n_ports, n_ports) W/K of one step: q_port = -Gamma T_port."""
     load = model.load_model
-    n = len(load.ports)
-    if not load.pairs:
-        return np.zeros((n, n))
-    g = drive.conductance[step][:, None]
-    to_rail, side = -g * drive.weight[step], g * drive.neighbour[step]
-    values = (g, to_rail, to_rail, g * drive.square[step], side, side)
-    places = _contact_places(load.rails, load.pairs, n)
-    return np.bincount(places, np.concatenate([v.ravel() for v in values]), n * n).reshape(n, n)
-
-
-@lru_cache(maxsize=8)
-def _contact_places(rails: tuple[Rail, ...], pairs: tuple[Pair, ...], n: int) -> np.ndarray:
-    """Where in Gamma, as a flat index, the numbers go that `contact_matrix` lines up.
-
-    Weights are padded with zeros to the longest rail: these go to a rail's last segment.
-    """
-    first = np.array([rails[p.rail].first_port for p in pairs])[:, None]
-    last = np.array([len(rails[p.rail].stations) - 1 for p in pairs])[:, None]
-    segment = np.arange(max(len(r.stations) for r in rails))[None, :]
-    here, beside = first + np.minimum(segment, last), first + np.minimum(segment + 1, last)
-    pad = np.array([p.pad_port for p in pairs])[:, None]
-    places = (pad * n + pad, pad * n + here, here * n + pad, here * n + here, here * n + beside, beside * n + here)
-    return np.concatenate([p.ravel() for p in places])
-
-
-@dataclass(frozen=True)
-class Loads:
-    """What drives one step, with the laws that follow the state read at its start."""
-
-    theta: np.ndarray  # (n_theta,) W/(m^2 K), films with radiation, then joints
-    rise: np.ndarray  # (n_theta,) K: outer temperature above the reference; zero for joints
-    lift: np.ndarray  # (n_theta,) multiplies H
-    power: np.ndarray  # (n_sources,) W
-    port_heat: np.ndarray  # (n_ports,) W
-    surface: np.ndarray  # (n_films,) degC
-    radiated: np.ndarray  # (n_films,) W/m^2 into the surfaces by radiation
-
-
-@dataclass(frozen=True)
-class Heat:
-    """Mean heat flows of one step [W]; what leaves one side of a contact enters the other, so contacts drop out."""
-
-    power: np.ndarray  # (n_sources,)
-    film: np.ndarray  # (n_films,) from the environments into the machine
-    stored: float
-    radiated: np.ndarray  # (n_films,) the part of `film` by radiation, at the step's start
-
-    @property
-    def balance_error(self) -> float:
-        """|heat in - heat out - heat stored| / throughput (0.06; erratum E-000-3)."""
-        rest = self.power.sum() + self.film.sum() - self.stored
-        # radiation and convection of one film may cancel: each counts
-        films = np.abs(self.film - self.radiated).sum() + np.abs(self.radiated).sum()
-        throughput = np.abs(self.power).sum() + films + abs(self.stored)
-        return float(abs(rest) / max(throughput, LEAST))
+    entries = contact_entries(load, drive, slice(step, step + 1))
+    return np.asarray(dense(np, ContactPlaces.of(load), entries.at(0)))
 
 
 @dataclass(eq=False)
@@ -102,54 +52,18 @@ class _Factored:
     Q: np.ndarray  # (n_ports_b, n_ports_b)
 
 
-def system_matrix(body: AffineBody, theta: np.ndarray, rate: float) -> Matrix:
-    """rate E + A0 + sum_k theta_k A_k with rate = 1/h [1/s] (0: steady state)."""
-    S = body.A0 + rate * body.E
-    for k, a in zip(body.theta, body.A, strict=True):
-        S = S + theta[k] * a
-    return S
-
-
-class _Dense:
-    """The matrices of a dense body laid out so that one pass over memory adds up its terms."""
-
-    def __init__(self, body: AffineBody, n_films: int):
-        self._body, self.n_films = body, sum(k < n_films for k in body.theta)
-        if any(k >= n_films for k in body.theta[: self.n_films]):
-            raise ValueError("films come before joints")
-        self._terms = np.ascontiguousarray(body.A, dtype=float).reshape(len(body.A), body.n**2)
-        self.unit = np.array_equal(body.E, np.eye(body.n))
-        self._joints: tuple[np.ndarray, np.ndarray] | None = None  # conductances and A0 with them
-
-    def system(self, own: np.ndarray, rate: float) -> np.ndarray:
-        """rate E + A0 + sum_k own_k A_k (n, n); own (len(body.theta),)."""
-        n, first = self._body.n, self.n_films
-        if self._joints is None or not np.array_equal(self._joints[0], own[first:]):
-            self._joints = (own[first:], self._body.A0 + (own[first:] @ self._terms[first:]).reshape(n, n))
-        S = self.film_terms(own[:first])
-        S += self._joints[1]
-        if self.unit:
-            S.flat[:: n + 1] += rate
-        else:
-            S += rate * self._body.E
-        return S
-
-    def film_terms(self, coefficients: np.ndarray) -> np.ndarray:
-        """sum_k coefficients_k A_k (n, n) over the films."""
-        return (coefficients @ self._terms[: self.n_films]).reshape(self._body.n, self._body.n)
-
-
 class CoupledStepper:
     """Steps a MachineModel whose bodies are sparse (full) or dense (rich); keeps the last factors per body."""
 
-    def __init__(self, model: MachineModel, keep: int = 2, follow: float = FOLLOW):
-        self.model = model
+    def __init__(self, model: MachineModel, keep: int = 2, follow: float = FOLLOW, tableau: Tableau = IMPLICIT_EULER):
+        self.model, self._tableau = model, tableau
         self._cache: tuple[list[_Factored], ...] = tuple([] for _ in model.bodies)  # latest last
         self._keep, self._follow = keep, follow
-        self._plan = FilmPlan.of(model.load_model)
+        ends = np.cumsum([0, *(b.n for b in model.bodies)]).tolist()
+        self._rows = [slice(a, b) for a, b in pairwise(ends)]
         n_films, n_theta = len(model.load_model.films), len(model.load_model.theta_names)
         self._film_rows = tuple(body.film_rows for body in model.bodies)
-        self._dense = tuple(None if scipy.sparse.issparse(b.E) else _Dense(b, n_films) for b in model.bodies)
+        self._dense = tuple(None if scipy.sparse.issparse(b.E) else DenseTerms(b, n_films) for b in model.bodies)
         # area and first moment of height of the films
         self._area, self._moment = np.zeros(n_theta), np.zeros(n_theta)
         for body in model.bodies:
@@ -158,11 +72,13 @@ class CoupledStepper:
             if body.H is not None:
                 self._moment[own] += body.left_one @ body.H
         self._area[n_films:] = 0.0
-        self._height = self._moment[:n_films] / np.where(self._area[:n_films] > 0, self._area[:n_films], 1.0)
+        self._safe_area = np.where(self._area[:n_films] > 0, self._area[:n_films], 1.0)
+        self._plan = FilmPlan.of(model.load_model, self._moment[:n_films] / self._safe_area)
+        self._contacts = ContactPlaces.of(model.load_model)
 
     def __reduce__(self) -> tuple:
         """A copy starts without factors: those of sparse solvers cannot be copied."""
-        return CoupledStepper, (self.model, self._keep, self._follow)
+        return CoupledStepper, (self.model, self._keep, self._follow, self._tableau)
 
     def forget(self) -> None:
         """Drop all factors: what follows depends on its own input only, to the last bit."""
@@ -175,37 +91,39 @@ class CoupledStepper:
         total = np.zeros(len(self._area))
         for body, rows, xb in zip(self.model.bodies, self._film_rows, x, strict=True):
             total[list(body.theta)] += rows @ xb
-        return self.model.reference_temperature + total[:n] / np.where(self._area[:n] > 0, self._area[:n], 1.0)
+        return self.model.reference_temperature + total[:n] / self._safe_area
 
-    def loads(self, drive: Drive, step: int, x: list[np.ndarray]) -> Loads:
+    def loads(self, drive: Drive, step: int, x: list[np.ndarray]) -> StepLoads:
         """The loads of a step that starts at x."""
         model, n = self.model, len(self.model.load_model.films)
-        environment, T_ref = drive.environment[step], model.reference_temperature
-        theta, rise, lift = drive.theta[step].copy(), np.zeros(len(self._area)), np.zeros(len(self._area))
-        surface = self.surfaces(x)
-        if drive.films.index:
-            own = list(drive.films.index)
-            air = self._plan.air(environment, self._height)[own]
-            theta[own] = read_table(np, drive.films.value[step], difference_place(np, surface[own] - air))
-        films = film_state(np, self._plan, theta[:n], surface, environment, float(drive.radiation))
-        theta[:n], rise[:n], lift[:n] = films.total, films.outer - T_ref, films.lift
-        power = drive.power[step].copy()
+        theta, T_ref = drive.theta[step], model.reference_temperature
+        temperature = np.full(len(model.load_model.sources), T_ref)
         if drive.losses.index:
-            temperature = np.full(len(power), T_ref)
             for body, xb in zip(model.bodies, x, strict=True):
                 temperature[list(body.sources)] += body.source_rows @ xb
-            own = list(drive.losses.index)
-            power[own] = read_table(np, drive.losses.value[step], temperature_place(np, temperature[own]))
-        return Loads(theta, rise, lift, power, drive.contact_heat[step].sum(axis=0), surface, films.radiated)
+        told = StepDrive(
+            convection=Tabulated(theta[:n], drive.films.index, drive.films.value[step]),
+            joints=theta[n:],
+            power=Tabulated(drive.power[step], drive.losses.index, drive.losses.value[step]),
+            port_heat=drive.contact_heat[step].sum(axis=0),
+            environment=drive.environment[step],
+            radiation=float(drive.radiation),
+        )
+        return step_loads(np, self._plan, told, self.surfaces(x), temperature[list(drive.losses.index)], T_ref)
 
-    def forcing(self, loads: Loads) -> list[np.ndarray]:
+    def _of_terms(self, films: np.ndarray) -> np.ndarray:
+        """(n_theta,): numbers (n_films,) of films, and zero for joints."""
+        return np.append(films, np.zeros(len(self._area) - len(films)))
+
+    def forcing(self, loads: StepLoads) -> list[np.ndarray]:
         """Per body M theta (T_out - T_ref) + H lift + B q + P q_port [W]."""
         result = []
+        rise, lift = self._of_terms(loads.rise), self._of_terms(loads.lift)
         for body in self.model.bodies:
             own = list(body.theta)
-            f = body.M @ (loads.theta[own] * loads.rise[own])
+            f = body.M @ (loads.theta[own] * rise[own])
             if body.H is not None:
-                f = f + body.H @ loads.lift[own]
+                f = f + body.H @ lift[own]
             result.append(f + body.B @ loads.power[list(body.sources)] + body.P @ loads.port_heat[list(body.ports)])
         return result
 
@@ -231,18 +149,7 @@ class CoupledStepper:
                 return nearest
         while len(cache) >= self._keep:  # free first: two factors of a large body need not fit beside a third
             cache.pop(0)
-        solve: Callable[[np.ndarray], np.ndarray]
-        dense = self._dense[b]
-        if dense is None:
-            solve = factorize(system_matrix(body, theta, rate).tocsr(), rhs_hint=1000).solve
-        elif body.symmetric:
-            S = dense.system(own, rate).T  # its own transpose, in the order that LAPACK overwrites
-            factor = scipy.linalg.cho_factor(S, lower=True, overwrite_a=True, check_finite=False)
-            solve = partial(scipy.linalg.cho_solve, factor, check_finite=False)
-        else:
-            S = dense.system(own, rate)
-            solve = partial(scipy.linalg.lu_solve, scipy.linalg.lu_factor(S, check_finite=False), check_finite=False)
-
+        solve = solver_of(body, self._dense[b], theta, rate)
         X = solve(np.ascontiguousarray(body.P)) if body.P.shape[1] else np.zeros_like(body.P)
         cache.append(_Factored(rate, own, solve, X, body.port_rows @ X))
         return cache[-1]
@@ -258,19 +165,25 @@ class CoupledStepper:
             return lambda x: D @ x
         return lambda x: np.sum([d * (a @ x) for d, a in zip(more, body.A, strict=True) if d != 0.0], axis=0)
 
-    def solve(self, rhs: list[np.ndarray], factors: list[_Factored], gamma: np.ndarray) -> list[np.ndarray]:
-        """Solve (rate E + A + P Gamma P^T) x = rhs for all bodies, with rate and A of the factors."""
+    def across(self, factors: list[_Factored], gamma: np.ndarray) -> np.ndarray:
+        """1 + Q Gamma (n_ports, n_ports): what port temperatures solve with the bodies of these factors in contact."""
+        Q = np.zeros(gamma.shape)
+        for body, f in zip(self.model.bodies, factors, strict=True):
+            Q[np.ix_(body.ports, body.ports)] = f.Q
+        return np.asarray(np.eye(len(gamma)) + Q @ gamma)
+
+    def solve(
+        self, rhs: list[np.ndarray], factors: list[_Factored], gamma: np.ndarray, across: np.ndarray
+    ) -> list[np.ndarray]:
+        """Solve (rate E + A + P Gamma P^T) x = rhs for all bodies, with rate and A of the factors; across: of both."""
         bodies = self.model.bodies
         y = [f.solve(r) for f, r in zip(factors, rhs, strict=True)]
-        n_ports = gamma.shape[0]
-        if n_ports == 0:
+        if not len(gamma):
             return y
-        Q, t = np.zeros((n_ports, n_ports)), np.zeros(n_ports)
-        for body, f, yb in zip(bodies, factors, y, strict=True):
-            ports = list(body.ports)
-            Q[np.ix_(ports, ports)] = f.Q
-            t[ports] = body.port_rows @ yb
-        q = gamma @ np.linalg.solve(np.eye(n_ports) + Q @ gamma, t)
+        t = np.zeros(len(gamma))
+        for body, yb in zip(bodies, y, strict=True):
+            t[list(body.ports)] = body.port_rows @ yb
+        q = gamma @ np.linalg.solve(across, t)
         return [yb - f.X @ q[list(body.ports)] for body, f, yb in zip(bodies, factors, y, strict=True)]
 
     def run(
@@ -280,27 +193,53 @@ class CoupledStepper:
 
         States per body (n_b,) K.
         """
+        tableau, contacts = self._tableau, contact_entries(self.model.load_model, drive)
         x = list(start)
         for step in range(first, drive.n_steps):
+            dt = drive.time[step + 1] - drive.time[step]
             loads = self.loads(drive, step, x)
-            factors = self.factors(loads.theta, substeps / (drive.time[step + 1] - drive.time[step]))
-            gamma = contact_matrix(self.model, drive, step)
-            f = self.forcing(loads)
+            factors = self.factors(loads.theta, substeps / dt / tableau.diagonal)
+            gamma = dense(np, self._contacts, contacts.at(step))
+            forcing = np.concatenate(self.forcing(loads))
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
-            passes = 1 if all(r is None for r in rest) else 2
-            before, old, new = x, [np.zeros_like(xb) for xb in x], [np.zeros_like(xb) for xb in x]
+            solve = partial(self._solve_twice, factors, gamma, self.across(factors, gamma), rest)
+            capacity = partial(self._capacity, factors)
+            after = before = np.concatenate(x)
+            own, seen = np.zeros_like(before), np.zeros_like(before)  # means over the step
             for _ in range(substeps):
-                known = [
-                    factor.rate * self._stored(b, xb) + fb
-                    for b, (xb, fb, factor) in enumerate(zip(x, f, factors, strict=True))
-                ]
-                for _ in range(passes):
-                    seen = x
-                    rhs = [k if r is None else k - r(s) for k, r, s in zip(known, rest, seen, strict=True)]
-                    x = self.solve(rhs, factors, gamma)
-                old = [m + s / substeps for m, s in zip(old, seen, strict=True)]
-                new = [m + xb / substeps for m, xb in zip(new, x, strict=True)]
-            yield step, x, self._heat(loads, factors, drive.time[step + 1] - drive.time[step], before, x, old, new)
+                made = stages(tableau, solve, capacity, after, forcing)
+                for weight, (at, saw) in zip(tableau.weights, made, strict=True):
+                    own, seen = own + weight * at / substeps, seen + weight * saw / substeps
+                after = made[-1][0]
+            x = self._parts(after)
+            yield step, x, self._heat(loads, factors, dt, *map(self._parts, (after - before, seen, own)))
+
+    def _parts(self, x: np.ndarray) -> list[np.ndarray]:
+        """The bodies' states (n_b,) of all states one after the other (N,)."""
+        return [x[part] for part in self._rows]
+
+    def _capacity(self, factors: list[_Factored], x: np.ndarray) -> np.ndarray:
+        """rate E x of all bodies, one after the other (N,)."""
+        parts = zip(factors, self._parts(x), strict=True)
+        return np.concatenate([factor.rate * self._stored(b, xb) for b, (factor, xb) in enumerate(parts)])
+
+    def _solve_twice(
+        self,
+        factors: list[_Factored],
+        gamma: np.ndarray,
+        across: np.ndarray,
+        rest: Sequence[Callable[[np.ndarray], np.ndarray] | None],
+        right: np.ndarray,
+        near: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The solution (N,), and the state at which it took what the factors leave out: `near`, then what that gave."""
+        known, seen = self._parts(right), near
+        for _ in range(1 if all(r is None for r in rest) else 2):
+            seen = near
+            parts = zip(known, rest, self._parts(seen), strict=True)
+            rhs = [k if r is None else k - r(s) for k, r, s in parts]
+            near = np.concatenate(self.solve(rhs, factors, gamma, across))
+        return near, seen
 
     def _stored(self, b: int, x: np.ndarray) -> np.ndarray:
         """E x of a body."""
@@ -309,23 +248,23 @@ class CoupledStepper:
 
     def _heat(
         self,
-        loads: Loads,
+        loads: StepLoads,
         factors: list[_Factored],
         dt: float,
-        before: list[np.ndarray],
-        after: list[np.ndarray],
-        old: list[np.ndarray],
-        new: list[np.ndarray],
+        change: list[np.ndarray],
+        seen: list[np.ndarray],
+        own: list[np.ndarray],
     ) -> Heat:
-        """Heat of a step from its loads and its states: at its ends, and the means that the rest and the factor saw."""
-        flow = loads.theta * self._area * loads.rise + self._moment * loads.lift
+        """Heat of a step from its loads, its change of state, and the means that the rest and the factor saw."""
+        rise, lift = self._of_terms(loads.rise), self._of_terms(loads.lift)
+        flow = loads.theta * self._area * rise + self._moment * lift
         stored = 0.0
-        for body, rows, f, x0, x1, xo, xn in zip(
-            self.model.bodies, self._film_rows, factors, before, after, old, new, strict=True
+        for body, rows, f, dx, x_seen, x_own in zip(
+            self.model.bodies, self._film_rows, factors, change, seen, own, strict=True
         ):
-            own = list(body.theta)
-            flow[own] -= f.theta * (rows @ xn) + (loads.theta[own] - f.theta) * (rows @ xo)
-            stored += float(body.energy @ (x1 - x0)) / dt
+            terms = list(body.theta)
+            flow[terms] -= f.theta * (rows @ x_own) + (loads.theta[terms] - f.theta) * (rows @ x_seen)
+            stored += float(body.energy @ dx) / dt
         n = len(self.model.load_model.films)
         return Heat(loads.power, flow[:n], stored, self._area[:n] * loads.radiated)
 
@@ -337,24 +276,23 @@ class CoupledStepper:
         radiation rises steeply with temperature. Raises ModelError where none is found.
         """
         gamma = contact_matrix(self.model, drive, step)
-        borders = np.cumsum([b.n for b in self.model.bodies])[:-1]
         capacity = sum(float(b.one @ b.energy) for b in self.model.bodies)
 
         def turn(flat: np.ndarray) -> np.ndarray:
-            x = np.split(flat, borders)
+            x = self._parts(flat)
             loads = self.loads(drive, step, x)
             factors = self.factors(loads.theta, 0.0, min(self._follow, FOLLOW))
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
             f = self.forcing(loads)
             rhs = [fb if r is None else fb - r(xb) for fb, r, xb in zip(f, rest, x, strict=True)]
-            return np.concatenate(self.solve(rhs, factors, gamma))
+            return np.concatenate(self.solve(rhs, factors, gamma, self.across(factors, gamma)))
 
         def size(flat: np.ndarray) -> float:
-            stored = [abs(float(p @ self._stored(b, p))) for b, p in enumerate(np.split(flat, borders))]
+            stored = [abs(float(p @ self._stored(b, p))) for b, p in enumerate(self._parts(flat))]
             return float(np.sqrt(sum(stored) / capacity))
 
         start = float(drive.environment[step, 0]) if drive.environment.shape[1] else self.model.reference_temperature
-        return np.split(fixed_point(turn, np.concatenate(self.uniform(start)), size, tolerance, most), borders)
+        return self._parts(fixed_point(turn, np.concatenate(self.uniform(start)), size, tolerance, most))
 
     def uniform(self, temperature: float) -> list[np.ndarray]:
         """The state of a machine at one temperature [degC]."""

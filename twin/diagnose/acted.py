@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.calibrate.fit.effects import contact_names
 from twin.diagnose import bells
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.elements import Elements
-from twin.diagnose.march import INNER, Slots
+from twin.diagnose.march import INNER
+from twin.diagnose.slots import Slots
 from twin.diagnose.study import Study
 
 READINGS = frozenset({  # kinds that act on what is read, see `readings`
@@ -143,7 +143,7 @@ def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) 
         elif unit.kind == "joint":
             slots.joint[:, s, [j.name for j in load.joints].index(unit.place)] = coarse
         elif unit.kind == "contact":
-            slots.contact[:, s, contact_names(bench.base).index(unit.place)] = coarse
+            slots.contact[:, s, bench.base.load_model.contacts.index(unit.place)] = coarse
         elif unit.kind == "capacity":
             p = [q.name for q in bench.places].index(unit.place)
             slots.E[s] = np.outer(bench.B[p], bench.B[p])

@@ -11,14 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
+import twin.run.jax_setup  # noqa: F401  isort: skip
+
+import jax
 import numpy as np
 import scipy.linalg
 
-from twin.calibrate.fit.effects import contact_names
-from twin.diagnose.march import GAMMA, Loads, gammas
+from twin.diagnose.march import gammas
 from twin.diagnose.study import Study
-from twin.rom.following import FilmPlan, difference_place, film_state, read_table
+from twin.rom.step_loads import Tabulated, film_loads
+from twin.rom.tableau import SDIRK2, stages
 
 AT_ONCE = 700  # columns
 
@@ -44,34 +48,23 @@ def nominal_run(study: Study, k: int) -> Nominal:
     """Trajectory and matrices of run k at nominal parameters."""
     bench = study.bench
     states = study.states(k, np.zeros(len(bench.parameters)))
-    system, layout, load = bench.system, bench.layout, bench.base.load_model
-    run = study.runs[k].run
-    loads: Loads = run.loads
+    system, layout, loads = jax.tree.map(np.asarray, bench.system), bench.layout, study.runs[k].run.loads
     n, m = loads.environment.shape[:2]
     n_films = layout.n_films
-    plan = FilmPlan.of(load)
-    area = np.where(np.asarray(system.film_area) > 0, system.film_area, 1.0)
-    P, A0, A = np.asarray(system.P[0]), np.asarray(system.A0[0]), np.asarray(system.A[0])
-    following = np.array(layout.following_films, dtype=int)
+    plan, T_ref = system.film_plan, float(system.reference_temperature)
+    P, A0, A = system.P[0], system.A0[0], system.A[0]
+    theta, environment = np.asarray(loads.theta), np.asarray(loads.environment)
     rate = float(np.asarray(loads.rate)[0])
     total, convection, outer = (np.zeros((n * m, n_films)) for _ in range(3))
     inverse = np.zeros((n * m, *A0.shape), dtype=np.float32)
-    gamma = gammas(bench.contacts, loads, np.ones(len(contact_names(bench.base))), P.shape[1])
+    gamma = gammas(bench.contacts, loads, np.ones(bench.contacts.n_contacts))
     for i in range(n):
-        z = states[i * m]
-        surface = np.asarray(system.reference_temperature) + (np.asarray(system.film_rows) @ z) / area
-        h = np.asarray(loads.theta)[i, :n_films].copy()
-        if len(following):
-            air = plan.air(loads.environment[i].mean(axis=0), np.asarray(system.film_moment) / area)[following]
-            h[following] = read_table(
-                np, np.asarray(loads.film_table)[i], difference_place(np, surface[following] - air)
-            )
-        for j in range(m):
-            state = film_state(np, plan, h, surface, np.asarray(loads.environment)[i, j], 1.0)
-            total[i * m + j], convection[i * m + j] = state.total, h
-            outer[i * m + j] = state.outer - float(system.reference_temperature)
-        coefficients = np.concatenate([total[i * m : (i + 1) * m].mean(axis=0), np.asarray(loads.theta)[i, n_films:]])
-        S = rate / GAMMA * np.eye(len(A0)) + A0 + np.tensordot(coefficients - np.asarray(system.nominal), A, 1)
+        fine = slice(i * m, (i + 1) * m)
+        told = Tabulated(theta[i, :n_films], layout.following_films, np.asarray(loads.film_table)[i])
+        films = film_loads(np, plan, told, system.surfaces(states[i * m]), environment[i], 1.0)
+        total[fine], convection[fine], outer[fine] = films.total, films.convection, films.outer - T_ref
+        coefficients = np.concatenate([films.total.mean(axis=0), theta[i, n_films:]])
+        S = rate / SDIRK2.diagonal * np.eye(len(A0)) + A0 + np.tensordot(coefficients - system.nominal, A, 1)
         for j in range(i * m, (i + 1) * m):
             factor = scipy.linalg.cho_factor(S + P @ gamma[j] @ P.T, lower=True)
             inverse[j] = scipy.linalg.cho_solve(factor, np.eye(len(S)))
@@ -131,14 +124,17 @@ def _march(
         if c is not None:
             V[:, j] = c
     changing = [(j, vectors[v]) for j, v in enumerate(used) if constant[j] is None]
-    rate = np.float32(nominal.rate / GAMMA)
-    back = np.float32((1.0 - GAMMA) / GAMMA)
+    rate = np.float32(nominal.rate / SDIRK2.diagonal)
+
+    def solve(t: int, right: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        X = nominal.inverse[t] @ right
+        return X, X
+
     for t in range(fine):
         for j, vector in changing:
             V[:, j] = vector[t]
         known = V[:, which] * S[t]
-        middle = nominal.inverse[t] @ (rate * X + known)
-        X = nominal.inverse[t] @ (rate * (X + back * (middle - X)) + known)
+        *_, (X, _) = stages(SDIRK2, partial(solve, t), lambda X: rate * X, X, known)
         T[t + 1] = C @ X
         if t + 1 in needed:
             kept[t + 1] = X

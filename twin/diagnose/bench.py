@@ -18,11 +18,9 @@ from twin.build.full_model import FullModel, assemble
 from twin.build.pipeline import theta_bounds
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
-from twin.calibrate.fit.march import Places as Contacts
-from twin.calibrate.fit.march import places_of as contacts_of
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
-from twin.diagnose.march import INNER, Loads, loads_for
+from twin.diagnose.march import INNER, NestedLoads, loads_for
 from twin.diagnose.places import GHOST, Place, places_of, pruned, with_ghosts, with_places
 from twin.diagnose.training import Shared, snapshots
 from twin.errors import LogError
@@ -30,6 +28,7 @@ from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
+from twin.rom.contact_matrix import ContactPlaces
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
@@ -63,7 +62,7 @@ class BenchRun:
     signals: dict[str, np.ndarray]  # (n_steps,) means over the drive's steps, currents as rms, SI
     start: float  # degC
     stated_start: bool
-    loads: Loads
+    loads: NestedLoads
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ class Bench:
     base: MachineModel  # the window model of the description
     layout: Layout
     system: System
-    contacts: Contacts
+    contacts: ContactPlaces
     parameters: tuple[Parameter, ...]
     places: tuple[Place, ...]
     B: np.ndarray  # (P, r) 1 W at each place
@@ -232,7 +231,7 @@ def _assembled(
                      loads_for(base, drive))
         )  # fmt: skip
     return Bench(
-        base, prepared.layout, prepared.system, contacts_of(base), tuple(parameters), rich.places,
+        base, prepared.layout, prepared.system, ContactPlaces.of(load), tuple(parameters), rich.places,
         B=body.B[:, n_sources:].T.copy(), A=np.array(body.A[n_films : n_films + n_places]),
         M=body.M[:, n_films : n_films + n_places].T.copy(), H=H, ghosts=body.C[ghost], runs=tuple(made),
         reduction=reduction,

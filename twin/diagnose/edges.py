@@ -18,7 +18,7 @@ from twin.diagnose.acted import Unit, slots_with
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.elements import Elements
-from twin.diagnose.march import Slots
+from twin.diagnose.slots import Slots
 from twin.diagnose.study import Study
 
 PULSE = 600.0  # s

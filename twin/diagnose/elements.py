@@ -23,7 +23,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.calibrate.fit.effects import contact_names
 from twin.diagnose.bank import Column, Nominal
 from twin.diagnose.march import INNER, gammas
 from twin.diagnose.places import beside
@@ -202,7 +201,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         conductance = [np.asarray(run.drive.theta)[:, [len(films) + j]] for run in runs]
         v = vector([-k * (x @ term.T) for k, x in zip(conductance, z, strict=True)])
         blocks("joint", joint.name, v)
-    for c, name in enumerate(contact_names(bench.base)):
+    for c, name in enumerate(bench.base.load_model.contacts):
         v = vector([_contact_flow(study, k, c, x) for k, x in enumerate(z)])
         blocks("contact", name, v)
     powers = [_powers(study, k, own) for k, own in enumerate(nominal)]
@@ -260,9 +259,9 @@ def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:
     bench = study.bench
     loads = study.runs[k].run.loads
     P = np.asarray(bench.system.P[0])
-    mask = np.zeros(len(contact_names(bench.base)))
+    mask = np.zeros(len(bench.base.load_model.contacts))
     mask[c] = 1.0
-    gamma = gammas(bench.contacts, loads, mask, P.shape[1])
+    gamma = gammas(bench.contacts, loads, mask)
     return np.asarray(-np.einsum("tij,tj->ti", gamma, z @ P) @ P.T)
 
 

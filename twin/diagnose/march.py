@@ -13,6 +13,7 @@ description lacks, each times an amplitude a_k that is differentiated like a par
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -23,83 +24,40 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from twin.calibrate.fit.effects import Effects, Factors, contact_names, factors_at
-from twin.calibrate.fit.march import Places, Rows
-from twin.diagnose.ports_first import Basis, Factor, basis, factor, held, solved, turned, within
-from twin.rom import law_values
+from twin.calibrate.fit.effects import Effects, Factors, factors_at
+from twin.calibrate.fit.march import Rows, displacements, temperatures
+from twin.diagnose.ports_first import Basis, Factor, basis, factor, held, turned, within
+from twin.diagnose.ports_first import solved as by_factor
+from twin.diagnose.slots import Slots
+from twin.rom.contact_matrix import ContactEntries, ContactPlaces, dense, entries_by_contact, product, scaled
 from twin.rom.drive import Drive
-from twin.rom.following import FilmPlan, difference_place, film_state, read_table, temperature_place
 from twin.rom.model import MachineModel
-from twin.run.stepping import inputs_of
+from twin.rom.step_loads import Tabulated, film_loads, source_powers
+from twin.rom.tableau import SDIRK2
+from twin.run.integrator import integrate, solved
 from twin.run.system import Array, Layout, System
 
 INNER = 5  # fine steps in a coarse one
-GAMMA = 1.0 - 0.5**0.5  # SDIRK2
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Loads:
+class NestedLoads:
     """A run; n coarse steps of m fine ones."""
 
     rate: Array  # (n,) 1/s of the fine steps
     theta: Array  # (n, n_theta) W/(m^2 K): convection of films that read the log alone, then joints
     film_table: Array  # (n, k, 65) W/(m^2 K) over DIFFERENCES
-    diagonal: Array  # (n, m, c, n_ports) W/K, as `twin.calibrate.fit.march.Loads`
-    neighbour: Array  # (n, m, c, n_ports)
-    weight: Array  # (n, m, n_pairs, n_segments)
+    contacts: ContactEntries  # (n, m, ...), each contact on its own
     environment: Array  # (n, m, n_environments) degC
     power: Array  # (n, m, n_sources) W
     power_table: Array  # (n, m, l, 121) W over TEMPERATURES
     contact_heat: Array  # (n, m, s, r) W, projected
 
 
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Slots:
-    """K hypotheses in window coordinates, as unit amplitudes."""
-
-    A: Array  # (K, r, r) per W/(m^2 K)
-    M: Array  # (K, r)
-    E: Array  # (K, r, r)
-    B: Array  # (K, r, n_sources) per W: where else the heat of sources goes
-    reads: Array  # (K, l, r): how else laws of sources that follow a temperature read it
-    gate: Array  # (n, K): of A and M
-    rise: Array  # (n, m, K) K: medium of M above the reference temperature
-    forcing: Array  # (n, m, K, r)
-    film: Array  # (n, K, n_films): relative change of the convection of films
-    joint: Array  # (n, K, n_joints)
-    contact: Array  # (n, K, n_contacts)
-    environment: Array  # (n, m, K, n_environments) K
-    initial: Array  # (K, r)
-
-
-def no_slots(n: int, m: int, K: int, r: int, model: MachineModel) -> Slots:
-    """Slots that do nothing, as numpy arrays to be filled."""
-    load = model.load_model
-    following = sum(bool(law_values.states_of(source.use)) for source in load.sources)
-    return Slots(
-        A=np.zeros((K, r, r)), M=np.zeros((K, r)), E=np.zeros((K, r, r)),
-        B=np.zeros((K, r, len(load.sources))), reads=np.zeros((K, following, r)), gate=np.zeros((n, K)),
-        rise=np.zeros((n, m, K)), forcing=np.zeros((n, m, K, r)), film=np.zeros((n, K, len(load.films))),
-        joint=np.zeros((n, K, len(load.joints))), contact=np.zeros((n, K, len(contact_names(model)))),
-        environment=np.zeros((n, m, K, len(load.environments))), initial=np.zeros((K, r)),
-    )  # fmt: skip
-
-
-def first_slots(slots: Slots, k: int) -> Slots:
-    """The first k of them."""
-    return Slots(
-        A=slots.A[:k], M=slots.M[:k], E=slots.E[:k], B=slots.B[:k], reads=slots.reads[:k], gate=slots.gate[:, :k],
-        rise=slots.rise[:, :, :k], forcing=slots.forcing[:, :, :k], film=slots.film[:, :k], joint=slots.joint[:, :k],
-        contact=slots.contact[:, :k], environment=slots.environment[:, :, :k], initial=slots.initial[:k],
-    )  # fmt: skip
-
-
-def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> Loads:
+def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> NestedLoads:
     """The loads of a run, from a drive of fine steps whose number is a multiple of m, for a model of one body."""
     (body,) = model.bodies
-    names, pairs = contact_names(model), model.load_model.pairs
     n = drive.n_steps // m
 
     def mean(values: np.ndarray) -> np.ndarray:
@@ -108,19 +66,12 @@ def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> Loads:
     def inner(values: np.ndarray) -> np.ndarray:
         return values.reshape(n, m, *values.shape[1:])
 
-    own = []
-    for name in names:
-        mask = np.array([p.contact == name for p in pairs])
-        own.append(inputs_of(model.load_model, replace(drive, conductance=drive.conductance * mask), 1))
-    inputs = inputs_of(model.load_model, drive, 1)
-    none = np.zeros((n, m, 0, len(model.load_model.ports)))
-    return Loads(
+    apart = entries_by_contact(model.load_model, drive)
+    return NestedLoads(
         rate=np.full(n, 1.0 / (drive.time[1] - drive.time[0])),
         theta=mean(drive.theta),
         film_table=mean(drive.films.value),
-        diagonal=np.stack([inner(np.asarray(i.contact_diagonal)) for i in own], axis=2) if own else none,
-        neighbour=np.stack([inner(np.asarray(i.contact_neighbour)) for i in own], axis=2) if own else none,
-        weight=inner(np.asarray(inputs.contact_weight)),
+        contacts=ContactEntries(inner(apart.diagonal), inner(apart.neighbour), inner(apart.weight)),
         environment=inner(drive.environment),
         power=inner(drive.power),
         power_table=inner(drive.losses.value),
@@ -128,74 +79,43 @@ def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> Loads:
     )
 
 
-def flows(places: Places, diagonal: Array, neighbour: Array, weight: Array, contact: Array, y: jax.Array) -> jax.Array:
-    """Gamma y (n_ports, k) W at port temperatures y (n_ports, k), of one fine step with the contacts scaled by contact
-    (c,); diagonal and neighbour (c, n_ports), weight (n_pairs, n_segments), as in `Loads`."""
-    contact = jnp.asarray(contact)
-    beside = (contact @ jnp.asarray(neighbour))[:-1, None]
-    pad, segment, c, k, s = _touching(places)
-    w = -(contact[c] * jnp.asarray(weight)[k, s])[:, None]
-    result = (contact @ jnp.asarray(diagonal))[:, None] * y
-    result = result.at[:-1].add(beside * y[1:]).at[1:].add(beside * y[:-1])
-    return result.at[np.concatenate([pad, segment])].add(jnp.concatenate([w * y[segment], w * y[pad]]))
-
-
-def gamma(places: Places, diagonal: Array, neighbour: Array, weight: Array, contact: Array) -> jax.Array:
-    """Gamma (n_ports, n_ports) W/K, as `flows`."""
-    contact = jnp.asarray(contact)
-    ports = np.arange(np.shape(diagonal)[1])
-    pad, segment, c, k, s = _touching(places)
-    beside = (contact @ jnp.asarray(neighbour))[:-1]
-    w = -contact[c] * jnp.asarray(weight)[k, s]
-    row = np.concatenate([ports, ports[:-1], ports[1:], pad, segment])
-    column = np.concatenate([ports, ports[1:], ports[:-1], segment, pad])
-    values = jnp.concatenate([contact @ jnp.asarray(diagonal), beside, beside, w, w])
-    return jnp.zeros((len(ports), len(ports))).at[row, column].add(values)
-
-
-def _touching(places: Places) -> np.ndarray:
-    """(5, n): pad and segment (ports), contact, pair and number of the segment in it, of all that may touch."""
-    pairs = [(p, first + s, c, k, s)
-             for k, (c, p, first, n) in enumerate(
-                 zip(places.contact_of_pair, places.pad, places.first, places.count, strict=True))
-             for s in range(n)]  # fmt: skip
-    return np.array(pairs, dtype=int).reshape(-1, 5).T
-
-
-def gammas(places: Places, loads: Loads, contact: np.ndarray, n_ports: int) -> np.ndarray:
-    """Gamma (n m, n_ports, n_ports) W/K of all fine steps of a run."""
-    steps = int(np.prod(np.asarray(loads.diagonal).shape[:2]))
-    if not n_ports:
+def gammas(places: ContactPlaces, loads: NestedLoads, contact: np.ndarray) -> np.ndarray:
+    """Gamma (n m, n_ports, n_ports) W/K of all fine steps of a run, with the contacts scaled by contact (c,)."""
+    steps = int(np.prod(np.shape(loads.contacts.diagonal)[:2]))
+    if not places.n_ports:
         return np.zeros((steps, 0, 0))
-    many = jax.jit(jax.vmap(partial(gamma, places), (0, 0, 0, None)))
-    flat = [np.asarray(v).reshape(steps, *v.shape[2:]) for v in (loads.diagonal, loads.neighbour, loads.weight)]
-    return np.asarray(many(*flat, contact))
+    flat = jax.tree.map(lambda v: np.asarray(v).reshape(steps, *v.shape[2:]), loads.contacts)
+    return np.asarray(jax.jit(jax.vmap(lambda one: dense(jnp, places, scaled(jnp, places, one, contact))))(flat))
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
-def _solved(
-    places: Places, many: bool, known_factor: Factor, c: jax.Array, terms: jax.Array, contact: jax.Array,
-    segments: tuple[Array, Array, Array], P: jax.Array, known: jax.Array,
-) -> jax.Array:  # fmt: skip
-    """S^-1 known, by the factor of S = c + P Gamma P^T (many: c . terms in c's place).
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class _Fixed:
+    """What derivatives of a solve take as it is."""
 
-    Derivatives come with c, contact and known; the factor's are not looked at.
+    factor: Factor  # of S = c + P Gamma P^T
+    terms: jax.Array  # (q, r, r), many: c is their combination
+    contacts: ContactEntries
+    P: jax.Array  # (r, n_ports)
+
+
+def _by_factor(fixed: _Fixed, right: jax.Array, near: jax.Array) -> jax.Array:
+    return by_factor(fixed.factor, right)
+
+
+def _change(places: ContactPlaces, many: bool) -> Callable[[_Fixed, tuple[jax.Array, jax.Array], jax.Array], jax.Array]:
+    """S' x by c, (r, r) or (q,) of the terms, and by the contacts' factors.
 
     Few derivatives: a matrix dc for each, made once. Many: the products of terms with the solution, which they share.
     The other way about, either takes several times as long.
     """
-    return solved(known_factor, known)
 
+    def change(fixed: _Fixed, d: tuple[jax.Array, jax.Array], x: jax.Array) -> jax.Array:
+        dc, dcontact = d
+        flow = product(jnp, places, scaled(jnp, places, fixed.contacts, dcontact), (fixed.P.T @ x)[:, None])[:, 0]
+        return (dc @ (fixed.terms @ x) if many else dc @ x) + fixed.P @ flow
 
-@_solved.defjvp
-def _solved_jvp(places: Places, many: bool, at: tuple, d: tuple) -> tuple[jax.Array, jax.Array]:
-    known_factor, _, terms, _, segments, P, known = at
-    _, dc, _, dcontact, _, _, dknown = d
-    x = solved(known_factor, known)
-    dS = dc @ (terms @ x) if many else dc @ x
-    diagonal, neighbour, weight = segments
-    dS = dS + P @ flows(places, diagonal, neighbour, weight, dcontact, (P.T @ x)[:, None])[:, 0]
-    return x, solved(known_factor, dknown - dS)
+    return change
 
 
 @dataclass(frozen=True)
@@ -227,38 +147,23 @@ class Operators:
 
 
 def _step(
-    layout: Layout, places: Places, many: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
-    fixed: Operators, z: jax.Array, now: tuple[Loads, Slots],
+    layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
+    fixed: Operators, z: jax.Array, now: tuple[NestedLoads, Slots],
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     """The state after one coarse step, and those after its fine ones (m, r)."""
     loads, slots = now
     n, T_ref = layout.n_films, system.reference_temperature
-    following, losing = np.array(layout.following_films, dtype=int), np.array(layout.following_losses, dtype=int)
+    losing = np.array(layout.following_losses, dtype=int)
     environment = jnp.asarray(loads.environment) + f.environment + jnp.einsum("k,mke->me", a, slots.environment)
     film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
     # films follow the state and the mean air at the step's start
-    plan = FilmPlan(
-        system.film_environment, system.film_radiant, system.film_emissivity, system.film_gradient, system.film_height
-    )
-    area = jnp.where(system.film_area > 0.0, system.film_area, 1.0)
-    surface = T_ref + (system.film_rows @ z) / area
-    convection = jnp.asarray(loads.theta)[:n]
-    if len(following):
-        air = plan.air(environment.mean(axis=0), system.film_moment / area)[following]
-        read = read_table(jnp, jnp.asarray(loads.film_table), difference_place(jnp, surface[following] - air))
-        convection = convection.at[following].set(read)
-    convection = convection * film_factor
-
-    def read_films(air: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-        state = film_state(jnp, plan, convection, surface, air, jnp.array(1.0))
-        return state.total, state.outer, state.lift
-
-    totals, outer, lift = jax.vmap(read_films)(environment)
-    total = totals.mean(axis=0)
+    convection = Tabulated(jnp.asarray(loads.theta)[:n], layout.following_films, loads.film_table)
+    films = film_loads(jnp, system.film_plan, convection, system.surfaces(z), environment, 1.0, film_factor)
+    total, rise = films.total.mean(axis=0), films.outer - T_ref
     joint_factor = f.joint * jnp.maximum(1.0 + a @ jnp.asarray(slots.joint), 0.02)
     joints = jnp.asarray(loads.theta)[n:] * joint_factor
     contact = f.contact * jnp.maximum(1.0 + a @ jnp.asarray(slots.contact), 0.02)
-    P, rate = jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / GAMMA
+    P, rate = jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / SDIRK2.diagonal
     gate = a * jnp.asarray(slots.gate)
     coefficients = jnp.concatenate([jnp.concatenate([total, joints]) - jnp.asarray(system.nominal), gate])
     valued = lax.stop_gradient(coefficients) if many else coefficients
@@ -278,19 +183,23 @@ def _step(
     tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
     winding = T_ref + fixed.reads @ z
 
+    change = _change(places, many)
+
     def fine(x: jax.Array, i: jax.Array) -> tuple[jax.Array, jax.Array]:
-        power = jnp.asarray(loads.power)[i] * f.source
-        if len(losing):
-            power = power.at[losing].set(read_table(jnp, tables[i], temperature_place(jnp, winding)))
+        told = Tabulated(jnp.asarray(loads.power)[i] * f.source, layout.following_losses, tables[i])
         ports = jnp.tensordot(f.source[np.array(places.sources, dtype=int)], jnp.asarray(loads.contact_heat)[i], 1)
-        forcing = system.M @ (total * (outer[i] - T_ref)) + system.H @ lift[i] + fixed.B @ power + ports
+        power = source_powers(jnp, told, winding)
+        forcing = system.M @ (total * rise[i]) + system.H @ films.lift + fixed.B @ power + ports
         forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ fixed.M + a @ jnp.asarray(slots.forcing)[i]
-        diagonal, neighbour, weight = (jnp.asarray(v)[i] for v in (loads.diagonal, loads.neighbour, loads.weight))
-        touching = gamma(places, diagonal, neighbour, weight, lax.stop_gradient(contact))
-        now = factor(kept, fixed.ports.across(touching))
-        solve = partial(_solved, places, many, now, c, terms, contact, (diagonal, neighbour, weight), P)
-        middle = solve(capacity(x) + forcing)
-        after = solve(capacity(x + (1.0 - GAMMA) / GAMMA * (middle - x)) + forcing)
+        apart = jax.tree.map(lambda v: jnp.asarray(v)[i], loads.contacts)
+        gamma = dense(jnp, places, scaled(jnp, places, apart, lax.stop_gradient(contact)))
+        known = _Fixed(factor(kept, fixed.ports.across(gamma)), terms, apart, P)
+
+        def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+            y = solved(_by_factor, change, known, (c, contact), right, near)
+            return y, y
+
+        after, *_ = integrate(SDIRK2, 1, solve, capacity, x, jnp.asarray(forcing))
         return after, after
 
     m = loads.environment.shape[0]
@@ -298,8 +207,8 @@ def _step(
 
 
 def trajectory(
-    layout: Layout, places: Places, many: bool, system: System, effects: Effects, loads: Loads, slots: Slots,
-    start: Array, v: Array,
+    layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, loads: NestedLoads,
+    slots: Slots, start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
     """States (n m + 1, r) at the fine steps from start (r,); v: parameters u of the machine, then amplitudes a (K,)."""
     n = effects.source.shape[1]
@@ -323,12 +232,10 @@ def trajectory(
 
 
 def outputs_of(
-    layout: Layout, places: Places, many: bool, from_first: bool, system: System, effects: Effects, loads: Loads,
-    slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
+    layout: Layout, places: ContactPlaces, many: bool, from_first: bool, system: System, effects: Effects,
+    loads: NestedLoads, slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
     """Means of sensors over bins (b s,) [degC], then TCP rows (k 3,) [m]."""
-    from twin.calibrate.fit.march import displacements, temperatures
-
     states = trajectory(layout, places, many, system, effects, loads, slots, start, v)
     mean_of, column = bins
     T = jnp.asarray(mean_of) @ temperatures(system, states)[:, column]
@@ -341,15 +248,15 @@ states_of = partial(jax.jit, static_argnums=(0, 1, 2))(trajectory)
 
 
 @partial(jax.jit, static_argnums=(0, 1, 2))
-def jacobian(layout: Layout, places: Places, from_first: bool, *rest: object) -> jax.Array:
+def jacobian(layout: Layout, places: ContactPlaces, from_first: bool, *rest: object) -> jax.Array:
     """Derivatives (b s + k 3, n + K) of `outputs_of` by v."""
     return jax.jacfwd(partial(outputs_of, layout, places, True, from_first), argnums=len(rest) - 1)(*rest)
 
 
 @partial(jax.jit, static_argnums=(0, 1, 2))
 def by_amplitudes(
-    layout: Layout, places: Places, from_first: bool, system: System, effects: Effects, loads: Loads, slots: Slots,
-    rows: Rows, bins: tuple[Array, Array], start: Array, u: Array, a: Array,
+    layout: Layout, places: ContactPlaces, from_first: bool, system: System, effects: Effects, loads: NestedLoads,
+    slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, u: Array, a: Array,
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     """Derivatives (b s + k 3, K) of `outputs_of` by the amplitudes alone, and the outputs."""
 

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.diagnose.elements import heated_places, own_place
-from twin.diagnose.march import INNER, Slots
+from twin.diagnose.march import INNER
 from twin.diagnose.places import beside
+from twin.diagnose.slots import Slots
 from twin.diagnose.study import Study
 from twin.run.system import Array
 

@@ -12,7 +12,8 @@ from twin.calibrate.fit.effects import Effects, effects_of
 from twin.calibrate.fit.march import Rows, displacements
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.bench import Bench, BenchRun
-from twin.diagnose.march import INNER, Slots, by_amplitudes, first_slots, jacobian, no_slots, outputs, states_of
+from twin.diagnose.march import INNER, by_amplitudes, jacobian, outputs, states_of
+from twin.diagnose.slots import Slots, first_slots, no_slots
 from twin.errors import TwinError
 
 K = 4  # amplitudes that may be active at once

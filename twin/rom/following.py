@@ -71,20 +71,21 @@ def read_table(xp: Any, table: Array, place: Array) -> Array:
 
 @dataclass(frozen=True)
 class FilmPlan:
-    """What the films of a load model need besides their tables; f films, k of them following."""
+    """What the films of a load model need besides their tables; f films."""
 
     environment: Array  # (f,) index
     radiant: Array  # (f,) index
     emissivity: Array  # (f,)
     gradient: Array  # (f,) K/m of the air
     height: Array  # (f,) m where the air's temperature is measured
+    mean_height: Array  # (f,) m of the films' surfaces
 
-    def air(self, environment: Array, mean_height: Array) -> Array:
-        """degC (f,) of the air at the mean height (f,) [m] of the films' surfaces: what their laws see."""
-        return environment[self.environment] + self.gradient * (mean_height - self.height)
+    def air(self, environment: Array) -> Array:
+        """degC (..., f) of the air at the mean height of the films' surfaces, which their laws see; (..., e) given."""
+        return environment[..., self.environment] + self.gradient * (self.mean_height - self.height)
 
     @classmethod
-    def of(cls, load: LoadModel) -> FilmPlan:
+    def of(cls, load: LoadModel, mean_height: Array) -> FilmPlan:
         air = [load.environments[f.environment] for f in load.films]
         return cls(
             environment=np.array([f.environment for f in load.films], dtype=np.int64),
@@ -92,17 +93,19 @@ class FilmPlan:
             emissivity=np.array([f.emissivity for f in load.films]),
             gradient=np.array([e.gradient for e in air]),
             height=np.array([e.height for e in air]),
+            mean_height=mean_height,
         )
 
 
 @dataclass(frozen=True)
 class FilmState:
-    """Films of a step; f films."""
+    """Films of a step; f films, with a leading axis m where there are as many environments."""
 
-    total: Array  # (f,) W/(m^2 K), convection and radiation: what multiplies the affine term
-    outer: Array  # (f,) degC: the temperature outside that both together see, at height zero
+    convection: Array  # (f,) W/(m^2 K)
+    total: Array  # (..., f) W/(m^2 K), convection and radiation: what multiplies the affine term
+    outer: Array  # (..., f) degC: the temperature outside that both together see, at height zero
     lift: Array  # (f,) W/(m^3 K) times K: convection times gradient, multiplies H
-    radiated: Array  # (f,) W/m^2 into the surfaces by radiation
+    radiated: Array  # (..., f) W/m^2 into the surfaces by radiation
 
 
 def film_state(
@@ -110,13 +113,13 @@ def film_state(
 ) -> FilmState:
     """Coefficients of films with convection (f,) [W/(m^2 K)] at mean surface temperatures (f,) [degC].
 
-    environment (n_environments,) [degC]; radiation: 1, or 0 to switch it off. With h_c (T - T_air) + h_r (T - T_rad) =
-    (h_c + h_r)(T - T_outer), a surface needs one affine term for both.
+    environment (..., n_environments) [degC]; radiation: 1, or 0 to switch it off. With h_c (T - T_air) +
+    h_r (T - T_rad) = (h_c + h_r)(T - T_outer), a surface needs one affine term for both.
     """
-    air, radiant = environment[plan.environment], environment[plan.radiant]
+    air, radiant = environment[..., plan.environment], environment[..., plan.radiant]
     radiated = radiation * radiation_coefficient(surface, radiant, plan.emissivity)
     at_zero = air - plan.gradient * plan.height
     total = convection + radiated
     share = radiated / xp.where(total > 0.0, total, 1.0)
     outer = at_zero + share * (radiant - at_zero)
-    return FilmState(total, outer, convection * plan.gradient, radiated * (radiant - surface))
+    return FilmState(convection, total, outer, convection * plan.gradient, radiated * (radiant - surface))

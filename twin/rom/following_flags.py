@@ -21,8 +21,8 @@ def following_flags(
     as stepped; height (n_films,) m: mean of the films' surfaces.
     """
     flags: dict[str, np.ndarray] = {}
-    plan = FilmPlan.of(load)
-    air = np.stack([plan.air(environment, height) for environment in drive.environment])
+    plan = FilmPlan.of(load, height)
+    air = plan.air(drive.environment)
     radiant = drive.environment[:, plan.radiant]
     exchanges = (np.abs(surface - air) > AT_REST) | ((plan.emissivity > 0) & (np.abs(surface - radiant) > AT_REST))
     for k, film in enumerate(load.films):

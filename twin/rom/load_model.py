@@ -145,6 +145,11 @@ class LoadModel:
         return min((f.environment for f in films), default=0)
 
     @property
+    def contacts(self) -> tuple[str, ...]:
+        """Moving contacts in the order of their first pair."""
+        return tuple(dict.fromkeys(p.contact for p in self.pairs))
+
+    @property
     def contact_sources(self) -> tuple[int, ...]:
         """Index of the sources whose heat goes into moving contacts."""
         return tuple(j for j, s in enumerate(self.sources) if s.contact)

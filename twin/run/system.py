@@ -14,12 +14,15 @@ import twin.run.jax_setup  # noqa: F401  isort: skip
 import jax
 import numpy as np
 
+from twin.rom.contact_matrix import ContactEntries
 from twin.rom.following import FilmPlan
 from twin.rom.law_values import states_of
 from twin.rom.model import AffineBody, MachineModel
 from twin.run.block_factor import Elimination, plan
 
 Array = jax.Array | np.ndarray
+
+jax.tree_util.register_dataclass(ContactEntries)
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,28 @@ class System:
     G: Array  # (n_poses * 3, N)
     one: Array  # (N,) the field that is 1 K everywhere
     reference_temperature: Array  # () degC
+
+    @property
+    def film_plan(self) -> FilmPlan:
+        """The films as `twin.rom.step_loads` reads them."""
+        return FilmPlan(
+            environment=self.film_environment,
+            radiant=self.film_radiant,
+            emissivity=self.film_emissivity,
+            gradient=self.film_gradient,
+            height=self.film_height,
+            mean_height=self.film_moment / self.safe_area,
+        )
+
+    @property
+    def safe_area(self) -> Array:
+        """film_area, 1 m^2 for films of no surface."""
+        xp = np if isinstance(self.film_area, np.ndarray) else jax.numpy
+        return xp.where(self.film_area > 0.0, self.film_area, 1.0)
+
+    def surfaces(self, z: Array) -> Array:
+        """Mean temperatures (n_films,) [degC] of the films' surfaces at state z (N,)."""
+        return self.reference_temperature + (self.film_rows @ z) / self.safe_area
 
 
 def _normalised(body: AffineBody) -> tuple[AffineBody, np.ndarray]:
@@ -195,7 +220,7 @@ def prepare(model: MachineModel) -> Prepared:
         source_rows[list(body.sources), rows] = body.source_rows
         C[list(body.sensors), rows] = body.C
         G[:, rows] = body.G.reshape(-1, body.n)
-    films = FilmPlan.of(load)
+    films = FilmPlan.of(load, np.zeros(n_films))
     nominal = np.array([0.0] * n_films + [j.conductance for j in load.joints])
     system = System(
         A0=tuple(b.A0 + np.tensordot(nominal[list(b.theta)], np.array(b.A).reshape(-1, b.n, b.n), 1) for b in bodies),

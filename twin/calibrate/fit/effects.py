@@ -56,11 +56,6 @@ class Start:
         return f"initial.{run_name}.{self.member}"
 
 
-def contact_names(model: MachineModel) -> tuple[str, ...]:
-    """Moving contacts in the order of their first pair."""
-    return tuple(dict.fromkeys(p.contact for p in model.load_model.pairs))
-
-
 def effects_of(model: MachineModel, parameters: Sequence[Parameter], starts: Sequence[Start]) -> Effects:
     """The arrays for a model of one body (`twin.calibrate.fit.window`).
 
@@ -72,7 +67,7 @@ def effects_of(model: MachineModel, parameters: Sequence[Parameter], starts: Seq
         "source": [s.name for s in load.sources],
         "film": [f.name for f in load.films],
         "joint": [j.name for j in load.joints],
-        "contact": list(contact_names(model)),
+        "contact": list(load.contacts),
         "environment": [e.name for e in load.environments],
         "capacity": list(body.members),
         "expansion": list(body.members),

@@ -1,13 +1,9 @@
-"""The window model stepped through a run as a function of the parameters, differentiable in JAX's forward mode.
+"""The window model integrated through a run as a function of the parameters, differentiable in JAX's forward mode.
 
-The step is the runtime's implicit Euler with the runtime's own loads (`twin.run.stepping.loads_of`), and the exact
-coefficients of every step in the matrix:
+The step is the runtime's (`twin.run.integrator`) with the runtime's own loads (`twin.run.stepping.loads_of`), and the
+exact coefficients of every step in the matrix:
 
     S(u) z_new = rate E(u) z + f(u),     S(u) = rate E(u) + A0 + sum_k theta_k(u) A_k + sum_c g_c(u) P Gamma_c P^T
-
-Derivatives by the implicit function theorem: with the inverse of S held fixed (stop_gradient) one Newton correction
-z + S^-1 (f - S z) has the exact derivative S^-1 (f' - S' z). Differentiating the factorisation instead costs twenty
-times as much for the same digits (measured at 100 states).
 """
 
 from __future__ import annotations
@@ -23,78 +19,36 @@ import numpy as np
 from jax import lax
 from jax.scipy.linalg import cho_solve
 
-from twin.calibrate.fit.effects import Effects, Factors, contact_names, factors, factors_at
+from twin.calibrate.fit.effects import Effects, Factors, factors, factors_at
+from twin.rom.contact_matrix import ContactEntries, ContactPlaces, entries_by_contact, projected
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
+from twin.run.integrator import integrate, solved
 from twin.run.stepping import Inputs, inputs_of, loads_of
 from twin.run.system import Array, Layout, System
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Loads:
-    """A run as the window model sees it; leading axis n_steps. c contacts, s contact sources."""
+class WindowLoads:
+    """A run as the window model sees it; leading axis n_steps. s contact sources."""
 
     inputs: Inputs  # of the runtime, without contacts and their heat
     contact_heat: Array  # (n, s, r) W, projected
-    diagonal: Array  # (n, c, n_ports) W/K: Gamma of each contact by its diagonal,
-    neighbour: Array  # (n, c, n_ports) its entries (i, i + 1),
-    weight: Array  # (n, n_pairs, n_segments) and minus its entries between pads and rails
+    contacts: ContactEntries  # each contact on its own
 
 
-@dataclass(frozen=True)
-class Places:
-    """Where contacts are among the ports. Hashable: the compiled step is specialised on it."""
-
-    contact_of_pair: tuple[int, ...]
-    pad: tuple[int, ...]  # per pair: port of the pad,
-    first: tuple[int, ...]  # first port and
-    count: tuple[int, ...]  # number of segments of its rail
-    n_contacts: int
-    sources: tuple[int, ...]  # of contacts
-
-
-def places_of(model: MachineModel) -> Places:
-    """The contacts of a model."""
-    load = model.load_model
-    names = contact_names(model)
-    rails = [load.rails[p.rail] for p in load.pairs]
-    return Places(
-        contact_of_pair=tuple(names.index(p.contact) for p in load.pairs),
-        pad=tuple(p.pad_port for p in load.pairs),
-        first=tuple(r.first_port for r in rails),
-        count=tuple(len(r.stations) for r in rails),
-        n_contacts=len(names),
-        sources=load.contact_sources,
-    )
-
-
-def loads_for(model: MachineModel, drive: Drive, substeps: int) -> Loads:
+def loads_for(model: MachineModel, drive: Drive, substeps: int) -> WindowLoads:
     """The loads of a run for a model of one body."""
     (body,) = model.bodies
-    names, pairs = contact_names(model), model.load_model.pairs
-    own = []
-    for name in names:
-        mask = np.array([p.contact == name for p in pairs])
-        own.append(inputs_of(model.load_model, replace(drive, conductance=drive.conductance * mask), substeps))
-    inputs = inputs_of(model.load_model, drive, substeps, follow=0.0)
-    n, n_ports = drive.n_steps, len(model.load_model.ports)
+    none = np.zeros((drive.n_steps, 0))
     bare = replace(
-        inputs,
-        port_heat=np.zeros((n, 0)),
-        contact_diagonal=np.zeros((n, 0)),
-        contact_neighbour=np.zeros((n, 0)),
-        contact_weight=np.zeros((n, 0)),
-        changed=np.zeros((n, 0)),
+        inputs_of(model.load_model, drive, substeps, follow=0.0),
+        port_heat=none,
+        contacts=ContactEntries(none, none, none),
+        changed=none,
     )
-    none = np.zeros((n, 0, n_ports))
-    return Loads(
-        inputs=bare,
-        contact_heat=drive.contact_heat @ body.P.T,
-        diagonal=np.stack([i.contact_diagonal for i in own], axis=1) if own else none,
-        neighbour=np.stack([i.contact_neighbour for i in own], axis=1) if own else none,
-        weight=inputs.contact_weight,
-    )
+    return WindowLoads(bare, drive.contact_heat @ body.P.T, entries_by_contact(model.load_model, drive))
 
 
 @jax.tree_util.register_dataclass
@@ -108,68 +62,72 @@ class Rows:
     member_row: Array  # (n_e, k, 3, r) m/K: what expansions scale
 
 
-def contacts_of(places: Places, P: Array, loads: Loads) -> jax.Array:
-    """P Gamma_c P^T (c, r, r) [1/s in coordinates with E = 1] of one step, at nominal conductances."""
-    P = jnp.asarray(P)
-    r = P.shape[0]
-    if not places.n_contacts:
-        return jnp.zeros((0, r, r))
-    PG = P * loads.diagonal[:, None, :]  # (c, r, ports)
-    beside = loads.neighbour[:, None, :-1]
-    PG = PG.at[:, :, :-1].add(P[:, 1:] * beside).at[:, :, 1:].add(P[:, :-1] * beside)
-    result = PG @ P.T
-    for k, c in enumerate(places.contact_of_pair):
-        facing = P[:, places.first[k] : places.first[k] + places.count[k]] @ loads.weight[k, : places.count[k]]
-        cross = jnp.outer(facing, P[:, places.pad[k]])
-        result = result.at[c].add(-cross - cross.T)
-    return result
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class _Fixed:
+    """What derivatives of a solve take as it is; q terms of A, n_c of E."""
+
+    factor: jax.Array  # (r, r) of S: its Cholesky factor, or its inverse where derivatives are wanted
+    A: jax.Array  # (q, r, r)
+    E: jax.Array  # (n_c, r, r)
+    rate: jax.Array  # () 1/s
+
+
+def _by_cholesky(fixed: _Fixed, right: jax.Array, near: jax.Array) -> jax.Array:
+    return jnp.asarray(cho_solve((fixed.factor, True), right))
+
+
+def _by_inverse(fixed: _Fixed, right: jax.Array, near: jax.Array) -> jax.Array:
+    return fixed.factor @ right
+
+
+def _change(fixed: _Fixed, d: tuple[jax.Array, jax.Array], x: jax.Array) -> jax.Array:
+    """S' x by coefficients (q,) and capacities (n_c,)."""
+    coefficients, capacities = d
+    return coefficients @ (fixed.A @ x) + fixed.rate * (capacities @ (fixed.E @ x))
 
 
 def _step(
     layout: Layout,
-    places: Places,
+    places: ContactPlaces,
     derivative: bool,
     system: System,
     effects: Effects,
     scaled: Factors,
     z: jax.Array,
-    loads: Loads,
+    loads: WindowLoads,
 ) -> jax.Array:
-    """The state (r,) after one step of `substeps` implicit Euler steps."""
+    """The state (r,) after one step of the run."""
     inputs = _with(loads.inputs, layout, scaled)
     drive = loads_of(layout, system, z, inputs)
     n = layout.n_films
-    K = contacts_of(places, system.P[0], loads)
-    terms = jnp.concatenate([jnp.asarray(system.A[0]), K])
+    K = projected(jnp, places, loads.contacts, jnp.asarray(system.P[0]))
+    terms, E_terms = jnp.concatenate([jnp.asarray(system.A[0]), K]), jnp.asarray(effects.E)
     coefficients = jnp.concatenate([drive.theta - jnp.asarray(system.nominal), scaled.contact])
     joints = slice(n, n + len(scaled.joint))  # switched ones differ from their nominal values, which A0 includes
     coefficients = coefficients.at[joints].set(drive.theta[n:] * scaled.joint - jnp.asarray(system.nominal)[n:])
-    rate = jnp.asarray(inputs.rate)
+    rate, growth = jnp.asarray(inputs.rate), scaled.capacity - 1.0
 
-    def E(x: jax.Array) -> jax.Array:
-        return x + jnp.tensordot(scaled.capacity - 1.0, jnp.asarray(effects.E) @ x, 1)
-
-    def S(x: jax.Array) -> jax.Array:
-        return rate * E(x) + jnp.asarray(system.A0[0]) @ x + coefficients @ (terms @ x)
-
-    fixed = jax.tree.map(lax.stop_gradient, (coefficients, scaled.capacity))
-    matrix = rate * jnp.eye(z.shape[0]) + jnp.asarray(system.A0[0]) + jnp.tensordot(fixed[0], terms, 1)
-    matrix = matrix + rate * jnp.tensordot(fixed[1] - 1.0, jnp.asarray(effects.E), 1)
+    held, held_growth = lax.stop_gradient((coefficients, growth))
+    matrix = rate * jnp.eye(z.shape[0]) + jnp.asarray(system.A0[0]) + jnp.tensordot(held, terms, 1)
+    matrix = matrix + rate * jnp.tensordot(held_growth, E_terms, 1)
     factor = jnp.linalg.cholesky(matrix)
-    inverse = cho_solve((factor, True), jnp.eye(z.shape[0])) if derivative else jnp.zeros((0, 0))
+    if derivative:  # many right-hand sides: products are faster than substitution
+        factor = cho_solve((factor, True), jnp.eye(z.shape[0]))
+    fixed = _Fixed(factor, terms, E_terms, rate)
 
-    power = drive.power  # contact sources bring theirs through ports
+    def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        how = _by_inverse if derivative else _by_cholesky
+        x = solved(how, _change, fixed, (coefficients, growth), right, near)
+        return x, x
+
+    def capacity(x: jax.Array) -> jax.Array:
+        return rate * (x + jnp.tensordot(growth, E_terms @ x, 1))
+
+    # contact sources bring their heat through ports
     contact = jnp.tensordot(scaled.source[np.array(places.sources, dtype=int)], loads.contact_heat, 1)
-    forcing = system.M @ (drive.theta[:n] * drive.rise) + system.H @ drive.lift + system.B @ power + contact
-
-    def substep(_: int, x: jax.Array) -> jax.Array:
-        known = rate * E(x) + forcing
-        if not derivative:
-            return jnp.asarray(cho_solve((factor, True), known))
-        solved = lax.stop_gradient(inverse @ lax.stop_gradient(known))
-        return solved + inverse @ (known - S(solved))
-
-    return lax.fori_loop(0, inputs.substeps, substep, z)
+    forcing = system.M @ (drive.theta[:n] * drive.rise) + system.H @ drive.lift + system.B @ drive.power + contact
+    return integrate(inputs.tableau, inputs.substeps, solve, capacity, z, jnp.asarray(forcing))[0]
 
 
 def _with(inputs: Inputs, layout: Layout, scaled: Factors) -> Inputs:
@@ -189,11 +147,11 @@ def _with(inputs: Inputs, layout: Layout, scaled: Factors) -> Inputs:
 @partial(jax.jit, static_argnums=(0, 1, 2))
 def trajectory(
     layout: Layout,
-    places: Places,
+    places: ContactPlaces,
     derivative: bool,
     system: System,
     effects: Effects,
-    loads: Loads,
+    loads: WindowLoads,
     start: Array,
     u: Array,
 ) -> jax.Array:
@@ -205,7 +163,7 @@ def trajectory(
     scaled = factors_at(effects, jnp.asarray(u)[:n])
     z0 = jnp.asarray(start) + jnp.asarray(u)[n:] @ jnp.asarray(effects.initial)
 
-    def one(z: jax.Array, now: Loads) -> tuple[jax.Array, jax.Array]:
+    def one(z: jax.Array, now: WindowLoads) -> tuple[jax.Array, jax.Array]:
         after = _step(layout, places, derivative, system, effects, scaled, z, now)
         return after, after
 

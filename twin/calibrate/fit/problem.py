@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from twin.calibrate.fit.effects import Effects, Start, effects_of
-from twin.calibrate.fit.march import Loads, Places, Rows, displacements, loads_for, places_of, temperatures, trajectory
+from twin.calibrate.fit.march import Rows, WindowLoads, displacements, loads_for, temperatures, trajectory
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.options import Options
 from twin.calibrate.fit.training import History, basis_for, trained
@@ -23,6 +23,7 @@ from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
+from twin.rom.contact_matrix import ContactPlaces
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
@@ -37,7 +38,7 @@ class FitRun:
     drive: Drive  # at nominal parameters
     start: float  # degC
     measured: Measured
-    loads: Loads
+    loads: WindowLoads
     rows: Rows
     z0: np.ndarray  # (r,)
 
@@ -53,7 +54,7 @@ class Problem:
     runs: tuple[FitRun, ...]
     layout: Layout
     system: System
-    places: Places
+    places: ContactPlaces
     effects: Effects
     options: Options
     snapshots: tuple[np.ndarray, ...]  # (N, m) that the window model was made from
@@ -121,8 +122,8 @@ class Problem:
 
 
 def outputs_of(
-    derivative: bool, layout: Layout, places: Places, from_first: bool, system: System, effects: Effects, loads: Loads,
-    rows: Rows, bins: tuple[jax.Array, jax.Array], z0: jax.Array, u: jax.Array,
+    derivative: bool, layout: Layout, places: ContactPlaces, from_first: bool, system: System, effects: Effects,
+    loads: WindowLoads, rows: Rows, bins: tuple[jax.Array, jax.Array], z0: jax.Array, u: jax.Array,
 ) -> jax.Array:  # fmt: skip
     states = trajectory(layout, places, derivative, system, effects, loads, z0, u)
     mean_of, column = bins
@@ -199,7 +200,8 @@ def problem(
         z0 = (start - model.reference_temperature) * body.one
         made.append(FitRun(name, drive, start, m, loads_for(small, drive, options.substeps), rows, z0))
     return Problem(
-        small, V, tuple(parameters), starts, tuple(made), prepared.layout, prepared.system, places_of(small), effects,
+        small, V, tuple(parameters), starts, tuple(made), prepared.layout, prepared.system,
+        ContactPlaces.of(small.load_model), effects,
         options, tuple(snapshots),
     )  # fmt: skip
 

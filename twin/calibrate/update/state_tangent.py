@@ -2,17 +2,17 @@
 
 Parameters u are what `twin.calibrate.fit.effects` calls them: ln(value / nominal) of factors, value - nominal of
 shifts. A direction is a column (dz, du) of a square root of a covariance matrix; it goes through the step's derivative.
-With S of `twin.run.stepping` and theta, forcing read at the step's start,
+With S of `twin.run.matrix` and theta, forcing read at the step's start,
 
     S dz_new = rate dz + d forcing - sum_k d theta_k A_k z_new
 
-is the implicit step differentiated: the factor is never differentiated, all columns share it. Losses, films, joints and
-air temperatures may be uncertain; capacities, moving contacts and expansions are taken as they are.
+is the implicit step differentiated (`twin.run.integrator.solved`): all columns share the step's factor. Losses, films,
+joints and air temperatures may be uncertain; capacities, moving contacts and expansions are taken as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -26,8 +26,10 @@ from jax import lax
 from twin.rom.drive import Drive
 from twin.rom.load_model import LoadModel
 from twin.rom.parameter import Parameter
-from twin.run.block_factor import solve
-from twin.run.stepping import Inputs, State, factor_of, inputs_of, loads_of
+from twin.run.block_factor import BlockFactor
+from twin.run.integrator import integrate, solved
+from twin.run.matrix import by_factor, terms_of
+from twin.run.stepping import Inputs, State, forcing_of, inputs_of, kept_or_new, loads_of, without_factor
 from twin.run.system import Array, Layout, System
 
 KINDS = ("source", "film", "joint", "environment")  # of parameters that the tangent knows
@@ -96,9 +98,38 @@ def _applied(layout: Layout, acts: Acts, loads: UncertainLoads, u: Array) -> Inp
 @partial(jax.jit, static_argnums=0)
 def cold(layout: Layout, system: System, z: jax.Array, loads: UncertainLoads) -> State:
     """The state to begin with: its factor is empty, and the next step must make one."""
-    shape = jax.eval_shape(partial(factor_of, layout), system, loads.inputs, jnp.asarray(loads.inputs.theta))
-    factor = jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), shape)
-    return State(z, factor, jnp.zeros(jnp.asarray(loads.inputs.theta).shape))
+    return without_factor(layout, system, z, loads.inputs)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class _Fixed:
+    """What derivatives of a solve take as it is."""
+
+    factor: BlockFactor
+    rest: tuple[jax.Array, ...]  # per body: what the factor lacks
+    A: tuple[Array, ...]  # per body (n_terms, n, n)
+
+
+def _twice(layout: Layout) -> Callable[[_Fixed, jax.Array, jax.Array], jax.Array]:
+    """The runtime's solve: what the factor lacks acts on the state before, then on the state so found."""
+
+    def solve(fixed: _Fixed, right: jax.Array, near: jax.Array) -> jax.Array:
+        for _ in range(2):
+            near = by_factor(layout, fixed.factor, fixed.rest, right, near)
+        return near
+
+    return solve
+
+
+def _change(layout: Layout) -> Callable[[_Fixed, jax.Array, jax.Array], jax.Array]:
+    """sum_k theta_k' A_k x."""
+
+    def change(fixed: _Fixed, d_theta: jax.Array, x: jax.Array) -> jax.Array:
+        parts = zip(layout.terms, fixed.A, jnp.split(x, layout.offsets[1:-1]), strict=True)
+        return jnp.concatenate([d_theta[np.array(terms, dtype=int)] @ (A @ xb) for terms, A, xb in parts])
+
+    return change
 
 
 @partial(jax.jit, static_argnums=0)
@@ -113,57 +144,22 @@ def tangent_step(
     loads: UncertainLoads,
 ) -> tuple[State, jax.Array]:
     """One step of the state at parameters u (n,), and of directions dz (N, r) with du (n, r): new state, new dz."""
-    borders, n = layout.offsets[1:-1], layout.n_films
 
-    def read(z: jax.Array, u: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """theta (n_theta,) and forcing (N,) at the step's start."""
+    def after(z: jax.Array, u: jax.Array) -> tuple[jax.Array, tuple[BlockFactor, jax.Array]]:
         inputs = _applied(layout, acts, loads, u)
         seen = loads_of(layout, system, z, inputs)
-        port_heat = [P @ inputs.port_heat[np.array(p, dtype=int)] for P, p in zip(system.P, layout.ports, strict=True)]
-        heat = system.M @ (seen.theta[:n] * seen.rise) + system.H @ seen.lift + system.B @ seen.power
-        return seen.theta, jnp.asarray(heat + jnp.concatenate(port_heat))
+        theta = lax.stop_gradient(seen.theta)
+        factor, held = kept_or_new(layout, system, state, loads.inputs, theta)
+        rest = tuple(terms_of(layout, system, b, theta - held) for b in range(len(layout.sizes)))
+        fixed = _Fixed(factor, rest, tuple(jnp.asarray(A) for A in system.A))
 
-    (theta, forcing), derivative = jax.linearize(read, state.z, u)
-    d_theta, d_forcing = jax.vmap(derivative, in_axes=1, out_axes=1)(dz, du)
-    inputs = loads.inputs
-    anew = inputs.changed | jnp.any(jnp.abs(theta - state.held) > inputs.follow * state.held)
-    factor, held = lax.cond(
-        anew, lambda: (factor_of(layout, system, inputs, theta), theta), lambda: (state.factor, state.held)
-    )
-    rest = [
-        jnp.tensordot((theta - held)[np.array(terms, dtype=int)], A, 1)
-        for terms, A in zip(layout.terms, system.A, strict=True)
-    ]
+        def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+            x = solved(_twice(layout), _change(layout), fixed, seen.theta, right, near)
+            return x, x
 
-    def less_rest(known: jax.Array, seen: jax.Array) -> jax.Array:
-        parts = jnp.split(seen, borders)
-        return jnp.concatenate(
-            solve(
-                factor,
-                layout.elimination,
-                jnp.split(known - jnp.concatenate([R @ s for R, s in zip(rest, parts, strict=True)]), borders),
-                layout.symmetric,
-            )
-        )
+        forcing = forcing_of(layout, system, seen)
+        z, *_ = integrate(inputs.tableau, inputs.substeps, solve, lambda x: jnp.asarray(inputs.rate * x), z, forcing)
+        return z, (factor, held)
 
-    columns = jax.vmap(less_rest, in_axes=1, out_axes=1)
-
-    def per_term(z: jax.Array) -> jax.Array:
-        """A_k z (N, n_theta)."""
-        rows = []
-        for b, part in enumerate(jnp.split(z, borders)):
-            own = jnp.zeros((len(theta), layout.sizes[b]))
-            for i, k in enumerate(layout.terms[b]):
-                own = own.at[k].add(system.A[b][i] @ part)
-            rows.append(own.T)
-        return jnp.concatenate(rows)
-
-    def substep(_: int, both: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
-        z, dz = both
-        known = inputs.rate * z + forcing
-        new = less_rest(known, less_rest(known, z))
-        d_known = inputs.rate * dz + d_forcing - per_term(new) @ d_theta
-        return new, columns(d_known, columns(d_known, dz))
-
-    z, dz = lax.fori_loop(0, inputs.substeps, substep, (state.z, dz))
-    return State(z, factor, held), dz
+    z, derivative, (factor, held) = jax.linearize(after, state.z, u, has_aux=True)
+    return State(z, factor, held), jax.vmap(derivative, in_axes=1, out_axes=1)(dz, du)
