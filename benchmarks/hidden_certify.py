@@ -17,9 +17,9 @@ from benchmarks.hidden_fast import Clean, Effects, fast, fast_truth, full_with_p
 from benchmarks.hidden_parts import STEP, STEPS, described
 from benchmarks.hidden_truth import START, SUBSTEPS
 from tests.hidden.load import NOISE, RUNS, TCP_NOISE
+from twin.build.acting import Acting, with_acting
+from twin.build.places import pruned
 from twin.build.simulate import simulate
-from twin.diagnose.acting import Acting, with_acting
-from twin.diagnose.places import pruned
 from twin.logs.signals import signal_values
 from twin.rom.apply import with_values
 from twin.rom.drive import Drive, evaluate

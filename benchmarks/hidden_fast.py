@@ -24,15 +24,15 @@ from benchmarks.five_axis import FOLDER
 from benchmarks.hidden_truth import OTHER_MESH, START, STEP, SUBSTEPS, machine_of, other_text
 from tests.hidden.load import RUNS, plan
 from twin.atomic import atomic_path
+from twin.build.acting import Acting, with_acting
 from twin.build.cache import folder
 from twin.build.compress import Tolerances, galerkin
 from twin.build.full_model import FullModel, assemble
 from twin.build.pipeline import theta_bounds
+from twin.build.place_training import Shared, snapshots
+from twin.build.places import PREFIX, Place, places_of, pruned, with_places
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
-from twin.diagnose.acting import Acting, with_acting
-from twin.diagnose.places import PREFIX, Place, places_of, pruned, with_places
-from twin.diagnose.training import Shared, snapshots
 from twin.logs.read import read_run
 from twin.logs.run import Run
 from twin.logs.signals import signal_values

@@ -31,7 +31,7 @@ from twin.diagnose.diagnosis import Window
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 
-# m^2 of sides that the sun reaches, by `twin.diagnose.places`
+# m^2 of sides that the sun reaches, by `twin.build.places`
 SIDES = {"bed.left": 0.29, "bed.right": 0.25, "bed.stem_left": 0.67, "bed.stem_right": 0.67, "column.left": 0.79,
          "column.right": 0.79}  # fmt: skip
 DRIVES = ("x_motor", "y_motor", "z_motor", "x_bearing", "y_bearing", "z_bearing", "spindle_motor", "spindle_bearing",

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.five_axis import FOLDER
 from benchmarks.hidden_fast import Clean, Effects, runs
 from tests.hidden.load import RUNS
-from twin.diagnose.acting import Acting
+from twin.build.acting import Acting
 from twin.diagnose.diagnosis import Window
 from twin.logs.run import Run, Table
 from twin.machine.description import Machine
@@ -44,7 +44,7 @@ class Hidden:
     family: str
     place: str
     history: str  # in words
-    size: float  # as Cause.amplitude of the family (`twin.diagnose.edits`); of readings SI
+    size: float  # as Cause.amplitude of the family (`twin.machine.effects.edits`); of readings SI
     unit: str
     windows: tuple[Window, ...] = ()  # none: always
     signal: str = ""

@@ -10,14 +10,14 @@ import numpy as np
 
 from benchmarks.campaign import machine
 from benchmarks.hidden_draw import draw
+from twin.build.acting import Acting
+from twin.build.place_training import EVERY, Shared, stepped
+from twin.build.places import pruned
 from twin.build.workers import each
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.acting import Acting
 from twin.diagnose.bench import Bench, fine_drive, make_bench, probed
 from twin.diagnose.march import INNER
-from twin.diagnose.places import pruned
 from twin.diagnose.study import Study, make_study
-from twin.diagnose.training import EVERY, Shared, stepped
 from twin.machine.parameters import parameters
 from twin.progress import bar
 

@@ -22,8 +22,8 @@ from benchmarks.hidden_fast import runs
 from benchmarks.hidden_parts import Hidden, described
 from tests.hidden.load import RUNS
 from tests.hidden.trial import HOUR, Expected, Trial, bell, cause_of
-from twin.diagnose.damage_access import Damage
 from twin.diagnose.diagnosis import Cause, Verdict
+from twin.inject.damage.channels import Damage
 from twin.machine.explain import explain, load_of
 
 FIRST = 301  # seed
@@ -63,7 +63,7 @@ def _right(hidden: Hidden) -> tuple[Verdict, ...]:
 
 
 def _cause(hidden: Hidden) -> Cause:
-    """For `twin.diagnose.edits`: a bell in steps of 10 min, a law's power where the campaign says a multiple of it."""
+    """For the description: a bell in steps of 10 min, a law's power where the campaign says a multiple of it."""
     windows, amplitude, unit, settings = hidden.windows, hidden.size, hidden.unit, dict(hidden.settings)
     if hidden.family == "sun":
         windows = tuple(b for w in windows for b in bell(w.run, w.start / HOUR, w.end / HOUR, w.level))

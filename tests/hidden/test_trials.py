@@ -10,11 +10,11 @@ import pytest
 from tests.hidden.load import MODEL, RUNS, TRUTH, load, read
 from tests.hidden.trial import HOUR, Trial, about, hidden_text
 from tests.hidden.trials import BROKEN, DOOR, SEALED, SIMULATED, SUN, TRIALS, stored, trial
-from twin.diagnose.damage import DAMAGES
 from twin.diagnose.diagnosis import VERDICTS
-from twin.diagnose.edits import EDITS
+from twin.inject.damage.kinds import DAMAGES
 from twin.logs.check import check_run
 from twin.logs.refuse import refusals
+from twin.machine.effects.edits import EDITS
 from twin.machine.load import load_machine
 
 # Two sensors of which one shows the effect more than the other, and by how much at least [K]

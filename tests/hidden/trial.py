@@ -2,7 +2,7 @@
 
 What is hidden in the machine is a `Cause`, put into its text as `twin hide` does it (`hidden_text`); signals of its
 history are felt and not logged. What is hidden in the log is done to a stored truth on reading, by
-`twin.diagnose.damage`: such trials need no file of their own.
+`twin.inject.damage.kinds`: such trials need no file of their own.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tests.hidden.load import MODEL, RUNS
-from twin.diagnose.damage_access import Damage
 from twin.diagnose.diagnosis import Cause, Verdict, Window
-from twin.diagnose.edits import extended_description, loads_with
+from twin.inject.damage.channels import Damage
 from twin.logs.read import read_run
+from twin.machine.effects.edits import extended_description, loads_with
 
 HOUR, END = 3600.0, 13.0 * 3600.0  # s; END: after the last row of every run
 
@@ -28,7 +28,7 @@ HOUR, END = 3600.0, 13.0 * 3600.0  # s; END: after the last row of every run
 @dataclass(frozen=True)
 class Expected:
     """What a diagnosis should say. A place "" is one that nobody can name; size and place of a fault of a log are those
-    of `twin.diagnose.damage`."""
+    of `twin.inject.damage.kinds`."""
 
     verdicts: tuple[Verdict, ...]  # any of them is right
     family: str  # of the first cause, "" where nothing is to be found

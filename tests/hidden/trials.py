@@ -25,8 +25,8 @@ from tests.hidden.trial import (
     in_machine,
     telegraph,
 )
-from twin.diagnose.damage import damaged
-from twin.diagnose.damage_access import Damage
+from twin.inject.damage.channels import Damage
+from twin.inject.damage.kinds import damaged
 from twin.logs.run import Run
 from twin.machine.load import load_machine
 

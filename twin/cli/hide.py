@@ -36,25 +36,22 @@ def command(
     from pathlib import Path
 
     from twin.cli.quantity import option
-    from twin.diagnose.hide import Hidden, hide
     from twin.errors import TwinError
+    from twin.inject.hide import hide
+    from twin.inject.request import When
 
     settings = dict(s.partition("=")[::2] for s in setting)
     if unset := [s for s in setting if "=" not in s]:
         raise TwinError(f"'{unset[0]}' has no value", "--setting", "write it like --setting temperature='15 degC'")
-    asked = Hidden(
-        family=family,
-        place=place,
-        size=size,
-        history=history,
+    when = When(
+        kind=history,
         signal=signal,
         exponent=exponent,
         start=None if start is None else option("--from", start, "s"),
         end=None if end is None else option("--to", end, "s"),
-        settings=settings,
     )
     names = [Path(run).resolve().name for run in runs]
     if twice := sorted({n for n in names if names.count(n) > 1}):
         raise TwinError(f"two runs are called '{twice[0]}'", "--run", "rename a folder: copies keep these names")
-    for line in hide(asked, Path(target), Path(output), [Path(run) for run in runs]):
+    for line in hide(target, family, place, size, output, when, settings, runs):
         click.echo(line)

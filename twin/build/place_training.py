@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.build.acting import Acting, with_acting
 from twin.build.compress import TRAINING_FOLLOW, TRAINING_KEEP
+from twin.build.places import Place, pruned
 from twin.build.stepper import CoupledStepper
 from twin.build.workers import each
-from twin.diagnose.acting import Acting, with_acting
-from twin.diagnose.places import Place, pruned
 from twin.progress import Progress, silent
 from twin.rom.apply import with_values
 from twin.rom.drive import Drive

@@ -1,6 +1,6 @@
-"""A cause written into a description: what `twin diagnose` proposes, and what `twin hide` hides.
+"""An effect written into a description: what `twin diagnose` proposes, and what `twin hide` hides.
 
-Per family one function, in the table EDITS. What `Cause.amplitude` means there:
+Per family one function, in the table EDITS. What `Effect.amplitude` means there:
 
 | family | place | amplitude |
 |---|---|---|
@@ -32,12 +32,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pydantic import ValidationError
 
-from twin.diagnose import edit_exchange, edit_heat, edit_scales
-from twin.diagnose.diagnosis import Cause, Window
-from twin.diagnose.site import Change, Site
 from twin.errors import DescriptionError
 from twin.logs.run import Run
 from twin.machine.description import Machine
+from twin.machine.effects import exchange, heat, scales
+from twin.machine.effects.effect import Effect, Window
+from twin.machine.effects.site import Change, Site
 from twin.machine.extend import appended, changed, free_name
 from twin.machine.references import reference_problems
 from twin.nearest import did_you_mean
@@ -47,33 +47,33 @@ _SIZES = {"sources": "gain", "films": "gain", "scales": "expansion", "tanks": "c
 
 @dataclass(frozen=True)
 class Edit:
-    """A description with causes in it, and the histories that its new signals need."""
+    """A description with effects in it, and the histories that its new signals need."""
 
     text: str
     signals: Mapping[str, tuple[Window, ...]] = field(default_factory=dict)  # column of loads.csv, 0 .. 1
-    parameters: tuple[str, ...] = ()  # per cause the dotted path of what it amounts to; "" where nothing changes
+    parameters: tuple[str, ...] = ()  # per effect the dotted path of what it amounts to; "" where nothing changes
 
 
-def extended_description(text: str, causes: Sequence[Cause], prefix: str = "found") -> Edit:
-    """The text of a machine.toml with causes in it; `twin.machine.extend.removed` takes them out again.
+def extended_description(text: str, effects: Sequence[Effect], prefix: str = "found") -> Edit:
+    """The text of a machine.toml with effects in it; `twin.machine.extend.removed` takes them out again.
 
     prefix: "found" or "hidden"; new entries are called prefix_1, prefix_2, ..., where these names are free.
     Raises DescriptionError for places that the machine does not have, and for what the description refuses.
     """
     signals: dict[str, tuple[Window, ...]] = {}
     parameters: list[str] = []
-    for cause in causes:
-        if cause.family not in EDITS:
+    for effect in effects:
+        if effect.family not in EDITS:
             raise DescriptionError(
-                f"unknown family '{cause.family}'", "", did_you_mean(cause.family, EDITS, "families")
+                f"unknown family '{effect.family}'", "", did_you_mean(effect.family, EDITS, "families")
             )
         site = Site(_described(text), tomllib.loads(text), free_name(text, prefix))
-        change = EDITS[cause.family](site, _levelled(cause))
-        if cause.windows and not change.signals and change != Change():
-            raise DescriptionError("has no switch that windows could turn", _told(cause), "give it without windows")
+        change = EDITS[effect.family](site, _levelled(effect))
+        if effect.windows and not change.signals and change != Change():
+            raise DescriptionError("has no switch that windows could turn", _told(effect), "give it without windows")
         text = changed(text, change.values, prefix)
         if change.tables:
-            text = appended(text, change.tables, _told(cause), prefix)
+            text = appended(text, change.tables, _told(effect), prefix)
         signals |= change.signals
         parameters.append(_parameter(change))
         _described(text)
@@ -101,7 +101,7 @@ def loads_with(run: Run, signals: Mapping[str, Sequence[Window]], name: str = ""
 
 
 def _parameter(change: Change) -> str:
-    """The path of the size of a cause: of the first table that has one, else the last value that changes."""
+    """The path of the size of an effect: of the first table that has one, else the last value that changes."""
     for name, _ in change.tables:
         if key := _SIZES.get(name.partition(".")[0]):
             return f"{name}.{key}"
@@ -114,7 +114,7 @@ def _described(text: str) -> Machine:
     try:
         machine = Machine.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as e:
-        raise DescriptionError(f"not valid TOML: {e}", "machine.toml", "mend it with `twin check`") from e
+        raise DescriptionError(f"not valid TOML: {e}", "machine.toml", "correct it with `twin check`") from e
     except ValidationError as e:
         first = e.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"]))
@@ -129,46 +129,46 @@ def _of_a_mesh(where: str) -> bool:
     return where.startswith("parts.") and where.endswith(".mesh")
 
 
-def _levelled(cause: Cause) -> Cause:
+def _levelled(effect: Effect) -> Effect:
     """With windows of levels up to 1: signals of switches end there. The amplitude takes the rest."""
-    top = max((w.level for w in cause.windows), default=1.0)
-    if any(w.level < 0.0 for w in cause.windows):
-        raise DescriptionError("a window of negative level", cause.place, "turn the sign of the amplitude")
+    top = max((w.level for w in effect.windows), default=1.0)
+    if any(w.level < 0.0 for w in effect.windows):
+        raise DescriptionError("a window of negative level", effect.place, "turn the sign of the amplitude")
     if top <= 1.0:
-        return cause
-    factor = cause.family == "joint"
-    amplitude = 1.0 + (cause.amplitude - 1.0) * top if factor else cause.amplitude * top
-    return replace(cause, amplitude=amplitude, windows=tuple(replace(w, level=w.level / top) for w in cause.windows))
+        return effect
+    factor = effect.family == "joint"
+    amplitude = 1.0 + (effect.amplitude - 1.0) * top if factor else effect.amplitude * top
+    return replace(effect, amplitude=amplitude, windows=tuple(replace(w, level=w.level / top) for w in effect.windows))
 
 
-def _told(cause: Cause) -> str:
-    unit = "" if cause.unit == "1" else f" {cause.unit}"
-    return f"{cause.family} at {cause.place}: {cause.amplitude:.4g}{unit}, {cause.history}"
+def _told(effect: Effect) -> str:
+    unit = "" if effect.unit == "1" else f" {effect.unit}"
+    return f"{effect.family} at {effect.place}: {effect.amplitude:.4g}{unit}, {effect.history}"
 
 
-def _nothing(site: Site, cause: Cause) -> Change:
+def _nothing(site: Site, effect: Effect) -> Change:
     """The description is not at fault."""
     return Change()
 
 
-EDITS: dict[str, Callable[[Site, Cause], Change]] = {
-    "film_gain": edit_exchange.film_gain,
-    "forced_convection": edit_exchange.forced_convection,
-    "heat_source": edit_heat.heat_source,
-    "loss_law": edit_heat.loss_law,
-    "joint": edit_exchange.joint,
-    "zone": edit_exchange.zone,
-    "sun": edit_heat.sun,
-    "coolant": edit_exchange.coolant,
+EDITS: dict[str, Callable[[Site, Effect], Change]] = {
+    "film_gain": exchange.film_gain,
+    "forced_convection": exchange.forced_convection,
+    "heat_source": heat.heat_source,
+    "loss_law": heat.loss_law,
+    "joint": exchange.joint,
+    "zone": exchange.zone,
+    "sun": heat.sun,
+    "coolant": exchange.coolant,
     "sensor": _nothing,
-    "signal": edit_scales.signal_factor,
-    "scale_expansion": edit_scales.scale_expansion,
-    "expansion": edit_scales.expansion,
+    "signal": scales.signal_factor,
+    "scale_expansion": scales.scale_expansion,
+    "expansion": scales.expansion,
     "slip": _nothing,
-    "capacity": edit_exchange.capacity,
+    "capacity": exchange.capacity,
     "initial_state": _nothing,
     "coarse_model": _nothing,
     "measurement": _nothing,
-    "misplaced_source": edit_heat.misplaced_source,
+    "misplaced_source": heat.misplaced_source,
     "not_thermal": _nothing,
 }

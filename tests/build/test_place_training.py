@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from tests.support.descriptions import SLIDE
-from twin.diagnose.training import DRAWS, LOST, values_of
+from twin.build.place_training import DRAWS, LOST, values_of
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from twin.diagnose.places import PREFIX
+from twin.build.places import PREFIX
 from twin.rom.drive import Drive
 from twin.rom.load_model import LoadModel
 

@@ -14,11 +14,12 @@ import pytest
 from tests.support.descriptions import MACHINES
 from twin.cli.main import run as twin
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.damage import DAMAGES, damaged
-from twin.diagnose.damage_access import Damage
-from twin.diagnose.hide import SETTINGS, UNITS, Hidden, hide
 from twin.diagnose.readings import _within_set
 from twin.errors import LogError, TwinError
+from twin.inject.damage.channels import Damage
+from twin.inject.damage.kinds import DAMAGES, damaged
+from twin.inject.hide import hide
+from twin.inject.request import SETTINGS, UNITS, Request, When
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.logs.write import write_run
@@ -252,6 +253,14 @@ def test_faults_of_the_tool_need_its_measurements():
         damaged(replace(RUN, tcp=None), of_kind("slip", "play"))
 
 
+def asked_for(family: str, place: str, size: str, settings: dict[str, str] | None = None, **when) -> Request:
+    return Request(family, place, size, When(**when), settings or {})
+
+
+def hidden(asked: Request, target: Path, out: Path) -> list[str]:
+    return hide(target, asked.family, asked.place, asked.size, out, asked.when, asked.settings)
+
+
 @pytest.fixture
 def measured(tmp_path) -> Path:
     folder = tmp_path / "measured"
@@ -262,21 +271,21 @@ def measured(tmp_path) -> Path:
 @pytest.mark.parametrize(
     ("asked", "told"),
     [
-        (Hidden("sensor", "sensors.a", "1 K", start=7200.0, end=3600.0), "between --from and --to"),
-        (Hidden("sensor", "sensors.a", "1 K", start=3600.0, end=3600.0), "between --from and --to"),
-        (Hidden("sensor", "sensors.a", "1 K", start=36000.0), "within the run, 0 h .. 10 h"),
-        (Hidden("sensor", "sensors.a", "1 K", history="drift", end=-60.0), "within the run"),
-        (Hidden("not_thermal", "tcp.dx", "3 um", start=35000.0), "changes nothing"),  # after the last TCP row
-        (Hidden("sensor", "sensors.a", "0 K"), "changes nothing"),
-        (Hidden("signal", "signals.current", "1"), "changes nothing"),
-        (Hidden("sensor", "sensors.a", "1 K", signal="air"), "follows no column"),
-        (Hidden("measurement", "tcp.dx:x", "5 deg", history="frame"), "not a quantity in 1"),
-        (Hidden("initial_state", "sensors.a", "1 K"), "places are: run, runs.measured"),
+        (asked_for("sensor", "sensors.a", "1 K", start=7200.0, end=3600.0), "between --from and --to"),
+        (asked_for("sensor", "sensors.a", "1 K", start=3600.0, end=3600.0), "between --from and --to"),
+        (asked_for("sensor", "sensors.a", "1 K", start=36000.0), "within the run, 0 h .. 10 h"),
+        (asked_for("sensor", "sensors.a", "1 K", kind="drift", end=-60.0), "within the run"),
+        (asked_for("not_thermal", "tcp.dx", "3 um", start=35000.0), "changes nothing"),  # after the last TCP row
+        (asked_for("sensor", "sensors.a", "0 K"), "changes nothing"),
+        (asked_for("signal", "signals.current", "1"), "changes nothing"),
+        (asked_for("sensor", "sensors.a", "1 K", signal="air"), "follows no column"),
+        (asked_for("measurement", "tcp.dx:x", "5 deg", kind="frame"), "not a quantity in 1"),
+        (asked_for("initial_state", "sensors.a", "1 K"), "places are: run, runs.measured"),
     ],
 )
 def test_a_copy_without_its_fault_is_not_written(asked, told, measured, tmp_path):
     with pytest.raises(TwinError) as e:
-        hide(asked, measured, tmp_path / "copy")
+        hidden(asked, measured, tmp_path / "copy")
     assert told in str(e.value)
     assert not (tmp_path / "copy").exists()
 
@@ -284,22 +293,22 @@ def test_a_copy_without_its_fault_is_not_written(asked, told, measured, tmp_path
 @pytest.mark.parametrize(
     ("machine", "asked", "told"),
     [
-        ("slide", Hidden("zone", "films.floor", "2 K/m"), "name environment.floor, or give a size in K"),
-        ("slide", Hidden("heat_source", "bed.x_max", "2 W", settings={"temperature": "9 degC"}), "no setting"),
-        ("slide", Hidden("heat_source", "bed.x_max", "2 W", exponent=2.0), "--exponent"),
-        ("slide", Hidden("heat_source", "bed.x_max", "2 W", start=-7200.0, end=-3600.0), "between --from and --to"),
-        ("spindle", Hidden("forced_convection", "housing", "2 W/(m^2*K)", signal="spindle_speed"), "docs/hiding.md"),
+        ("slide", asked_for("zone", "films.floor", "2 K/m"), "name environment.floor, or give a size in K"),
+        ("slide", asked_for("heat_source", "bed.x_max", "2 W", settings={"temperature": "9 degC"}), "no setting"),
+        ("slide", asked_for("heat_source", "bed.x_max", "2 W", exponent=2.0), "--exponent"),
+        ("slide", asked_for("heat_source", "bed.x_max", "2 W", start=-7200.0, end=-3600.0), "between --from and --to"),
+        ("spindle", asked_for("forced_convection", "housing", "2 W/(m^2*K)", signal="spindle_speed"), "docs/hiding.md"),
     ],
 )
 def test_what_a_machine_cannot_have_is_told(machine, asked, told, tmp_path):
     with pytest.raises(TwinError) as e:
-        hide(asked, MACHINE[machine], tmp_path / "copy")
+        hidden(asked, MACHINE[machine], tmp_path / "copy")
     assert told in str(e.value)
     assert not (tmp_path / "copy").exists()
 
 
 def test_a_late_clock_can_be_written_and_read(measured, tmp_path):
-    hide(Hidden("signal", "runs.measured", "6 min", history="clock"), measured, tmp_path / "copy")
+    hidden(asked_for("signal", "runs.measured", "6 min", kind="clock"), measured, tmp_path / "copy")
     assert read_run(tmp_path / "copy").temperatures.time - TIME == pytest.approx(360.0)
 
 
@@ -336,8 +345,8 @@ def test_the_commands_of_the_page_work(tmp_path, monkeypatch, capsys):
     calls = [shlex.split(line) for line in PAGE.splitlines() if line.startswith("    twin ")]
     for call in calls:
         assert twin([str(tmp_path / word) if word.startswith("out/") else word for word in call[1:]]) == 0, call
-    hidden = {call[2] for call in calls if call[1] == "hide"}
-    assert hidden == {f.name for f in FAMILIES} - {"coarse_model"}
+    families = {call[2] for call in calls if call[1] == "hide"}
+    assert families == {f.name for f in FAMILIES} - {"coarse_model"}
     assert "error" not in capsys.readouterr().err
 
 

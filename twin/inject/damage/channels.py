@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnose.readings import SET_GAP
 from twin.errors import LogError
 from twin.logs.run import Run, Table
 from twin.nearest import did_you_mean
 
 COMPONENTS = ("dx", "dy", "dz")
+SET_GAP = 600.0  # s: TCP rows closer than that belong to one measurement
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Every cause of the catalogue as text: the description stays sound and means what the cause says."""
+"""Every effect as text: the description stays sound and means what the effect says."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pytest
 
 from tests.support.descriptions import MACHINES
 from twin.cli.main import run as command
-from twin.diagnose.diagnosis import Cause, Window
-from twin.diagnose.edits import EDITS, extended_description, loads_with
 from twin.errors import DescriptionError
 from twin.logs.run import Run, Table
 from twin.machine.description import Machine
+from twin.machine.effects.edits import EDITS, extended_description, loads_with
+from twin.machine.effects.effect import Effect, Window
 from twin.machine.explain import explain, load_of
 from twin.machine.extend import removed
 from twin.machine.load import load_machine
@@ -24,13 +24,13 @@ TEXTS = {name: path.read_text(encoding="utf-8") for name, path in FILES.items()}
 DAY = (Window("run_1", 3600.0, 7200.0), Window("run_2", 0.0, 600.0, 0.5))
 
 
-def cause(family: str, place: str, amplitude: float, unit: str = "1", **more) -> Cause:
-    return Cause(family, place, "", amplitude, (amplitude, amplitude), unit, 50.0, 20.0, **more)
+def effect(family: str, place: str, amplitude: float, unit: str = "1", **more) -> Effect:
+    return Effect(family, place, amplitude, unit, **more)
 
 
-def extended(name: str, *causes: Cause) -> Machine:
-    """The machine with causes; loading it is half of each test."""
-    edit = extended_description(TEXTS[name], causes)
+def extended(name: str, *effects: Effect) -> Machine:
+    """The machine with effects; loading it is half of each test."""
+    edit = extended_description(TEXTS[name], effects)
     assert removed(edit.text) == TEXTS[name]
     return load_machine(FILES[name], edit.text)
 
@@ -47,38 +47,41 @@ def film(machine: Machine, name: str, **settings: str) -> float:
 @pytest.mark.parametrize(
     ("name", "one"),
     [
-        ("slide", cause("film_gain", "films.floor", 3.0)),
-        ("slide", cause("film_gain", "bed.y_min", 12.0, "W/(m^2*K)")),
-        ("slide", cause("forced_convection", "slide.z_max", 9.0, "W/(m^2*K)", signal="x_speed", exponent=0.8)),
-        ("slide", cause("heat_source", "bed.x_max", 12.0, "W")),
-        ("slide", cause("heat_source", "bed.x_max", 12.0, "W", windows=DAY)),
-        ("slide", cause("loss_law", "sources.x_motor", 2.0)),
-        ("slide", cause("joint", "contacts.screw_end", 0.2)),
-        ("slide", cause("zone", "environment.shop", -2.0, "K")),
-        ("slide", cause("sun", "bed.y_max", 30.0, "W", windows=DAY)),
-        ("slide", cause("coolant", "block.y_min", 200.0, "W/(m^2*K)", settings={"temperature": 15.0})),
-        ("slide", cause("signal", "signals.x_current", 2.0, history="factor")),
-        ("slide", cause("scale_expansion", "axes.x", 8e-6, "1/K")),
-        ("slide", cause("expansion", "parts.bed", 1.2)),
-        ("slide", cause("capacity", "bed.z_max", 5e3, "J/K", settings={"conductance": 10.0})),
-        ("slide", cause("misplaced_source", "sources.x_motor", 1.0, settings={"surface": "bed.x_min"})),
-        ("five_axis", cause("film_gain", "films.bed", 3.0)),
-        ("five_axis", cause("film_gain", "bed.x_motor", 12.0, "W/(m^2*K)")),
-        ("five_axis", cause("forced_convection", "column.back", 9.0, "W/(m^2*K)", signal="x_speed")),
-        ("five_axis", cause("heat_source", "column.pad_1", 12.0, "W", signal="spindle_speed", exponent=1.5)),
-        ("five_axis", cause("heat_source", "contacts.x_guide", 12.0, "W", signal="x_speed", exponent=2.0)),
-        ("five_axis", cause("loss_law", "sources.x_guide", 100.0, "W", signal="x_speed", exponent=2.0)),
-        ("five_axis", cause("joint", "contacts.x_guide", 0.2, windows=DAY)),
-        ("five_axis", cause("zone", "environment.room", 1.5, "K/m", settings={"height": 0.5})),
-        ("five_axis", cause("sun", "column.left", 30.0, "W", windows=DAY)),
-        ("five_axis", cause("coolant", "headstock.top", 200.0, "W/(m^2*K)", windows=DAY, settings={"temperature": 15})),
-        ("five_axis", cause("signal", "signals.spindle_speed", 60.0, history="factor")),
-        ("five_axis", cause("scale_expansion", "axes.y", 8e-6, "1/K", settings={"surface": "column.back"})),
-        ("five_axis", cause("expansion", "materials.steel", 0.9)),
-        ("five_axis", cause("capacity", "table.top", 5e3, "J/K")),
-        ("five_axis", cause("misplaced_source", "sources.y_motor", 1.0, settings={"surface": "column.back"})),
+        ("slide", effect("film_gain", "films.floor", 3.0)),
+        ("slide", effect("film_gain", "bed.y_min", 12.0, "W/(m^2*K)")),
+        ("slide", effect("forced_convection", "slide.z_max", 9.0, "W/(m^2*K)", signal="x_speed", exponent=0.8)),
+        ("slide", effect("heat_source", "bed.x_max", 12.0, "W")),
+        ("slide", effect("heat_source", "bed.x_max", 12.0, "W", windows=DAY)),
+        ("slide", effect("loss_law", "sources.x_motor", 2.0)),
+        ("slide", effect("joint", "contacts.screw_end", 0.2)),
+        ("slide", effect("zone", "environment.shop", -2.0, "K")),
+        ("slide", effect("sun", "bed.y_max", 30.0, "W", windows=DAY)),
+        ("slide", effect("coolant", "block.y_min", 200.0, "W/(m^2*K)", settings={"temperature": 15.0})),
+        ("slide", effect("signal", "signals.x_current", 2.0, history="factor")),
+        ("slide", effect("scale_expansion", "axes.x", 8e-6, "1/K")),
+        ("slide", effect("expansion", "parts.bed", 1.2)),
+        ("slide", effect("capacity", "bed.z_max", 5e3, "J/K", settings={"conductance": 10.0})),
+        ("slide", effect("misplaced_source", "sources.x_motor", 1.0, settings={"surface": "bed.x_min"})),
+        ("five_axis", effect("film_gain", "films.bed", 3.0)),
+        ("five_axis", effect("film_gain", "bed.x_motor", 12.0, "W/(m^2*K)")),
+        ("five_axis", effect("forced_convection", "column.back", 9.0, "W/(m^2*K)", signal="x_speed")),
+        ("five_axis", effect("heat_source", "column.pad_1", 12.0, "W", signal="spindle_speed", exponent=1.5)),
+        ("five_axis", effect("heat_source", "contacts.x_guide", 12.0, "W", signal="x_speed", exponent=2.0)),
+        ("five_axis", effect("loss_law", "sources.x_guide", 100.0, "W", signal="x_speed", exponent=2.0)),
+        ("five_axis", effect("joint", "contacts.x_guide", 0.2, windows=DAY)),
+        ("five_axis", effect("zone", "environment.room", 1.5, "K/m", settings={"height": 0.5})),
+        ("five_axis", effect("sun", "column.left", 30.0, "W", windows=DAY)),
+        (
+            "five_axis",
+            effect("coolant", "headstock.top", 200.0, "W/(m^2*K)", windows=DAY, settings={"temperature": 15}),
+        ),
+        ("five_axis", effect("signal", "signals.spindle_speed", 60.0, history="factor")),
+        ("five_axis", effect("scale_expansion", "axes.y", 8e-6, "1/K", settings={"surface": "column.back"})),
+        ("five_axis", effect("expansion", "materials.steel", 0.9)),
+        ("five_axis", effect("capacity", "table.top", 5e3, "J/K")),
+        ("five_axis", effect("misplaced_source", "sources.y_motor", 1.0, settings={"surface": "column.back"})),
     ],
-    ids=lambda value: f"{value.family}-{value.place}" if isinstance(value, Cause) else value,
+    ids=lambda value: f"{value.family}-{value.place}" if isinstance(value, Effect) else value,
 )  # fmt: skip
 def test_the_edited_description_is_sound_and_another_one(name, one):
     before = load_machine(FILES[name])
@@ -97,23 +100,23 @@ def test_the_edited_description_is_sound_and_another_one(name, one):
 @pytest.mark.parametrize(
     ("one", "path"),
     [
-        (cause("film_gain", "films.floor", 3.0), "films.floor.gain"),
-        (cause("coolant", "bed.y_min", 9.0, windows=DAY, settings={"temperature": 15}), "films.found_1.gain"),
-        (cause("heat_source", "bed.y_min", 9.0, windows=DAY), "sources.found_1.gain"),
-        (cause("joint", "contacts.nut", 2.0, windows=DAY), "contacts.nut.switched"),
-        (cause("zone", "environment.shop", 2.0, "K/m", settings={"height": 0.5}), "environment.shop.gradient"),
-        (cause("expansion", "parts.bed", 1.1), "materials.found_1.expansion"),
-        (cause("sensor", "sensors.block", 1.0), ""),
+        (effect("film_gain", "films.floor", 3.0), "films.floor.gain"),
+        (effect("coolant", "bed.y_min", 9.0, windows=DAY, settings={"temperature": 15}), "films.found_1.gain"),
+        (effect("heat_source", "bed.y_min", 9.0, windows=DAY), "sources.found_1.gain"),
+        (effect("joint", "contacts.nut", 2.0, windows=DAY), "contacts.nut.switched"),
+        (effect("zone", "environment.shop", 2.0, "K/m", settings={"height": 0.5}), "environment.shop.gradient"),
+        (effect("expansion", "parts.bed", 1.1), "materials.found_1.expansion"),
+        (effect("sensor", "sensors.block", 1.0), ""),
     ],
-    ids=lambda value: value.family if isinstance(value, Cause) else None,
+    ids=lambda value: value.family if isinstance(value, Effect) else None,
 )
-def test_the_path_of_what_a_cause_amounts_to(one, path):
+def test_the_path_of_what_an_effect_amounts_to(one, path):
     assert extended_description(TEXTS["slide"], [one]).parameters == (path,)
 
 
 @pytest.mark.parametrize("family", ["sensor", "slip", "initial_state", "coarse_model", "measurement", "not_thermal"])
 def test_what_is_no_fault_of_the_description_leaves_it(family):
-    edit = extended_description(TEXTS["slide"], [cause(family, "sensors.block", 1.0, history="offset")])
+    edit = extended_description(TEXTS["slide"], [effect(family, "sensors.block", 1.0, history="offset")])
     assert (edit.text, edit.signals) == (TEXTS["slide"], {})
 
 
@@ -126,142 +129,143 @@ def test_every_family_has_its_row():
 
 
 def test_heat_is_what_it_says():
-    assert heat(extended("slide", cause("heat_source", "bed.x_max", 12.0, "W")), "found_1") == pytest.approx(12.0)
-    switched = extended("slide", cause("heat_source", "bed.x_max", 12.0, "W", windows=DAY))
+    assert heat(extended("slide", effect("heat_source", "bed.x_max", 12.0, "W")), "found_1") == pytest.approx(12.0)
+    switched = extended("slide", effect("heat_source", "bed.x_max", 12.0, "W", windows=DAY))
     assert heat(switched, "found_1", found_1="0.25") == pytest.approx(3.0)
-    by_current = extended("slide", cause("heat_source", "bed.x_max", 12.0, "W", signal="x_current", exponent=2.0))
+    by_current = extended("slide", effect("heat_source", "bed.x_max", 12.0, "W", signal="x_current", exponent=2.0))
     assert by_current.sources["found_1"].law == "motor_copper"
     assert heat(by_current, "found_1", x_current="6 A") == pytest.approx(3.0, rel=1e-4)  # half the largest
     reference = {"reference": 0.1}
     by_speed = extended(
-        "slide", cause("heat_source", "bed.x_max", 12.0, "W", signal="x_speed", exponent=1.5, settings=reference)
+        "slide", effect("heat_source", "bed.x_max", 12.0, "W", signal="x_speed", exponent=1.5, settings=reference)
     )
     assert heat(by_speed, "found_1", x_speed="-0.4 m/s") == pytest.approx(12.0 * 4.0**1.5)
-    by_turns = extended("five_axis", cause("heat_source", "spindle.neck", 12.0, "W", signal="spindle_speed"))
+    by_turns = extended("five_axis", effect("heat_source", "spindle.neck", 12.0, "W", signal="spindle_speed"))
     assert by_turns.sources["found_1"].law == "turning_heat"
     assert heat(by_turns, "found_1", spindle_speed="5000 1/min") == pytest.approx(6.0, rel=1e-5)
 
 
 def test_heat_at_a_moving_contact_goes_into_its_pads():
-    source = extended("slide", cause("heat_source", "contacts.x_guide", 12.0, "W")).sources["found_1"]
+    source = extended("slide", effect("heat_source", "contacts.x_guide", 12.0, "W")).sources["found_1"]
     assert (source.contact, source.surface, source.rail_share) == ("x_guide", None, 0.0)
 
 
 def test_a_loss_of_another_shape_takes_the_place_of_the_old_one():
-    one = cause("loss_law", "sources.x_guide", 80.0, "W", signal="x_speed", exponent=2.0, settings={"gain": 0.25})
+    one = effect("loss_law", "sources.x_guide", 80.0, "W", signal="x_speed", exponent=2.0, settings={"gain": 0.25})
     machine = extended("five_axis", one)
     assert machine.sources["x_guide"].gain == 0.25
     new = machine.sources["found_1"]
     assert (new.law, new.contact, new.rail_share) == ("speed_heat", "x_guide", 0.5)
     assert heat(machine, "found_1", x_speed="0.3 m/s") == pytest.approx(20.0)
-    assert extended("slide", cause("loss_law", "sources.x_nut", 1.5)).sources["x_nut"].gain == 1.5
+    assert extended("slide", effect("loss_law", "sources.x_nut", 1.5)).sources["x_nut"].gain == 1.5
 
 
 def test_films_lie_on_top_in_the_air_of_their_surface():
-    machine = extended("five_axis", cause("film_gain", "headstock.top", 12.0, "W/(m^2*K)"))
+    machine = extended("five_axis", effect("film_gain", "headstock.top", 12.0, "W/(m^2*K)"))
     assert (machine.films["found_1"].environment, machine.films["found_1"].additional) == ("enclosure", True)
     assert film(machine, "found_1") == pytest.approx(12.0)
-    pads = extended("five_axis", cause("film_gain", "contacts.x_guide", 12.0, "W/(m^2*K)")).films["found_1"]
+    pads = extended("five_axis", effect("film_gain", "contacts.x_guide", 12.0, "W/(m^2*K)")).films["found_1"]
     assert pads.surfaces == ("column.pad_1", "column.pad_2", "column.pad_3", "column.pad_4")
     assert pads.environment == "room"
     wind = extended(
-        "slide", cause("forced_convection", "slide.z_max", 9.0, "W/(m^2*K)", signal="x_speed", exponent=0.5)
+        "slide", effect("forced_convection", "slide.z_max", 9.0, "W/(m^2*K)", signal="x_speed", exponent=0.5)
     )
     assert film(wind, "found_1", x_speed="0.25 m/s") == pytest.approx(4.5)
     assert film(wind, "found_1", x_speed="0 m/s") == 0.0
-    assert extended("five_axis", cause("film_gain", "films.y_motor", 0.5)).films["y_motor"].gain == 7.0
+    assert extended("five_axis", effect("film_gain", "films.y_motor", 0.5)).films["y_motor"].gain == 7.0
 
 
 def test_a_medium_has_its_temperature_and_its_valve():
-    always = extended("slide", cause("coolant", "block.y_min", 200.0, "W/(m^2*K)", settings={"temperature": 15.0}))
+    always = extended("slide", effect("coolant", "block.y_min", 200.0, "W/(m^2*K)", settings={"temperature": 15.0}))
     assert always.environment["found_1"].temperature == 15.0
     assert film(always, "found_1") == pytest.approx(200.0)
-    one = cause("coolant", "block.y_min", 200.0, "W/(m^2*K)", windows=DAY, settings={"temperature": 15.0})
+    one = effect("coolant", "block.y_min", 200.0, "W/(m^2*K)", windows=DAY, settings={"temperature": 15.0})
     machine = extended("slide", one)
     assert (machine.films["found_1"].law, machine.films["found_1"].environment) == ("switched_film", "found_1")
     assert film(machine, "found_1", found_1="0.5") == pytest.approx(100.0)
     with pytest.raises(DescriptionError, match="temperature of the medium"):
-        extended("slide", cause("coolant", "block.y_min", 200.0))
+        extended("slide", effect("coolant", "block.y_min", 200.0))
 
 
 def test_a_film_may_be_switched():
-    machine = extended("slide", cause("film_gain", "bed.y_min", 12.0, "W/(m^2*K)", windows=DAY))
+    machine = extended("slide", effect("film_gain", "bed.y_min", 12.0, "W/(m^2*K)", windows=DAY))
     assert film(machine, "found_1", found_1="0.25") == pytest.approx(3.0)
     assert machine.films["found_1"].environment == "shop"
 
 
 def test_what_is_switched_already_is_not_switched_twice():
-    edit = extended_description(TEXTS["slide"], [cause("zone", "environment.shop", -3.0, "K", windows=DAY)])
+    edit = extended_description(TEXTS["slide"], [effect("zone", "environment.shop", -3.0, "K", windows=DAY)])
     with pytest.raises(DescriptionError, match="switched by 'found_1' already"):
-        extended_description(edit.text, [cause("zone", "environment.shop", 1.0, "K", windows=DAY)])
+        extended_description(edit.text, [effect("zone", "environment.shop", 1.0, "K", windows=DAY)])
 
 
 def test_joints_and_zones_change_or_are_switched():
-    assert extended("slide", cause("joint", "contacts.screw_end", 0.2)).contacts["screw_end"].conductance == 600.0
-    switched = extended("slide", cause("joint", "contacts.screw_end", 0.2, windows=DAY)).contacts["screw_end"]
+    assert extended("slide", effect("joint", "contacts.screw_end", 0.2)).contacts["screw_end"].conductance == 600.0
+    switched = extended("slide", effect("joint", "contacts.screw_end", 0.2, windows=DAY)).contacts["screw_end"]
     assert (switched.conductance, switched.switch, switched.switched) == (3000.0, "found_1", 0.2)
-    assert extended("spindle", cause("joint", "contacts.front_outer", 0.5)).contacts["front_outer"].total == 7.0
-    assert extended("slide", cause("zone", "environment.shop", -2.0, "K")).environment["shop"].offset == -2.0
-    door = extended("slide", cause("zone", "environment.shop", -3.0, "K", windows=DAY)).environment["shop"]
+    assert extended("spindle", effect("joint", "contacts.front_outer", 0.5)).contacts["front_outer"].total == 7.0
+    assert extended("slide", effect("zone", "environment.shop", -2.0, "K")).environment["shop"].offset == -2.0
+    door = extended("slide", effect("zone", "environment.shop", -3.0, "K", windows=DAY)).environment["shop"]
     assert (door.switch, door.switched_offset, door.offset) == ("found_1", -3.0, 0.0)
-    air = extended("slide", cause("zone", "environment.shop", 2.0, "K/m", settings={"height": 0.1})).environment["shop"]
+    higher = effect("zone", "environment.shop", 2.0, "K/m", settings={"height": 0.1})
+    air = extended("slide", higher).environment["shop"]
     assert (air.gradient, air.height) == (2.0, 0.1)
 
 
 def test_declarations_of_signals():
     assert (
-        extended("slide", cause("signal", "signals.x_current", 2.0, history="factor")).signals["x_current"].factor
+        extended("slide", effect("signal", "signals.x_current", 2.0, history="factor")).signals["x_current"].factor
         == 2.0
     )
-    peak = extended("slide", cause("signal", "signals.x_current", 0.5**0.5, history="factor")).signals["x_current"]
+    peak = extended("slide", effect("signal", "signals.x_current", 0.5**0.5, history="factor")).signals["x_current"]
     assert (peak.kind, peak.factor) == ("peak", 1.0)
     assert extended_description(
-        TEXTS["slide"], [cause("signal", "signals.x_current", 30.0, "s", history="clock")]
+        TEXTS["slide"], [effect("signal", "signals.x_current", 30.0, "s", history="clock")]
     ).text == TEXTS["slide"]  # fmt: skip
 
 
 def test_expansions():
-    assert extended("slide", cause("expansion", "materials.steel", 1.1)).materials["steel"].expansion == pytest.approx(
+    assert extended("slide", effect("expansion", "materials.steel", 1.1)).materials["steel"].expansion == pytest.approx(
         1.1 * 11.5e-6
     )
-    machine = extended("slide", cause("expansion", "parts.bed", 1.2))
+    machine = extended("slide", effect("expansion", "parts.bed", 1.2))
     assert (machine.parts["bed"].material, machine.parts["slide"].material) == ("found_1", "cast_iron")
     copy, old = machine.materials["found_1"], machine.materials["cast_iron"]
     assert copy == old.model_copy(update={"expansion": 12e-6})
-    scale = extended("slide", cause("scale_expansion", "axes.x", 8e-6, "1/K")).scales["found_1"]
+    scale = extended("slide", effect("scale_expansion", "axes.x", 8e-6, "1/K")).scales["found_1"]
     assert (scale.axis, scale.surface, scale.expansion, scale.fixed_at) == ("x", "rail_1.z_max", 8e-6, 0.0)
-    scale = extended("slide", cause("scale_expansion", "bed.y_min", 8e-6, "1/K")).scales["found_1"]
+    scale = extended("slide", effect("scale_expansion", "bed.y_min", 8e-6, "1/K")).scales["found_1"]
     assert (scale.axis, scale.surface) == ("x", "bed.y_min")
 
 
 def test_a_tank_and_a_source_elsewhere():
-    tank = extended("slide", cause("capacity", "bed.z_max", 5e3, "J/K", settings={"conductance": 10.0})).tanks[
+    tank = extended("slide", effect("capacity", "bed.z_max", 5e3, "J/K", settings={"conductance": 10.0})).tanks[
         "found_1"
     ]
     assert (tank.surface, tank.capacity, tank.conductance) == ("bed.z_max", 5e3, 10.0)
-    moved = cause("misplaced_source", "sources.x_motor", 1.0, settings={"surface": "bed.x_min"})
+    moved = effect("misplaced_source", "sources.x_motor", 1.0, settings={"surface": "bed.x_min"})
     assert extended("slide", moved).sources["x_motor"].surface == "bed.x_min"
     with pytest.raises(DescriptionError, match="moving contact"):
-        extended("slide", cause("misplaced_source", "sources.x_nut", 1.0, settings={"surface": "bed.x_min"}))
+        extended("slide", effect("misplaced_source", "sources.x_nut", 1.0, settings={"surface": "bed.x_min"}))
 
 
-def test_several_causes_get_several_names_and_one_block():
-    causes = [
-        cause("heat_source", "bed.x_max", 12.0, "W", windows=DAY),
-        cause("film_gain", "films.floor", 3.0),
-        cause("heat_source", "bed.x_min", 4.0, "W"),
+def test_several_effects_get_several_names_and_one_block():
+    effects = [
+        effect("heat_source", "bed.x_max", 12.0, "W", windows=DAY),
+        effect("film_gain", "films.floor", 3.0),
+        effect("heat_source", "bed.x_min", 4.0, "W"),
     ]
-    edit = extended_description(TEXTS["slide"], causes)
+    edit = extended_description(TEXTS["slide"], effects)
     machine = load_machine(FILES["slide"], edit.text)
     assert [n for n in machine.sources if n.startswith("found")] == ["found_1", "found_2"]
     assert edit.text.count("# --- found by twin diagnose ---") == 1
-    again = extended_description(edit.text, [cause("capacity", "bed.z_max", 5e3, "J/K")])
+    again = extended_description(edit.text, [effect("capacity", "bed.z_max", 5e3, "J/K")])
     assert list(load_machine(FILES["slide"], again.text).tanks) == ["found_3"]
 
 
 def test_lumped_machines_have_nodes_for_surfaces():
     machine = extended(
-        "spindle", cause("heat_source", "housing", 12.0, "W"), cause("film_gain", "housing", 5.0, "W/(m^2*K)")
+        "spindle", effect("heat_source", "housing", 12.0, "W"), effect("film_gain", "housing", 5.0, "W/(m^2*K)")
     )
     assert machine.sources["found_1"].surface == "housing"
     assert machine.films["found_2"].surfaces == ("housing",)
@@ -270,19 +274,19 @@ def test_lumped_machines_have_nodes_for_surfaces():
 @pytest.mark.parametrize(
     ("one", "told"),
     [
-        (cause("heat_source", "bde.x_max", 12.0), "did you mean 'bed.x_max'"),
-        (cause("heat_source", "bed.xmax", 12.0), "did you mean 'bed.x_max'"),
-        (cause("heat_source", "bed", 12.0), "no such surface"),
-        (cause("heat_source", "bed.x_max", 12.0, signal="x_curent"), "did you mean 'x_current'"),
-        (cause("heat_source", "bed.x_max", 12.0, signal="shop_air"), "no law heats"),
-        (cause("heat_source", "bed.x_max", -12.0, "W"), "outside 0"),
-        (cause("film_gain", "films.flor", 2.0), "did you mean 'films.floor'"),
-        (cause("zone", "films.flor", 2.0, "K"), "did you mean 'films.floor'"),
-        (cause("forced_convection", "bed.x_max", 2.0, signal="x_current"), "speed in m/s"),
-        (cause("sun", "bed.x_max", 2.0), "profile"),
-        (cause("capacity", "bed.x_max", 5e3, "J/K", windows=DAY), "without windows"),
-        (cause("loss_law", "sources.x_nut", 2.0, windows=DAY), "without windows"),
-        (cause("heat_sorce", "bed.x_max", 2.0), "did you mean 'heat_source'"),
+        (effect("heat_source", "bde.x_max", 12.0), "did you mean 'bed.x_max'"),
+        (effect("heat_source", "bed.xmax", 12.0), "did you mean 'bed.x_max'"),
+        (effect("heat_source", "bed", 12.0), "no such surface"),
+        (effect("heat_source", "bed.x_max", 12.0, signal="x_curent"), "did you mean 'x_current'"),
+        (effect("heat_source", "bed.x_max", 12.0, signal="shop_air"), "no law heats"),
+        (effect("heat_source", "bed.x_max", -12.0, "W"), "outside 0"),
+        (effect("film_gain", "films.flor", 2.0), "did you mean 'films.floor'"),
+        (effect("zone", "films.flor", 2.0, "K"), "did you mean 'films.floor'"),
+        (effect("forced_convection", "bed.x_max", 2.0, signal="x_current"), "speed in m/s"),
+        (effect("sun", "bed.x_max", 2.0), "profile"),
+        (effect("capacity", "bed.x_max", 5e3, "J/K", windows=DAY), "without windows"),
+        (effect("loss_law", "sources.x_nut", 2.0, windows=DAY), "without windows"),
+        (effect("heat_sorce", "bed.x_max", 2.0), "did you mean 'heat_source'"),
     ],
 )
 def test_what_cannot_be_written_is_told(one, told):
@@ -293,10 +297,10 @@ def test_what_cannot_be_written_is_told(one, told):
 
 def test_levels_above_one_go_into_the_amplitude():
     windows = (Window("a", 0.0, 10.0, 4.0), Window("a", 10.0, 20.0, 1.0))
-    edit = extended_description(TEXTS["slide"], [cause("heat_source", "bed.x_max", 3.0, "W", windows=windows)])
+    edit = extended_description(TEXTS["slide"], [effect("heat_source", "bed.x_max", 3.0, "W", windows=windows)])
     assert heat(load_machine(FILES["slide"], edit.text), "found_1") == pytest.approx(12.0)
     assert [w.level for w in edit.signals["found_1"]] == [1.0, 0.25]
-    joint = extended_description(TEXTS["slide"], [cause("joint", "contacts.nut", 1.5, windows=windows)])
+    joint = extended_description(TEXTS["slide"], [effect("joint", "contacts.nut", 1.5, windows=windows)])
     assert load_machine(FILES["slide"], joint.text).contacts["nut"].switched == pytest.approx(3.0)
 
 
@@ -335,7 +339,7 @@ def test_hidden_in_runs_whose_folders_have_one_name(tmp_path, capsys):
 def test_one_film_may_have_air_of_its_own():
     before = load_machine(FILES["slide"])
     air = before.environment[before.films["floor"].environment]
-    machine = extended("slide", cause("zone", "films.floor", 2.0, "K"))
+    machine = extended("slide", effect("zone", "films.floor", 2.0, "K"))
     own = machine.environment[machine.films["floor"].environment]
     assert machine.films["floor"].environment == "found_1"
     assert own.offset == pytest.approx(air.offset + 2.0)

@@ -1,4 +1,4 @@
-"""Where a cause is written into a description: its surfaces, films, signals and switches, looked up by name."""
+"""Where an effect is written into a description: its surfaces, films, signals and switches, looked up by name."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from twin.diagnose.diagnosis import Cause, Window
 from twin.errors import DescriptionError
 from twin.machine import wiring
 from twin.machine.bodies import owner_of
 from twin.machine.description import BOX_SURFACES, Machine
+from twin.machine.effects.effect import Effect, Window
 from twin.nearest import did_you_mean
 
 
 @dataclass(frozen=True)
 class Change:
-    """What one cause adds to a description and what it changes there."""
+    """What one effect adds to a description and what it changes there."""
 
     tables: tuple[tuple[str, Mapping[str, object]], ...] = ()
     values: Mapping[str, float | str | bool] = field(default_factory=dict)
@@ -25,7 +25,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Site:
-    """The description that a cause is written into, and the name of what it adds."""
+    """The description that an effect is written into, and the name of what it adds."""
 
     machine: Machine
     data: Mapping[str, Any]  # as written
@@ -92,23 +92,23 @@ def surfaces_of(site: Site, place: str) -> tuple[str, ...]:
     return (place,)
 
 
-def signal_of(site: Site, cause: Cause) -> tuple[str, str]:
-    """(name, SI unit) of the signal that a cause follows."""
-    if cause.signal not in site.machine.signals:
-        what = f"unknown signal '{cause.signal}'" if cause.signal else "needs a signal"
-        remedy = did_you_mean(cause.signal, site.machine.signals, "signals")
-        raise DescriptionError(what, f"{cause.family} at {cause.place}", remedy)
-    return cause.signal, wiring.signal(cause.signal, site.machine.signals[cause.signal]).unit
+def signal_of(site: Site, effect: Effect) -> tuple[str, str]:
+    """(name, SI unit) of the signal that an effect follows."""
+    if effect.signal not in site.machine.signals:
+        what = f"unknown signal '{effect.signal}'" if effect.signal else "needs a signal"
+        remedy = did_you_mean(effect.signal, site.machine.signals, "signals")
+        raise DescriptionError(what, f"{effect.family} at {effect.place}", remedy)
+    return effect.signal, wiring.signal(effect.signal, site.machine.signals[effect.signal]).unit
 
 
-def switch_of(site: Site, cause: Cause) -> tuple[str, Change]:
-    """The signal that switches a cause, and its declaration where it is a new one; "" for one that always acts."""
-    if cause.signal:
-        name, unit = signal_of(site, cause)
+def switch_of(site: Site, effect: Effect) -> tuple[str, Change]:
+    """The signal that switches an effect, and its declaration where it is a new one; "" for one that always acts."""
+    if effect.signal:
+        name, unit = signal_of(site, effect)
         if unit != "1":
-            raise DescriptionError(f"signal '{name}' is no switch", cause.place, "name a signal of unit 1 in 0 .. 1")
+            raise DescriptionError(f"signal '{name}' is no switch", effect.place, "name a signal of unit 1 in 0 .. 1")
         return name, Change()
-    if not cause.windows:
+    if not effect.windows:
         return "", Change()
     entry = {"unit": "1", "range": [0.0, 1.0], "default": 0.0}
-    return site.name, Change(((f"signals.{site.name}", entry),), {}, {site.name: cause.windows})
+    return site.name, Change(((f"signals.{site.name}", entry),), {}, {site.name: effect.windows})
