@@ -5,20 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.hidden_truth import ASIDE, FILMS, OFF, _felt, other_parameters, other_text
-from tests.hidden.load import MODEL
+from tests.hidden.trials import EXPERIMENT, MODEL
+from twin.inject.truth.other_films import FILMS
+from twin.inject.truth.other_machine import ASIDE, OFF, other_parameters, other_text
+from twin.inject.truth.side_by_side import felt_run
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 
 
 @pytest.fixture(scope="module")
 def pair():
-    return load_machine(MODEL / "machine.toml"), load_machine(MODEL / "machine.toml", other_text(4))
+    return load_machine(MODEL / "machine.toml"), load_machine(MODEL / "machine.toml", other_text(EXPERIMENT, 4))
 
 
 def test_a_seed_gives_one_machine():
-    assert other_text(4) == other_text(4)
-    assert other_text(4) != other_text(5)
+    assert other_text(EXPERIMENT, 4) == other_text(EXPERIMENT, 4)
+    assert other_text(EXPERIMENT, 4) != other_text(EXPERIMENT, 5)
 
 
 def test_names_and_wiring_are_those_of_the_shipped_machine(pair):
@@ -51,7 +53,7 @@ def test_sensors_sit_some_millimetres_aside(pair):
 
 def test_parameters_are_off_by_their_half_widths():
     factors: dict[str, list[float]] = {kind: [] for kind in OFF}
-    for p, value in other_parameters(4).values():
+    for p, value in other_parameters(EXPERIMENT, 4).values():
         if p.kind in OFF:
             gain = FILMS[p.path.split(".")[1]].gain if p.kind == "film" else 1.0
             factors[p.kind].append(value / p.nominal / gain)
@@ -64,12 +66,12 @@ def test_parameters_are_off_by_their_half_widths():
 def test_work_before_the_start_and_what_is_not_logged():
     run = read_run(MODEL / "runs" / "diagnosis_1")
     extra = {"hidden_1": np.linspace(0.0, 1.0, len(run.loads.time))}
-    felt, ahead = _felt(run, extra, 1.5)
+    felt, ahead = felt_run(run, extra, 1.5)
     assert ahead == 5400.0
     assert np.all(np.diff(felt.loads.time) == 60.0)
     assert felt.loads.units["hidden_1"] == "1"
     np.testing.assert_array_equal(felt.loads.columns["hidden_1"][90:], extra["hidden_1"])
     np.testing.assert_array_equal(felt.loads.columns["x_speed"][:90], run.loads.columns["x_speed"][:90])
-    same, late = _felt(run, {}, 0.0)
+    same, late = felt_run(run, {}, 0.0)
     assert late == 0.0
     np.testing.assert_array_equal(same.loads.time, run.loads.time)

@@ -1,8 +1,7 @@
-"""Truths of hidden-effect trials, small enough for the repository: what a machine did, without noise.
+"""Truths that are small enough for a repository: what a machine did in the runs of an experiment, without noise.
 
-tests/hidden/truth/NAME.npz holds the runs for diagnosis of one machine: temperatures at every row of the log in steps
-of RESOLUTION, as differences along time (compressed to a few bits each), TCP rows in steps of TCP_RESOLUTION. Written
-by `benchmarks.hidden_store`, which needs gmsh and minutes; read with numpy alone.
+A file (.npz) holds temperatures at every row of the log in steps of RESOLUTION, as differences along time (compressed
+to a few bits each), and TCP rows in steps of TCP_RESOLUTION. Read with numpy alone.
 """
 
 from __future__ import annotations
@@ -16,16 +15,10 @@ from typing import Any
 import numpy as np
 
 from twin.atomic import atomic_path
-from twin.logs.read import read_run
+from twin.inject.experiment import NOISE, RUNS, TCP_NOISE, Experiment, plan
 from twin.logs.run import Run, Table, Tcp
 
-TRUTH = Path(__file__).parent / "truth"
-MODEL = Path(__file__).parents[2] / "models" / "five_axis"
-RUNS = ("diagnosis_1", "diagnosis_2", "diagnosis_sealed")  # the last is kept for judging
-
-MEASURED_EVERY, PLACES, APART = 1800.0, 3, 60.0  # s, places of the TCP one after the other, s between them
 RESOLUTION, TCP_RESOLUTION = 0.005, 2e-8  # K, m: a tenth of the noise at most
-NOISE, TCP_NOISE = 0.08, 1e-6  # K, m, standard deviations
 
 
 @dataclass(frozen=True)
@@ -41,17 +34,11 @@ class Truth:
     tcp: np.ndarray  # (m, 3) m
 
 
-def plan(run: Run, axes: Sequence[str] = ("x", "y", "z")) -> tuple[np.ndarray, np.ndarray]:
-    """Times (m,) [s] and positions (m, axes) [m] at which the TCP is measured: where the log has the axes then."""
-    t = run.loads.time
-    every = np.arange(MEASURED_EVERY, t[-1] + 1.0, MEASURED_EVERY)
-    when = (every[:, None] - APART * np.arange(PLACES)[::-1]).ravel()
-    return when, np.column_stack([np.interp(when, t, run.loads.columns[f"{a}_position"]) for a in axes])
-
-
-def measured(truth: Truth, seed: int, noise: float = NOISE, tcp_noise: float = TCP_NOISE) -> Run:
+def measured(
+    experiment: Experiment, truth: Truth, seed: int, noise: float = NOISE, tcp_noise: float = TCP_NOISE
+) -> Run:
     """The run as it was logged and measured: noise [K], [m] of white Gaussian kind, drawn by `seed` and the run."""
-    run = read_run(MODEL / "runs" / truth.run)
+    run = experiment.run(truth.run)
     rng = np.random.default_rng([seed, RUNS.index(truth.run)])
     T = truth.temperatures + noise * rng.standard_normal(truth.temperatures.shape)
     tcp = truth.tcp + tcp_noise * rng.standard_normal(truth.tcp.shape)
@@ -77,24 +64,13 @@ def measured(truth: Truth, seed: int, noise: float = NOISE, tcp_noise: float = T
     )
 
 
-def load(name: str, seed: int = 0) -> tuple[tuple[Run, ...], dict[str, Any]]:
-    """The runs of a stored trial with noise of a seed, in the order of RUNS, and what is hidden in them."""
-    found, about = read(name)
-    return tuple(measured(truth, seed) for truth in found), about
-
-
-def names() -> tuple[str, ...]:
-    """The stored trials."""
-    return tuple(sorted(path.stem for path in TRUTH.glob("*.npz")))
-
-
-def read(name: str, folder: Path = TRUTH) -> tuple[tuple[Truth, ...], dict[str, Any]]:
-    """The truths of a stored trial, and what is hidden in them."""
-    with np.load(folder / f"{name}.npz") as data:
+def read(experiment: Experiment, path: Path) -> tuple[tuple[Truth, ...], dict[str, Any]]:
+    """The truths of a file, and what is hidden in them."""
+    with np.load(path) as data:
         sensors = tuple(str(s) for s in data["sensors"])
         found = []
         for run in (r for r in RUNS if f"{r}.steps" in data):
-            when, where = plan(read_run(MODEL / "runs" / run))
+            when, where = plan(experiment.run(run))
             steps = np.cumsum(data[f"{run}.steps"].astype(np.int64), axis=1).T
             time = data[f"{run}.every"] * np.arange(len(steps))
             tcp = TCP_RESOLUTION * data[f"{run}.tcp"]
@@ -102,20 +78,21 @@ def read(name: str, folder: Path = TRUTH) -> tuple[tuple[Truth, ...], dict[str, 
         return tuple(found), json.loads(str(data["about"]))
 
 
-def write(name: str, truths: Sequence[Truth], about: Mapping[str, object], folder: Path = TRUTH) -> Path:
-    """Store the truths of a trial; about: what is hidden, as JSON can say it. All runs have the same sensors."""
-    arrays: dict[str, np.ndarray] = {"sensors": np.array(truths[0].sensors), "about": np.array(json.dumps(about))}
+def write(path: Path, truths: Sequence[Truth], about: Mapping[str, object]) -> None:
+    """Store truths; about: what is hidden, as JSON can say it. All runs have the same sensors.
+
+    Raises ValueError for what is no temperature or TCP deviation of a machine tool.
+    """
+    arrays: dict[str, Any] = {"sensors": np.array(truths[0].sensors), "about": np.array(json.dumps(about))}
     for truth in truths:
         steps = np.round(truth.temperatures / RESOLUTION).astype(np.int64).T
         # by sensor: neighbours in the file are alike, which is what compression lives on
         arrays[f"{truth.run}.steps"] = _int16(np.diff(steps, axis=1, prepend=0))
         arrays[f"{truth.run}.every"] = np.array(truth.time[1] - truth.time[0])
         arrays[f"{truth.run}.tcp"] = _int16(np.round(truth.tcp / TCP_RESOLUTION))
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{name}.npz"
+    path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary, Path(temporary).open("wb") as f:
         np.savez_compressed(f, **arrays)
-    return path
 
 
 def _int16(steps: np.ndarray) -> np.ndarray:

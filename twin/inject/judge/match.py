@@ -1,6 +1,6 @@
 """Whether what was said of a trial is what was hidden in it: family, place, part, size.
 
-Results are the dictionaries that `benchmarks.campaign.judged` makes, truths the words of `benchmarks.hidden_parts`.
+Results are dictionaries as `docs/campaign.jsonl.gz` holds them, one a trial; truths in them are those of `Hidden`.
 """
 
 from __future__ import annotations
@@ -8,18 +8,40 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
-from benchmarks.five_axis import FOLDER
+import numpy as np
+
+from twin.inject.experiment import STEPS, Experiment
 from twin.machine.bodies import bodies_of
-from twin.machine.load import load_machine
 
 FACTORS = ("film_gain", "loss_law", "joint", "expansion")  # families whose sizes of unit 1 are factors, 1 for nothing
 PREFIXES = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs", "parts")
 DAY = 86400.0  # s
-Top = Callable[[str], float]  # signal -> its largest absolute value in all runs [SI], where histories are one
+
+
+@dataclass(frozen=True)
+class Known:
+    """What judging needs to know of the machine, its runs and the catalogue that was searched."""
+
+    described: Mapping[str, Any]  # tables of machine.toml
+    bodies: Mapping[str, str]  # part -> body
+    top: Callable[[str], float]  # signal -> its largest absolute value in all runs [SI], where histories are one
+    families: tuple[str, ...] = ()  # of the catalogue, in its order
+    predicts: tuple[str, ...] = ()  # of these, those whose extension is a better model
+
+
+def known_of(experiment: Experiment, families: Sequence[str] = (), predicts: Sequence[str] = ()) -> Known:
+    """Of an experiment, and a catalogue's families."""
+
+    @cache
+    def top(signal: str) -> float:
+        return max(float(np.abs(run.loads.columns[signal][:STEPS]).max()) for run in experiment.runs)
+
+    bodies = {part: body.name for body in bodies_of(experiment.machine) for part in body.parts}
+    return Known(tomllib.loads(experiment.text), bodies, top, tuple(families), tuple(predicts))
 
 
 def place_of(truth: Mapping[str, Any]) -> str:
@@ -36,21 +58,15 @@ def place_of(truth: Mapping[str, Any]) -> str:
     return place
 
 
-def same_place(truth: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
+def same_place(truth: Mapping[str, Any], cause: Mapping[str, Any], known: Known) -> bool:
     """The same name; two swapped sensors in either order; any part of a body that was warm."""
     wanted, said = place_of(truth), str(cause["place"])
     if truth["family"] == "initial_state":  # what moves as one was warmed as one; a diagnosis tells it part by part
         run, _, part = said.rpartition(".")
-        return run == str(truth["place"]) and bodies().get(part) == truth["settings"]["body"]
+        return run == str(truth["place"]) and known.bodies.get(part) == truth["settings"]["body"]
     if "<>" in wanted and "<>" in said:
         return _pair(wanted) == _pair(said)
     return wanted == said
-
-
-@cache
-def bodies() -> dict[str, str]:
-    """Part -> body of the machine of the trials."""
-    return {part: body.name for body in bodies_of(load_machine(FOLDER / "machine.toml")) for part in body.parts}
 
 
 def _pair(place: str) -> set[str]:
@@ -72,18 +88,13 @@ def parts(place: str, described: Mapping[str, Any]) -> set[str]:
     return {f"{head}.{name}"}
 
 
-def same_part(truth: Mapping[str, Any], cause: Mapping[str, Any], described: Mapping[str, Any]) -> bool:
+def same_part(truth: Mapping[str, Any], cause: Mapping[str, Any], known: Known) -> bool:
     """The same place, or one of the same part."""
-    return same_place(truth, cause) or bool(parts(place_of(truth), described) & parts(str(cause["place"]), described))
+    own, said = parts(place_of(truth), known.described), parts(str(cause["place"]), known.described)
+    return same_place(truth, cause, known) or bool(own & said)
 
 
-def described(model: Path) -> dict[str, Any]:
-    """The tables of a machine's description; none where it is not there."""
-    path = model / "machine.toml"
-    return tomllib.loads(path.read_text("utf-8")) if path.exists() else {}
-
-
-def size_of(truth: Mapping[str, Any], cause: Mapping[str, Any], top: Top) -> float | None:
+def size_of(truth: Mapping[str, Any], cause: Mapping[str, Any], known: Known) -> float | None:
     """The size of a hidden thing in the words of the cause that was said; None where they cannot be compared.
 
     Compared are equal units and equal kinds of history (always, in windows, with one signal). Exact factors of signals
@@ -107,7 +118,7 @@ def size_of(truth: Mapping[str, Any], cause: Mapping[str, Any], top: Top) -> flo
         if history.split("^")[0] != signal:
             return None
         reference = float(truth["settings"].get("reference", 1.0))
-        return size * (top(signal) / reference) ** float(truth["exponent"])
+        return size * (known.top(signal) / reference) ** float(truth["exponent"])
     if _windowed(history) != bool(truth["windows"]) or "^" in history:
         return None
     return size
@@ -117,15 +128,15 @@ def _windowed(history: str) -> bool:
     return history.startswith("from ")
 
 
-def covered(truth: Mapping[str, Any], cause: Mapping[str, Any], top: Top) -> bool | None:
+def covered(truth: Mapping[str, Any], cause: Mapping[str, Any], known: Known) -> bool | None:
     """Whether the 95 % interval of a cause holds the hidden size; None where they cannot be compared."""
-    size = size_of(truth, cause, top)
+    size = size_of(truth, cause, known)
     low, high = cause["ci95"]
     return None if size is None else bool(low <= size <= high)
 
 
-def effect(truth: Mapping[str, Any], top: Top) -> float:
-    """A size as `limits_at` counts it: factors by their distance from one, of losses by their logarithm, signals at
+def effect(truth: Mapping[str, Any], known: Known) -> float:
+    """A size as detection limits count it: factors by their distance from one, of losses by their logarithm, signals at
     their top."""
     size = float(truth["size"])
     if truth["family"] == "loss_law" and truth["unit"] == "1":
@@ -134,7 +145,7 @@ def effect(truth: Mapping[str, Any], top: Top) -> float:
         return abs(size - 1.0)
     if truth["signal"] and truth["family"] in ("heat_source", "forced_convection"):
         reference = float(truth["settings"].get("reference", 1.0))
-        return abs(size) * (top(str(truth["signal"])) / reference) ** float(truth["exponent"])
+        return abs(size) * (known.top(str(truth["signal"])) / reference) ** float(truth["exponent"])
     return abs(size) * (DAY if truth["unit"] == "K/s" else 1.0)
 
 

@@ -1,7 +1,7 @@
 """Hidden heat: sources that the twin does not have, has elsewhere, or with another law.
 
-Functions take a generator and the factor of the nominal size. Where the catalogue has a formula, the truth has another:
-an exponent, a bell's shape, a history of its own.
+Functions take the experiment, a generator and the factor of the nominal size. Where the catalogue has a formula, the
+truth has another: an exponent, a bell's shape, a history of its own.
 """
 
 from __future__ import annotations
@@ -10,44 +10,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.hidden_fast import Effects, place_column
-from benchmarks.hidden_parts import (
-    HOUR,
-    OUTER,
-    STEP,
-    STEPS,
-    Hidden,
-    Part,
-    described,
-    followed,
-    heating,
-    on,
-    one_of,
-    signal,
-    windows_of,
-)  # fmt: skip
-from tests.hidden.load import RUNS
-from twin.diagnose.diagnosis import Window
+from twin.inject.draw.histories import followed, on, one_of, signal, windows_of
+from twin.inject.draw.parts import Part, heating
+from twin.inject.experiment import HOUR, RUNS, STEP, STEPS, Experiment
+from twin.inject.five_axis import BEARINGS, DRIVES, ELSEWHERE, OUTER, SIDES
+from twin.inject.hidden import Hidden
+from twin.inject.truth.behaviour import Behaviour
+from twin.inject.truth.reduced import place_column
+from twin.machine.effects.effect import Window
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 
-# m^2 of sides that the sun reaches, by `twin.build.places`
-SIDES = {"bed.left": 0.29, "bed.right": 0.25, "bed.stem_left": 0.67, "bed.stem_right": 0.67, "column.left": 0.79,
-         "column.right": 0.79}  # fmt: skip
-DRIVES = ("x_motor", "y_motor", "z_motor", "x_bearing", "y_bearing", "z_bearing", "spindle_motor", "spindle_bearing",
-          "x_guide", "y_guide", "z_guide")  # fmt: skip
-BEARINGS = {"x_bearing": "x_motor_speed", "y_bearing": "y_motor_speed", "z_bearing": "z_motor_speed",
-            "spindle_bearing": "spindle_speed"}  # fmt: skip
-# A source on a surface: where else on its part its heat may enter
-ELSEWHERE = {
-    "x_motor": ("bed.right", "bed.back", "bed.x_top"), "y_motor": ("column.front", "column.back", "column.right"),
-    "z_motor": ("bed.z_top", "bed.stem_right", "bed.front"), "x_bearing": ("bed.right", "bed.x_top", "bed.shoulder"),
-    "y_bearing": ("column.front", "column.right", "column.left"), "z_bearing": ("bed.z_top", "bed.stem_left"),
-    "spindle_motor": ("headstock.back", "headstock.front", "headstock.top"), "spindle_bearing": ("spindle.nose",),
-}  # fmt: skip
 
-
-def heat_source(rng: np.random.Generator, factor: float) -> Part:
+def heat_source(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """12 W while it works, at an outer face: always, with a drive, or in a window of 3 h."""
     place, watts = one_of(rng, OUTER), 12.0 * factor
     kind = one_of(rng, ("always", "signal", "window"))
@@ -58,7 +33,7 @@ def heat_source(rng: np.random.Generator, factor: float) -> Part:
     if kind == "signal":
         name = one_of(rng, ("spindle_speed", "x_speed", "y_speed", "z_speed"))
         truth, told = (1.8, 5.0 / 3.0) if name == "spindle_speed" else (1.1, 1.0)
-        histories, top, mean = followed(name, truth)
+        histories, top, mean = followed(experiment, name, truth)
         hidden = Hidden(
             "heat_source", place, f"{name}^{told:.2f}", watts / mean, "W", (), name, told, {"reference": top}
         )
@@ -66,7 +41,7 @@ def heat_source(rng: np.random.Generator, factor: float) -> Part:
     return heating(Hidden("heat_source", place, "always", watts, "W"), [np.full(STEPS, watts)] * 3)
 
 
-def sun(rng: np.random.Generator, factor: float) -> Part:
+def sun(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """150 W/m^2, 60 W at most, at the top of a bell of 4 to 6 h on one side; another height every day."""
     place = one_of(rng, SIDES)
     watts = min(150.0 * SIDES[place], 60.0) * factor
@@ -80,7 +55,7 @@ def sun(rng: np.random.Generator, factor: float) -> Part:
     return heating(Hidden("sun", place, "a bell a day", watts, "W", windows), [watts * d * bell for d in day])
 
 
-def loss_law(rng: np.random.Generator, factor: float) -> Part:
+def loss_law(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """A source times 2.2, or a bearing by n^2.3 with twice its power at top speed."""
     if rng.random() < 0.7:
         name, gain = one_of(rng, DRIVES), 1.0 + 1.2 * factor
@@ -89,13 +64,13 @@ def loss_law(rng: np.random.Generator, factor: float) -> Part:
         )
     name, exponent = one_of(rng, BEARINGS), 2.3
     column = BEARINGS[name]
-    top = max(float(signal(r, column).max()) for r in (0, 1))
+    top = max(float(signal(experiment, r, column).max()) for r in (0, 1))
 
     def loads(r: int, drive: Drive) -> Drive:
-        k = drive.losses.index.index(list(described().sources).index(name))
+        k = drive.losses.index.index(list(experiment.machine.sources).index(name))
         value = drive.losses.value.copy()
         warm = int(np.searchsorted(drive.losses.grid, 35.0))
-        share = signal(r, column) / top
+        share = signal(experiment, r, column) / top
         fastest = int(share.argmax())
         at_top = value[fastest, k, warm] / max(share[fastest], 1e-9)  # friction grows about linearly near the top
         value[:, k] = ((1.0 + factor) * at_top * share**exponent)[:, None]
@@ -112,14 +87,14 @@ def loss_law(rng: np.random.Generator, factor: float) -> Part:
         exponent,
         {"reference": top},
     )
-    return Part((hidden,), Effects(loads=loads))
+    return Part((hidden,), Behaviour(loads=loads))
 
 
-def misplaced_source(rng: np.random.Generator, factor: float) -> Part:
+def misplaced_source(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """The heat of a motor or bearing enters another face of its part: all of it, half of it at half size."""
     name, share = one_of(rng, ELSEWHERE), min(factor, 1.0)
     place = one_of(rng, ELSEWHERE[name])
-    k = list(described().sources).index(name)
+    k = list(experiment.machine.sources).index(name)
 
     def shape(model: MachineModel) -> MachineModel:
         where, there = place_column(model, place)
@@ -132,13 +107,13 @@ def misplaced_source(rng: np.random.Generator, factor: float) -> Part:
         return replace(model, bodies=tuple(bodies))
 
     hidden = Hidden("misplaced_source", f"sources.{name}", "always", share, "1", settings={"surface": place})
-    return Part((hidden,), Effects(heats=(place,), shape=shape))
+    return Part((hidden,), Behaviour(heats=(place,), shape=shape))
 
 
-def pair(rng: np.random.Generator, factor: float) -> Part:
+def pair(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """At the spindle's bearing, with n^(8/3) or n^(5/3): what hardly any data tell apart."""
     exponent = (8.0 / 3.0, 5.0 / 3.0)[rng.integers(2)]
-    histories, top, mean = followed("spindle_speed", exponent)
+    histories, top, mean = followed(experiment, "spindle_speed", exponent)
     watts = 25.0 * factor / mean
     told = {"reference": top, "rival": 13.0 / 3.0 - exponent}
     hidden = Hidden(
@@ -147,7 +122,7 @@ def pair(rng: np.random.Generator, factor: float) -> Part:
     return heating(hidden, [watts * h for h in histories])
 
 
-def outside(rng: np.random.Generator, factor: float) -> Part:
+def outside(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """No entry of the catalogue: 25 W that come and go, in and out, by slow ramps to levels of a random telegraph."""
     place = one_of(rng, OUTER)
     watts = []

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 VARIABLE = "TWIN_MEASURED_DATA"
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 
 
 def measured_data(name: str) -> Path | None:

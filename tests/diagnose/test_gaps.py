@@ -6,10 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.campaign import EACH, FIRST, items
-from benchmarks.campaign_stuck import emptied
-from benchmarks.hidden_draw import part_of
 from tests.diagnose import small_case
+from twin.diagnose.gaps import emptied
 from twin.diagnose.study import with_measured
 from twin.diagnose.whiten import measured_of, missing
 
@@ -32,11 +30,3 @@ def test_what_is_missing_counts_nowhere():
     y = measured_of(yard.study)
     other = np.where(lost, y + 7.0, y)
     np.testing.assert_array_equal(after.fitter(y).x, after.fitter(other).x)
-
-
-def test_what_has_no_size_is_tried_once():
-    seed = next(s for s in range(FIRST, FIRST + EACH) if part_of("sensor", 1.0, s).hidden[0].history == "stuck")
-    tried = {(family, size) for family, size, s in items() if s == seed}
-    assert ("sensor", 1.0) in tried
-    assert not {("sensor", 0.5), ("sensor", 2.0)} & tried
-    assert {("heat_source", 0.5), ("heat_source", 1.0), ("heat_source", 2.0)} <= tried

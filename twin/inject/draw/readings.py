@@ -1,7 +1,7 @@
 """Hidden faults of what is read: sensors, load signals, clocks, and the displacement of the tool.
 
-Functions take a generator and the factor of the nominal size. Noise comes on top of a faulty sensor's reading, except
-where the reading stands still.
+Functions take the experiment, a generator and the factor of the nominal size. Noise comes on top of a faulty sensor's
+reading, except where the reading stands still.
 """
 
 from __future__ import annotations
@@ -12,45 +12,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.hidden_fast import Clean, Effects
-from benchmarks.hidden_parts import (
-    HOUR,
-    STEP,
-    STEPS,
-    Hidden,
-    Part,
-    described,
-    one_of,
-    with_column,
-    with_sensor,
-    with_tcp,
-)
-from tests.hidden.load import RUNS
-from twin.diagnose.diagnosis import Window
+from twin.inject.draw.histories import one_of
+from twin.inject.draw.parts import Part, with_column, with_sensor, with_tcp
+from twin.inject.experiment import HOUR, RUNS, START, STEP, STEPS, Experiment
+from twin.inject.five_axis import SCALES
+from twin.inject.hidden import Hidden
+from twin.inject.truth.behaviour import Behaviour, Clean
 from twin.logs.run import Run
+from twin.machine.effects.effect import Window
+from twin.physics.play import play
 
-SENSORS = tuple(f"sensors.{n}" for n, s in described().sensors.items() if s.part is not None)
 COMPONENTS = ("dx", "dy", "dz")
-SCALES = {
-    "x": ("x_rail_1.sides", "bed.x_top"),
-    "y": ("y_rail_1.sides", "column.front"),
-    "z": ("z_rail_1.sides", "bed.z_top"),
-}
 DAY = 86400.0
 
 
-def sensor(rng: np.random.Generator, factor: float) -> Part:
+def sensor(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """Offset 1 K, drift 1.2 K a day (from every start), lag 40 min, half detached, stuck, or two swapped."""
     kind = one_of(rng, ("offset", "drift", "lag", "detached", "stuck", "swapped"))
-    return fault(rng, kind, factor)
+    return fault(experiment, rng, kind, factor)
 
 
-def fault(rng: np.random.Generator, kind: str, factor: float) -> Part:
+def fault(experiment: Experiment, rng: np.random.Generator, kind: str, factor: float) -> Part:
     """A sensor with a fault of one kind, of either sign where there are two."""
-    place = one_of(rng, SENSORS)
+    sensors = [f"sensors.{n}" for n, s in experiment.machine.sensors.items() if s.part is not None]
+    place = one_of(rng, sensors)
     name, sign = place.partition(".")[2], (-1.0, 1.0)[rng.integers(2)]
     if kind == "swapped":
-        return _swapped(name, one_of(rng, [s for s in SENSORS if s != place]).partition(".")[2])
+        return _swapped(name, one_of(rng, [s for s in sensors if s != place]).partition(".")[2])
     if kind == "stuck":
         return _stuck(rng, name)
     size, unit = {
@@ -101,7 +89,7 @@ def _stuck(rng: np.random.Generator, name: str) -> Part:
     return Part((hidden,), logs=logs)
 
 
-def signal(rng: np.random.Generator, factor: float) -> Part:
+def signal(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """A current logged sqrt(2) times or half as large, a speed twice as large, or a run's measurements 6 min late.
 
     The log is that of every trial, and the machine had other loads: what a diagnosis makes of loads alone serves all.
@@ -118,7 +106,7 @@ def signal(rng: np.random.Generator, factor: float) -> Part:
 
     # the size is what the logged values want, as a declaration corrected has it
     hidden = Hidden("signal", f"signals.{name}", "factor", 1.0 / logged, "1", signal=name)
-    return Part((hidden,), Effects(really=really, laws=True))
+    return Part((hidden,), Behaviour(really=really, laws=True))
 
 
 def _clock(rng: np.random.Generator, factor: float) -> Part:
@@ -133,14 +121,14 @@ def _clock(rng: np.random.Generator, factor: float) -> Part:
         return replace(run, temperatures=replace(run.temperatures, columns=shifted))
 
     hidden = Hidden("signal", f"runs.{RUNS[r]}", "clock", late, "s")
-    return Part((hidden,), Effects(late={r: late}), readings=readings)
+    return Part((hidden,), Behaviour(late={r: late}), readings=readings)
 
 
 def _displaced(hidden: Hidden, more: Callable[[int, Run, Clean], np.ndarray], heats: tuple[str, ...] = ()) -> Part:
     def readings(r: int, run: Run, clean: Clean) -> Run:
         return with_tcp(run, more(r, run, clean))
 
-    return Part((hidden,), Effects(heats=heats), readings=readings)
+    return Part((hidden,), Behaviour(heats=heats), readings=readings)
 
 
 def _along(rows: np.ndarray, component: int) -> np.ndarray:
@@ -150,7 +138,7 @@ def _along(rows: np.ndarray, component: int) -> np.ndarray:
     return result
 
 
-def scale_expansion(rng: np.random.Generator, factor: float) -> Part:
+def scale_expansion(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """An encoder scale grows by 8 um/(m K) and reads too little; fixed at position zero, as warm as a face."""
     axis = one_of(rng, SCALES)
     place, growth = one_of(rng, SCALES[axis]), 8e-6 * factor
@@ -158,7 +146,7 @@ def scale_expansion(rng: np.random.Generator, factor: float) -> Part:
 
     def more(_: int, __: Run, clean: Clean) -> np.ndarray:
         step = np.searchsorted(clean.time, clean.tcp_time)
-        return _along(-growth * (clean.shown[place][step] - 22.0) * clean.positions[:, c], c)
+        return _along(-growth * (clean.shown[place][step] - START) * clean.positions[:, c], c)
 
     hidden = Hidden(
         "scale_expansion", f"axes.{axis}", "always", growth, "1/K", settings={"surface": place, "fixed_at": 0.0}
@@ -166,29 +154,20 @@ def scale_expansion(rng: np.random.Generator, factor: float) -> Part:
     return _displaced(hidden, more, (place,))
 
 
-def slip(rng: np.random.Generator, factor: float) -> Part:
+def slip(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """6 um of play on a component: two anchors that stick side by side, one of a wider play than the other."""
     name, width = one_of(rng, COMPONENTS), 6e-6 * factor
     c = COMPONENTS.index(name)
 
     def more(_: int, __: Run, clean: Clean) -> np.ndarray:
         moved = clean.moved[:, c]
-        lag = np.mean([_play(moved, share * width) - moved for share in (0.6, 1.4)], axis=0)
+        lag = np.mean([play(moved, share * width) - moved for share in (0.6, 1.4)], axis=0)
         return _along(lag[np.searchsorted(clean.time, clean.tcp_time)], c)
 
     return _displaced(Hidden("slip", f"tcp.{name}", "always", width, "m"), more)
 
 
-def _play(moved: np.ndarray, width: float) -> np.ndarray:
-    """(n,) what follows a motion through a play."""
-    result, at = np.empty_like(moved), float(moved[0])
-    for k, value in enumerate(moved):
-        at = min(max(at, value - width / 2), value + width / 2)
-        result[k] = at
-    return result
-
-
-def measurement(rng: np.random.Generator, factor: float) -> Part:
+def measurement(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """The device drifts by 8 um in 12 h, from every start, or stands askew by 20 um/m."""
     name, sign = one_of(rng, COMPONENTS), (-1.0, 1.0)[rng.integers(2)]
     c = COMPONENTS.index(name)
@@ -202,7 +181,7 @@ def measurement(rng: np.random.Generator, factor: float) -> Part:
     return _displaced(hidden, lambda _r, _run, clean: _along(slope * clean.positions[:, "xyz".index(axis)], c))
 
 
-def not_thermal(rng: np.random.Generator, factor: float) -> Part:
+def not_thermal(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """A step of 10 um at some time and ever after, or 0.6 um per ampere of an axis."""
     name, sign = one_of(rng, COMPONENTS), (-1.0, 1.0)[rng.integers(2)]
     c = COMPONENTS.index(name)

@@ -7,27 +7,18 @@ import math
 import pytest
 from scipy.stats import binom
 
-from benchmarks.campaign_match import covered, effect, place_of, said, same_part, same_place, size_of
-from benchmarks.campaign_table import (
-    confusion,
-    goals,
-    lower,
-    mistakes,
-    page,
-    per_family,
-    recovered,
-    several,
-    upper,
-    write_tables,
-)
+from tests.hidden.trials import EXPERIMENT
+from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.diagnosis import Limit
+from twin.inject.judge.figures import goals, lower, per_family, recovered, several, upper
+from twin.inject.judge.match import Known, covered, effect, known_of, place_of, said, same_part, same_place, size_of
+from twin.inject.judge.page import confusion, mistakes, page
 
 TABLES = {"films": {"bed": {"surfaces": ["bed.*", "rail.*"]}}, "sources": {"x_motor": {"surface": "bed.x_motor"}}}
-
-
-def top(signal):
-    """Every signal reaches 2."""
-    return 2.0
+NAMES = tuple(f.name for f in FAMILIES)
+PREDICTS = tuple(f.name for f in FAMILIES if f.group in ("machine", "signal"))
+# every signal reaches 2; the bed carries a rail
+KNOWN = Known(TABLES, {"bed": "bed", "rail": "other"}, lambda _signal: 2.0, NAMES, PREDICTS)
 
 
 def hidden(family, place, size, unit, history="always", windows=(), signal="", exponent=1.0, **settings):
@@ -81,7 +72,7 @@ def values(rows):
 
 
 def test_goals_are_counted_rightly():
-    found = values(goals(RESULTS, LIMITS, top, TABLES))
+    found = values(goals(RESULTS, LIMITS, KNOWN))
     assert found["false alarms"] == ("0.091", "1 of 11")
     assert found["false alarms: named"] == ("0.091", "1 of 11")
     assert found["false alarms of null_law"] == ("0.000", "0 of 1")
@@ -103,16 +94,16 @@ def test_goals_are_counted_rightly():
 
 
 def test_failed_trials_stand_beside_their_figure():
-    rows = {row[0]: row for row in goals(RESULTS, LIMITS, top, TABLES)}
+    rows = {row[0]: row for row in goals(RESULTS, LIMITS, KNOWN)}
     assert rows["detected at nominal size"][4] == "1"
     assert rows["detected at half size"][4] == "0"
-    (row,) = per_family(RESULTS, top, TABLES)
+    (row,) = per_family(RESULTS, KNOWN)
     assert row[:9] == ["heat_source", "7", "1", "2 of 3", "2 of 3", "1 of 1", "3 of 5", "2 of 5", "3 of 5"]
-    assert several(RESULTS) == [["two", "1", "0", "0 of 1", "1 of 1", "0 of 1"]]
+    assert several(RESULTS, KNOWN) == [["two", "1", "0", "0 of 1", "1 of 1", "0 of 1"]]
 
 
 def test_confusion():
-    header, rows = confusion(RESULTS)
+    header, rows = confusion(RESULTS, KNOWN)
     table = {row[0]: dict(zip(header[1:], row[1:], strict=True)) for row in rows}
     assert table["heat_source"]["heat_source"] == "3"
     assert table["heat_source"]["error"] == "1"
@@ -131,11 +122,11 @@ def test_bounds_are_those_of_clopper_and_pearson(k, n):
 
 
 def test_recovered_is_what_the_machine_without_the_effect_would_leave():
-    assert recovered(trial("sun", variance=(3.0, 1.5, 1.0))) == pytest.approx(0.75)
-    assert recovered(trial("sun", variance=(1.04, 0.9, 1.0))) is None  # hardly any
-    assert recovered(trial("sensor", variance=(3.0, 1.5, 1.0))) is None  # not the machine
+    assert recovered(trial("sun", variance=(3.0, 1.5, 1.0)), KNOWN) == pytest.approx(0.75)
+    assert recovered(trial("sun", variance=(1.04, 0.9, 1.0)), KNOWN) is None  # hardly any
+    assert recovered(trial("sensor", variance=(3.0, 1.5, 1.0)), KNOWN) is None  # not the machine
     unseen = hidden("zone", "environment.room", 2.5, "K", "in windows")
-    assert recovered(trial("zone", [unseen], variance=(3.0, 1.5, 1.0))) is None  # nobody can foresee it
+    assert recovered(trial("zone", [unseen], variance=(3.0, 1.5, 1.0)), KNOWN) is None  # nobody can foresee it
 
 
 @pytest.mark.parametrize(
@@ -158,39 +149,41 @@ def test_recovered_is_what_the_machine_without_the_effect_would_leave():
 )
 def test_places(truth, place, right, part):
     there = cause(truth["family"], place, 1.0, "1")
-    assert same_place(truth, there) is right, place_of(truth)
-    assert same_part(truth, there, TABLES) is part
+    assert same_place(truth, there, KNOWN) is right, place_of(truth)
+    assert same_part(truth, there, KNOWN) is part
 
 
 def test_sizes_are_compared_in_one_unit_or_not_at_all():
     day = cause("sensor", "sensors.a", 1.2, "K/day", 0.1, "drift")
-    assert covered(hidden("sensor", "sensors.a", 1.2 / 86400, "K/s", "drift"), day, top) is True
-    assert covered(hidden("sensor", "sensors.a", 1.2, "K", "offset"), day, top) is None
+    assert covered(hidden("sensor", "sensors.a", 1.2 / 86400, "K/s", "drift"), day, KNOWN) is True
+    assert covered(hidden("sensor", "sensors.a", 1.2, "K", "offset"), day, KNOWN) is None
     # 10 W/(m^2 K) at 1 m/s with an exponent of 0.7 are 16.2 at 2 m/s
     wind = hidden("forced_convection", "bed.left", 10.0, "W/(m^2*K)", "v^0.7", (), "v", 0.7)
     blown = cause("forced_convection", "bed.left", 15.0, "W/(m^2*K)", 2.0, "v^0.6")
-    assert size_of(wind, blown, top) == pytest.approx(10.0 * 2.0**0.7)
-    assert effect(wind, top) == pytest.approx(10.0 * 2.0**0.7 / 1.0)
-    assert covered(wind, blown, top) is True
-    assert covered(wind, {**blown, "history": "u^0.6"}, top) is None
+    assert size_of(wind, blown, KNOWN) == pytest.approx(10.0 * 2.0**0.7)
+    assert effect(wind, KNOWN) == pytest.approx(10.0 * 2.0**0.7 / 1.0)
+    assert covered(wind, blown, KNOWN) is True
+    assert covered(wind, {**blown, "history": "u^0.6"}, KNOWN) is None
     # the size of a sun is that of the larger day
     days = [{"run": "a", "level": 0.8}, {"run": "b", "level": 1.2}, {"run": "sealed", "level": 1.3}]
     sun = hidden("sun", "bed.left", 50.0, "W", windows=days)
-    assert size_of(sun, cause("sun", "bed.left", 60.0, "W", history="0 to 6 h of every run"), top) == pytest.approx(
+    assert size_of(sun, cause("sun", "bed.left", 60.0, "W", history="0 to 6 h of every run"), KNOWN) == pytest.approx(
         60.0
     )
     # in a window or always are two things
     window = hidden("heat_source", "bed.left", 12.0, "W", "in windows", days)
-    assert size_of(window, cause("heat_source", "bed.left", 12.0, "W"), top) is None
-    assert size_of(window, cause("heat_source", "bed.left", 12.0, "W", history="from 1.0 h to 4.0 h of a"), top) == 12.0
+    assert size_of(window, cause("heat_source", "bed.left", 12.0, "W"), KNOWN) is None
+    assert (
+        size_of(window, cause("heat_source", "bed.left", 12.0, "W", history="from 1.0 h to 4.0 h of a"), KNOWN) == 12.0
+    )
     assert size_of(hidden("signal", "signals.a", 0.5, "1", "factor"),
-                   cause("signal", "signals.a", 0.5, "1", history="factor"), top) is None  # fmt: skip
-    assert effect(hidden("joint", "contacts.a", 0.15, "1"), top) == pytest.approx(0.85)
-    assert effect(hidden("loss_law", "sources.a", 0.5, "1"), top) == pytest.approx(math.log(2.0))
+                   cause("signal", "signals.a", 0.5, "1", history="factor"), KNOWN) is None  # fmt: skip
+    assert effect(hidden("joint", "contacts.a", 0.15, "1"), KNOWN) == pytest.approx(0.85)
+    assert effect(hidden("loss_law", "sources.a", 0.5, "1"), KNOWN) == pytest.approx(math.log(2.0))
 
 
 def test_mistakes_are_listed_with_what_was_said():
-    rows = mistakes(RESULTS)
+    rows = mistakes(RESULTS, KNOWN)
     assert [row[2:4] for row in rows] == [
         ["film_gain", "films.bed, always"],
         ["heat_source", "bed.right, always"],
@@ -206,7 +199,7 @@ def test_mistakes_are_listed_with_what_was_said():
 def test_limits_are_those_of_the_place_and_weak_effects_are_told_apart():
     weak = {**trial("heat_source", [HEAT], verdict="nothing"), "limits": [1.0], "present": 3.0}
     strong = {**trial("heat_source", [HEAT], [cause("heat_source", "bed.left", 12.0, "W")]), "limits": [7.0]}
-    found = values(goals([weak, strong], LIMITS, top, TABLES))
+    found = values(goals([weak, strong], LIMITS, KNOWN))
     assert found["detected at twice the stated limit and more"] == ("0.000", "0 of 1")  # 12 W at a limit of 1 W
     assert found["detected at nominal size"] == ("0.500", "1 of 2")
     assert found["detected at nominal size, of what the data show"] == ("1.000", "1 of 1")
@@ -214,17 +207,16 @@ def test_limits_are_those_of_the_place_and_weak_effects_are_told_apart():
 
 def test_a_part_of_a_warm_body_is_the_right_place():
     truth = hidden("initial_state", "runs.diagnosis_2", 1.5, "K", "offset", body="carriage")
+    shipped = known_of(EXPERIMENT)
     for part, right in (("carriage", True), ("table", True), ("bed", False)):
-        assert same_place(truth, cause("initial_state", f"runs.diagnosis_2.{part}", 1.4, "K")) is right
-    assert not same_place(truth, cause("initial_state", "runs.diagnosis_1.carriage", 1.4, "K"))
+        assert same_place(truth, cause("initial_state", f"runs.diagnosis_2.{part}", 1.4, "K"), shipped) is right
+    assert not same_place(truth, cause("initial_state", "runs.diagnosis_1.carriage", 1.4, "K"), shipped)
+    assert shipped.top("spindle_speed") == max(run.loads.columns["spindle_speed"].max() for run in EXPERIMENT.runs)
 
 
-def test_an_unfinished_campaign_has_its_tables(tmp_path, capsys):
-    write_tables([], (), tmp_path / "campaign", tmp_path)
-    text = (tmp_path / "campaign" / "tables.md").read_text("utf-8")
-    assert text.strip() == capsys.readouterr().out.strip()
-    assert "| false alarms | - | - | 0 of 0 | 0 | <= 0.05 |" in text
-    whole = page(RESULTS, LIMITS, tmp_path, top)
-    assert "1 of them failed (ValueError 1 times)" in whole
+def test_an_unfinished_campaign_has_its_tables():
+    assert "| false alarms | - | - | 0 of 0 | 0 | <= 0.05 |" in page([], (), KNOWN, "five_axis")
+    whole = page(RESULTS, LIMITS, KNOWN, "five_axis")
+    assert "trials on five_axis, 1 of them failed (ValueError 1 times)" in whole
     for line in whole.splitlines():
         assert not line.startswith("|") or line.endswith("|")

@@ -1,7 +1,7 @@
-"""Trials with something hidden in them: drawn by family, size and seed, stepped by the reduced other machine.
+"""Trials with something hidden in them, drawn by family, size and seed, of the reduced other machine.
 
-    trial = draw("heat_source", 1.0, 7)     # some seconds
-    trial.runs                              # what a user would hand to `twin diagnose`
+    trial = draw(experiment, "heat_source", 1.0, 7)     # some seconds
+    trial.runs                                          # what a user would hand to `twin diagnose`
 
 Every trial, a null one too, has its own parameters (uniform, half widths OFF), noise, and air near the machine that
 wanders by AIR without being logged. Everything is drawn from numpy generators of the seed and the family's name.
@@ -11,38 +11,37 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from benchmarks import hidden_exchange as exchange
-from benchmarks import hidden_heat as heat
-from benchmarks import hidden_readings as readings
-from benchmarks.five_axis import FOLDER
-from benchmarks.hidden_fast import Clean, Fast, fast, fast_truth, runs
-from benchmarks.hidden_parts import STEP, STEPS, Hidden, Part, together
-from benchmarks.hidden_truth import FILMS, OFF, START
-from tests.hidden.load import NOISE, TCP_NOISE
+from twin.inject.draw import exchange, heat, readings
+from twin.inject.draw.parts import Part, together
+from twin.inject.experiment import NOISE, START, STEP, STEPS, TCP_NOISE, Experiment
+from twin.inject.hidden import Trial
+from twin.inject.truth.behaviour import Behaviour, Clean, clean_runs
+from twin.inject.truth.other_films import FILMS
+from twin.inject.truth.other_machine import OFF
+from twin.inject.truth.reduced import Reduced, reduced
 from twin.logs.run import Run, Table, Tcp
-from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 from twin.rom.drive import Drive
 
 AIR, AIR_TIME = 0.15, 1500.0  # K, s: the air that the machine feels beside the air that is logged
-Make = Callable[[np.random.Generator, float], Part]
+Make = Callable[[Experiment, np.random.Generator, float], Part]
 
 
-def two(rng: np.random.Generator, factor: float) -> Part:
+def two(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """A heat source, and something of another family in the machine."""
     other = MACHINE[rng.integers(len(MACHINE))]
-    return together([heat.heat_source(rng, factor), FAMILIES[other](rng, factor)])
+    return together([heat.heat_source(experiment, rng, factor), FAMILIES[other](experiment, rng, factor)])
 
 
-def effect_and_sensor(rng: np.random.Generator, factor: float) -> Part:
+def effect_and_sensor(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """Something in the machine, and a sensor that is off or drifts."""
     names = ("heat_source", *MACHINE)
-    own = FAMILIES[names[rng.integers(len(names))]](rng, factor)
-    return together([own, readings.fault(rng, ("offset", "drift")[rng.integers(2)], factor)])
+    own = FAMILIES[names[rng.integers(len(names))]](experiment, rng, factor)
+    return together([own, readings.fault(experiment, rng, ("offset", "drift")[rng.integers(2)], factor)])
 
 
 MACHINE = ("film_gain", "loss_law", "zone", "coolant", "expansion", "joint")  # what goes with a heat source
@@ -66,7 +65,7 @@ FAMILIES: dict[str, Make] = {
     "misplaced_source": heat.misplaced_source,
     "not_thermal": readings.not_thermal,
     # not in the catalogue
-    "null": lambda _rng, _factor: Part(()),
+    "null": lambda _experiment, _rng, _factor: Part(()),
     "null_law": exchange.null_law,
     "outside": heat.outside,
     "pair": heat.pair,
@@ -76,55 +75,43 @@ FAMILIES: dict[str, Make] = {
 NULLS = ("null", "null_law")
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Three runs, in the order of RUNS: two to fit, one sealed; and what is hidden in them."""
-
-    seed: int
-    family: str  # of FAMILIES: a family of the catalogue, or "null", "null_law", "outside", "pair", "two", ...
-    factor: float  # of the nominal size
-    truth: tuple[Hidden, ...]  # nothing in a null
-    runs: tuple[Run, ...]
-    parameters: dict[str, float]  # path -> value there [SI]
-
-
 def generator(family: str, seed: int, what: str) -> np.random.Generator:
     return np.random.default_rng([seed, zlib.crc32(family.encode()), zlib.crc32(what.encode())])
 
 
-def part_of(family: str, factor: float, seed: int) -> Part:
+def part_of(experiment: Experiment, family: str, factor: float, seed: int) -> Part:
     """What is hidden in a trial. Raises KeyError for unknown families, ValueError for a factor that is not positive."""
     if not factor > 0.0:
         raise ValueError(f"a size of {factor:g} times the nominal one")
-    return FAMILIES[family](generator(family, seed, "hidden"), factor)
+    return FAMILIES[family](experiment, generator(family, seed, "hidden"), factor)
 
 
-def values_of(family: str, seed: int) -> dict[str, float]:
+def values_of(experiment: Experiment, family: str, seed: int) -> dict[str, float]:
     """Parameters of the other machine [SI] by path: as described, times the gains of its film laws, times a draw."""
     rng = generator(family, seed, "parameters")
     result = {}
-    for p in parameters(load_machine(FOLDER / "machine.toml")):
+    for p in parameters(experiment.machine):
         if p.kind in OFF:
             gain = FILMS[p.path.split(".")[1]].gain if p.kind == "film" else 1.0
             result[p.path] = p.nominal * gain * (1.0 + rng.uniform(-OFF[p.kind], OFF[p.kind]))
     return result
 
 
-def draw(family: str, factor: float, seed: int, machine: Fast | None = None, hidden: bool = True) -> Trial:
+def draw(experiment: Experiment, family: str, factor: float, seed: int, hidden: bool = True) -> Trial:
     """The trial of a family at a factor of its nominal size; not hidden: the same machine, air and noise without it."""
-    known = fast() if machine is None else machine
-    part = part_of(family, factor, seed) if hidden else Part(())
-    values = values_of(family, seed)
+    known = reduced(experiment)
+    part = part_of(experiment, family, factor, seed) if hidden else Part(())
+    values = values_of(experiment, family, seed)
     for path, more in part.factors.items():
         values[path] *= more
     air = together([_air(generator(family, seed, "air")), part])
-    clean = fast_truth(known, values, air.effects)
+    clean = clean_runs(experiment, values, air.behaviour)
     noise = generator(family, seed, "noise")
     made = []
-    for r, (logged, did) in enumerate(zip(runs(), clean, strict=True)):
+    for r, (logged, did) in enumerate(zip(experiment.runs, clean, strict=True)):
         run = part.readings(r, _measured(known, logged, did), did)
         made.append(part.logs(r, _noisy(run, noise)))
-    return Trial(seed, family, factor, part.hidden, tuple(made), values)
+    return Trial(family, seed, part.hidden, tuple(made), factor, values)
 
 
 def _air(rng: np.random.Generator) -> Part:
@@ -139,11 +126,10 @@ def _air(rng: np.random.Generator) -> Part:
     def loads(r: int, drive: Drive) -> Drive:
         return replace(drive, environment=drive.environment + AIR * wander[r])
 
-    part = Part(())
-    return replace(part, effects=replace(part.effects, loads=loads))
+    return Part((), Behaviour(loads=loads))
 
 
-def _measured(known: Fast, logged: Run, did: Clean) -> Run:
+def _measured(known: Reduced, logged: Run, did: Clean) -> Run:
     """What the machine did as a run without noise, with the loads as they were."""
     columns = dict(zip(known.model.sensors, did.temperatures.T, strict=True))
     for name, environment in known.model.ambient_sensors:
