@@ -1,19 +1,19 @@
 """Trials with something hidden: every family is there, drawn by its seed alone, inside the runs, and does what it says.
 
-Nothing is meshed or stepped here but in the slow tests, which need gmsh.
+Only the slow tests step a machine: a small one, on the mesh of the description, for which nobody needs gmsh.
 """
 
 from __future__ import annotations
 
 import math
 from functools import partial
-from importlib.util import find_spec
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.hidden.trials import EXPERIMENT
+from twin.build.rich_basis import RichOptions
 from twin.inject.draw import trial as drawing
 from twin.inject.draw.histories import gate
 from twin.inject.draw.parts import together
@@ -21,7 +21,8 @@ from twin.inject.draw.readings import fault
 from twin.inject.draw.trial import FAMILIES, NULLS, draw
 from twin.inject.experiment import RUNS, STEPS
 from twin.inject.five_axis import BEARINGS, DRIVES, ELSEWHERE, JOINTS, OUTER, PARTS, ROOM, SPEEDS, WETTED
-from twin.inject.truth.behaviour import SOURCES, Clean
+from twin.inject.truth import reduced as made_small
+from twin.inject.truth.behaviour import SOURCES, Behaviour, Clean
 from twin.inject.truth.other_films import FILMS
 from twin.inject.truth.other_machine import OFF
 from twin.logs.run import Run, Table, Tcp
@@ -49,9 +50,6 @@ CATALOGUE = (
     "not_thermal",
 )  # fmt: skip; a model too coarse is hidden in no machine
 SEEDS = range(12)
-MESHED = pytest.mark.skipif(
-    find_spec("gmsh") is None, reason="gmsh makes the other mesh, once: pip install 'twin[mesh]'"
-)
 part_of, values_of = partial(drawing.part_of, EXPERIMENT), partial(drawing.values_of, EXPERIMENT)
 FELT = SimpleNamespace(environment=np.column_stack([np.full(STEPS, 21.0), np.full(STEPS, 23.0)]))
 
@@ -79,6 +77,22 @@ def made_up(r: int) -> tuple[Run, Clean]:
         ),
         clean,
     )
+
+
+@pytest.fixture(scope="module")
+def small():
+    """Trials of a machine that is made in half a minute: the shipped mesh, few states from few trajectories."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(made_small, "other_machine", lambda experiment, text: experiment.another(text))
+        patch.setattr(made_small, "RICH", RichOptions(samples=2, tolerance=5e-2))
+        patch.setattr(made_small, "STATES", 150)
+        patch.setattr(made_small, "DRAWS", 2)
+        patch.setattr(made_small, "cached", lambda *given: given[-1]())
+        for function in (made_small.reduced, made_small.nominal_drives):
+            function.cache_clear()
+        yield
+        for function in (made_small.reduced, made_small.nominal_drives):
+            function.cache_clear()
 
 
 def test_every_family_of_the_catalogue_is_there_and_more():
@@ -199,8 +213,7 @@ def test_a_clock_is_late_for_temperatures_and_the_tool_alike():
 
 
 @pytest.mark.slow
-@MESHED
-def test_the_tool_is_late_with_the_temperatures():
+def test_the_tool_is_late_with_the_temperatures(small):
     seed = next(s for s in range(60) if part_of("signal", 1.0, s).hidden[0].history == "clock")
     late, right = draw(EXPERIMENT, "signal", 1.0, seed), draw(EXPERIMENT, "signal", 1.0, seed, hidden=False)
     r = RUNS.index(late.hidden[0].place.removeprefix("runs."))
@@ -277,8 +290,7 @@ def test_put_together_powers_add_and_both_are_told():
 
 
 @pytest.mark.slow
-@MESHED
-def test_a_trial_is_what_a_user_would_have():
+def test_a_trial_is_what_a_user_would_have(small):
     trial = draw(EXPERIMENT, "heat_source", 2.0, 3)
     null = draw(EXPERIMENT, "heat_source", 1e-9, 3)
     assert [run.folder.name for run in trial.runs] == list(RUNS)
@@ -290,3 +302,16 @@ def test_a_trial_is_what_a_user_would_have():
         assert left["air_column"] == 0.0
         assert np.isfinite(run.tcp.displacement).all()
     assert max(left.values()) > 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["zone", "capacity", "misplaced_source", "null_law", "expansion"])
+def test_a_machine_of_another_shape_can_be_stepped(small, family):
+    seed = next(s for s in SEEDS if part_of(family, 1.0, s).behaviour.shape is not Behaviour().shape)
+    with_it, without = draw(EXPERIMENT, family, 1.0, seed), draw(EXPERIMENT, family, 1.0, seed, hidden=False)
+    pairs = list(zip(with_it.runs, without.runs, strict=True))
+    warmer = max(np.abs(a.temperatures.columns[n] - b.temperatures.columns[n]).max()
+                 for a, b in pairs for n in a.temperatures.columns)  # fmt: skip
+    moved = max(np.abs(a.tcp.displacement - b.tcp.displacement).max() for a, b in pairs)
+    assert warmer == 0.0 if family == "expansion" else 0.05 < warmer < 50.0
+    assert 0.1e-6 < moved < 500e-6

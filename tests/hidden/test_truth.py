@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from tests.hidden.trials import EXPERIMENT, MODEL
+from twin.build.full_model import assemble
+from twin.build.simulate import simulate
+from twin.inject.experiment import NOISE, START, STEP, TCP_NOISE
 from twin.inject.truth.other_films import FILMS
 from twin.inject.truth.other_machine import ASIDE, OFF, other_parameters, other_text
-from twin.inject.truth.side_by_side import felt_run
+from twin.inject.truth.side_by_side import driven, felt_run, truths_of
 from twin.logs.read import read_run
+from twin.logs.signals import signal_values
 from twin.machine.load import load_machine
+from twin.rom.drive import evaluate
 
 
 @pytest.fixture(scope="module")
@@ -75,3 +80,24 @@ def test_work_before_the_start_and_what_is_not_logged():
     same, late = felt_run(run, {}, 0.0)
     assert late == 0.0
     np.testing.assert_array_equal(same.loads.time, run.loads.time)
+
+
+@pytest.mark.slow
+def test_runs_side_by_side_are_those_one_after_the_other():
+    """A minute is one step of second order there; against eight Euler steps, on the shipped mesh."""
+    full, steps = assemble(EXPERIMENT.machine), 35
+    several = [driven(full, run, {}) for run in EXPERIMENT.runs[1:]]
+    (found,) = truths_of([full], several, steps)
+    load = full.thermal.load_model
+    for truth, one, run in zip(found, several, EXPERIMENT.runs[1:], strict=True):
+        drive = evaluate(load, run.loads.time, signal_values(run, load.signals), STEP, steps)
+        rows = one.when <= drive.time[-1]
+        assert rows.any()
+        wanted = simulate(full, drive, one.when[rows], one.where[rows], START, 8)
+        assert truth.sensors == wanted.sensors
+        np.testing.assert_allclose(truth.time, wanted.time)
+        error = truth.temperatures - wanted.temperatures
+        assert np.sqrt((error**2).mean(axis=0)).max() < NOISE  # of the sensor that sees the spindle start
+        assert np.sqrt((error**2).mean()) < 0.25 * NOISE
+        assert np.ptp(wanted.temperatures) > 2.0
+        np.testing.assert_allclose(truth.tcp[rows], wanted.tcp, atol=TCP_NOISE)

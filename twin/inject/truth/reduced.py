@@ -19,10 +19,11 @@ from twin.build.cache import cached
 from twin.build.compress import Tolerances, galerkin
 from twin.build.full_model import FullModel, assemble
 from twin.build.pipeline import theta_bounds
-from twin.build.place_training import Shared, snapshots
+from twin.build.place_training import DRAWS, Draw, Shared, trajectory
 from twin.build.places import PREFIX, Place, places_of, pruned, with_places
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
+from twin.build.workers import each
 from twin.inject.experiment import RUNS, START, STEP, Experiment, plan
 from twin.inject.truth.other_machine import OTHER_MESH, other_machine, other_text
 from twin.logs.run import Run
@@ -58,7 +59,7 @@ def reduced(experiment: Experiment) -> Reduced:
     for name in RUNS:
         loads.update((experiment.folder / "runs" / name / "loads.csv").read_bytes())
     known = (other_text(experiment, STRUCTURE), RICH, TRAINING_STEP, STATES, UNIT, OTHER_MESH)
-    return cached("hidden-truth", (*known, loads.hexdigest()), lambda: _made(experiment))
+    return cached("hidden", (*known, loads.hexdigest()), lambda: _made(experiment))
 
 
 @lru_cache(maxsize=2)
@@ -112,7 +113,9 @@ def _made(experiment: Experiment) -> Reduced:
     known = tuple(parameters(machine))
     base = pruned(model)
     drives = tuple(evaluated(base, run, TRAINING_STEP) for run in experiment.runs)
-    stacked = np.column_stack(snapshots(Shared(model, base, known, places, drives, (START,) * len(drives))))
+    shared = Shared(model, base, known, places, drives, (START,) * len(drives))
+    draws = [Draw(run, seed) for seed in range(DRAWS + 1) for run in range(len(drives))]
+    stacked = np.column_stack(each(trajectory, shared, draws))
     parts = np.split(stacked, np.cumsum([b.n for b in rich])[:-1])
     carried = tuple(_carrying(b, h) for b, h in zip(rich, heights, strict=True))
     reduced = galerkin(replace(model, bodies=carried), parts, STATES, UNIT)
