@@ -58,7 +58,7 @@ def reduced(experiment: Experiment) -> Reduced:
     loads = hashlib.sha256()
     for name in RUNS:
         loads.update((experiment.folder / "runs" / name / "loads.csv").read_bytes())
-    known = (other_text(experiment, STRUCTURE), RICH, TRAINING_STEP, STATES, UNIT, OTHER_MESH)
+    known = (other_text(experiment, STRUCTURE), RICH, TRAINING_STEP, DRAWS, STATES, UNIT, OTHER_MESH)
     return cached("hidden", (*known, loads.hexdigest()), lambda: _made(experiment))
 
 
@@ -118,10 +118,10 @@ def _made(experiment: Experiment) -> Reduced:
     stacked = np.column_stack(each(trajectory, shared, draws))
     parts = np.split(stacked, np.cumsum([b.n for b in rich])[:-1])
     carried = tuple(_carrying(b, h) for b, h in zip(rich, heights, strict=True))
-    reduced = galerkin(replace(model, bodies=carried), parts, STATES, UNIT)
-    stripped, projected = zip(*(_carried(b, n_films) for b in reduced.bodies), strict=True)
+    compact = galerkin(replace(model, bodies=carried), parts, STATES, UNIT)
+    stripped, projected = zip(*(_carried(b, n_films) for b in compact.bodies), strict=True)
     return Reduced(
-        replace(reduced, bodies=stripped), places, projected, known,
+        replace(compact, bodies=stripped), places, projected, known,
         tuple(when for when, _ in plans), tuple(where for _, where in plans),
     )  # fmt: skip
 
