@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache, lru_cache
 from itertools import groupby
 from pathlib import Path
@@ -14,18 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.campaign_match import place_of
-from benchmarks.campaign_stuck import emptied, without_stuck
-from benchmarks.campaign_table import write_tables
-from benchmarks.five_axis import FOLDER, machine
-from benchmarks.hidden_draw import FAMILIES as HIDDEN
-from benchmarks.hidden_draw import Trial, draw, part_of
-from benchmarks.hidden_parts import Hidden
+from benchmarks.five_axis import EXPERIMENT, machine
+from twin.atomic import atomic_path
 from twin.build.workers import each
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.gain import predicted
+from twin.diagnose.gaps import emptied
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
 from twin.diagnose.settled import settled
@@ -33,37 +30,19 @@ from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
 from twin.diagnose.yardstick import Yardstick
+from twin.inject.draw.trial import draw
+from twin.inject.hidden import Hidden, Trial
+from twin.inject.judge.items import Item, items
+from twin.inject.judge.match import known_of, place_of
+from twin.inject.judge.page import page
 from twin.progress import bar
 
 OUT = Path("out/campaign")
 NOISE = 0.08  # K
 SETTINGS = Settings(temperature_sigma=NOISE)
-NULLS, EACH = 200, 10
-SIZES = (1.0, 0.5, 2.0)
-MORE = (("outside", 20), ("null_law", 10))
-SEVERAL = (("pair", 10), ("two", 10), ("effect_and_sensor", 10))  # no figure of the goals
-FAST = 4  # rounds that all nulls are in
 FIRST = 5800  # seed of the first trial: none that anything was tuned on
-
-Item = tuple[str, float, int]
-
-
-def items(first: int = FIRST) -> list[Item]:
-    """All trials from this seed on, in an order in which an unfinished campaign is worth most."""
-    families = [f.name for f in FAMILIES if f.name in HIDDEN]
-    result: list[Item] = []
-    for k in range(EACH):
-        nulls = range(min(k * NULLS // FAST, NULLS), min((k + 1) * NULLS // FAST, NULLS))
-        sized = [(family, size, first + k) for family in families for size in SIZES]
-        result += [item for item in sized if _differs(*item)]
-        result += [(name, 1.0, first + i) for name, n in MORE for i in range(k * n // EACH, (k + 1) * n // EACH)]
-        result += [("null", 1.0, first + i) for i in nulls]
-    return result + [(name, 1.0, first + i) for name, n in SEVERAL for i in range(n)]
-
-
-def _differs(family: str, size: float, seed: int) -> bool:
-    """Whether data of another size are others: a stuck sensor or a doubled signal is what it is."""
-    return size == 1.0 or part_of(family, size, seed).hidden != part_of(family, 1.0, seed).hidden
+CATALOGUE = tuple(f.name for f in FAMILIES)
+KNOWN = known_of(EXPERIMENT, CATALOGUE, [f.name for f in FAMILIES if f.group in ("machine", "signal")])
 
 
 @cache
@@ -71,7 +50,7 @@ def yardstick() -> Yardstick:
     """The nominal machine's, on the loads of the three runs, as `twin diagnose` makes it."""
     from twin.rom.artefact import Artefact
 
-    trial = draw("null", 1.0, 0)
+    trial = draw(EXPERIMENT, "null", 1.0, 0)
     nothing: Any = Artefact
     return prepare(nothing, machine(), trial.runs[:2], trial.runs[2:], SETTINGS)[2]
 
@@ -93,7 +72,10 @@ def limit(hidden: Hidden) -> float | None:
 def judged(yard: Yardstick, trial: Trial) -> dict[str, Any]:
     """One trial: what was hidden, what was said, and what it was worth on the sealed run (of a null nothing)."""
     began = time.perf_counter()
-    trial, stuck = without_stuck(yard, trial)
+    names = [planned.run.name for planned in yard.study.runs[:2]]
+    usable, stuck = stuck_sensors(trial.runs[:2], yard.study.bench.base.sensors, names)
+    if stuck:
+        trial = replace(trial, runs=(*usable, *trial.runs[2:]))
     plans = plans_of(yard, trial)
     own = emptied(yard, plans) if stuck else yard
     y = measured_of(with_measured(yard.study, plans))
@@ -101,12 +83,12 @@ def judged(yard: Yardstick, trial: Trial) -> dict[str, Any]:
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     unknown = unknown_of(found) if verdict == "unknown" else None
     seconds = time.perf_counter() - began
-    without = bare(trial.family, trial.seed) if trial.truth else None
+    without = bare(trial.name, trial.seed) if trial.hidden else None
     return {
-        "family": trial.family,
+        "family": trial.name,
         "factor": trial.factor,
         "seed": trial.seed,
-        "truth": [asdict(h) for h in trial.truth],
+        "truth": [asdict(h) for h in trial.hidden],
         "verdict": verdict,
         "causes": [
             {"family": c.family, "place": c.place, "history": c.history, "amplitude": c.amplitude, "ci95": c.ci95,
@@ -117,7 +99,7 @@ def judged(yard: Yardstick, trial: Trial) -> dict[str, Any]:
         "unknown": None if unknown is None else [unknown.part, unknown.surface, unknown.statistic],
         "evidence": max(found.steps[0].parts.values()),
         "observed": found.steps[0].observed,
-        "limits": [limit(h) for h in trial.truth],
+        "limits": [limit(h) for h in trial.hidden],
         "present": _distance(yard, y, without.y) if without else 0.0,
         "variance": [*variance(found, plans[2].temperature, plans[2].tcp), without.variance] if without else None,
         "seconds": seconds,
@@ -154,7 +136,7 @@ class Bare:
 
 @lru_cache(maxsize=1)  # for the three sizes of a trial
 def bare(family: str, seed: int) -> Bare:
-    yard, trial = yardstick(), draw(family, 1.0, seed, hidden=False)
+    yard, trial = yardstick(), draw(EXPERIMENT, family, 1.0, seed, hidden=False)
     study, plans = yard.study, plans_of(yard, trial)
     y, last = measured_of(with_measured(study, plans)), len(study.fitted)
     x, _ = settled(yard, y, ())
@@ -174,7 +156,7 @@ def _several(deadline: float, trials: Sequence[Item]) -> None:
         if time.time() > deadline:
             return
         try:
-            result = judged(yardstick(), draw(family, factor, seed))
+            result = judged(yardstick(), draw(EXPERIMENT, family, factor, seed))
         except Exception as e:  # a trial that fails is a result, too
             result = {"family": family, "factor": factor, "seed": seed, "error": f"{type(e).__name__}: {e}"}
         OUT.mkdir(parents=True, exist_ok=True)
@@ -186,18 +168,21 @@ def results(first: int = FIRST) -> list[dict[str, Any]]:
     """The trials from this seed on that were made; of one that is in several files, the last file's by name."""
     lines = [line for path in sorted(OUT.glob("trials-*.jsonl")) for line in path.read_text("utf-8").splitlines()]
     found = {(r["family"], r["factor"], r["seed"]): r for r in map(json.loads, lines)}
-    return [found[item] for item in items(first) if item in found]
+    return [found[item] for item in items(EXPERIMENT, CATALOGUE, first) if item in found]
 
 
 def main(minutes: float = float("inf"), first: int = FIRST) -> None:
     yard = yardstick()
     done = {(r["family"], r["factor"], r["seed"]) for r in results(first)}
-    todo = [i for i in items(first) if i not in done]
+    todo = [i for i in items(EXPERIMENT, CATALOGUE, first) if i not in done]
     deadline = time.time() + 60.0 * minutes
     pieces = [list(sizes) for _, sizes in groupby(todo, key=lambda item: (item[0], item[2]))]
     with bar("campaign", len(pieces)) as advance:
         each(_several, deadline, pieces, lambda p: advance(f"{p[0][0]} of seed {p[0][2]}"), long=0.0)
-    write_tables(results(first), limits_of(yard), OUT, FOLDER)
+    text = page(results(first), limits_of(yard), KNOWN, EXPERIMENT.folder.name)
+    print(text, flush=True)
+    with atomic_path(OUT / "tables.md") as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

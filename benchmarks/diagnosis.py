@@ -9,22 +9,24 @@ import json
 import tempfile
 from pathlib import Path
 
-from benchmarks.five_axis import FOLDER
+from benchmarks.five_axis import EXPERIMENT, FOLDER, TRUTHS
 from benchmarks.machines import twin
-from tests.hidden.load import RUNS
-from tests.hidden.trials import trial
+from twin.inject.experiment import RUNS
+from twin.inject.stored.recipe import trial_of
+from twin.inject.stored.table import table
 from twin.logs.write import write_run
 
 TRIAL = "heat_source"
 
 
 def main() -> None:
-    runs, expected = trial(TRIAL)
-    print(f"   hidden: {expected.family} at {expected.place}, {expected.size:g} {expected.unit}")
+    trial = trial_of(EXPERIMENT, table(EXPERIMENT)[TRIAL], TRUTHS)
+    (hidden,) = trial.hidden
+    print(f"   hidden: {hidden.family} at {hidden.place}, {hidden.size:g} {hidden.unit}")
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         artefact, report = folder / "machine.h5", folder / "report"
-        for name, run in zip(RUNS, runs, strict=True):
+        for name, run in zip(RUNS, trial.runs, strict=True):
             write_run(folder / name, run)
         twin(["build", str(FOLDER), "-o", str(artefact)], folder)
         looked_at = [str(folder / name) for name in RUNS[:2]]

@@ -1,4 +1,4 @@
-"""The fast truth of hidden-effect trials against the full model of the same mesh, with things hidden in it.
+"""The reduced truth of hidden-effect trials against the full model of the same mesh, with things hidden in it.
 
 Three draws of parameters, two with sources, films and media at places, one with a lost joint, 12 h each: worst sensor
 and worst TCP component must be within a tenth of the measurement noise (rms). Needs gmsh once, and some minutes a draw.
@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.hidden_draw import values_of
-from benchmarks.hidden_fast import Clean, Effects, fast, fast_truth, full_with_places, runs
-from benchmarks.hidden_parts import STEP, STEPS, described
-from benchmarks.hidden_truth import START, SUBSTEPS
-from tests.hidden.load import NOISE, RUNS, TCP_NOISE
+from benchmarks.five_axis import EXPERIMENT
+from twin.build.acting import Acting, with_acting
+from twin.build.places import pruned
 from twin.build.simulate import simulate
-from twin.diagnose.acting import Acting, with_acting
-from twin.diagnose.places import pruned
+from twin.inject.draw.trial import values_of
+from twin.inject.experiment import NOISE, RUNS, START, STEP, STEPS, SUBSTEPS, TCP_NOISE
+from twin.inject.truth.behaviour import Behaviour, Clean, clean_runs
+from twin.inject.truth.reduced import full_with_places, reduced
 from twin.logs.signals import signal_values
 from twin.rom.apply import with_values
 from twin.rom.drive import Drive, evaluate
@@ -56,7 +56,7 @@ def _second(_: int, drive: Drive) -> Acting:
     """Sun on the bed, a source that follows the spindle, more film on the bed and on the headstock."""
     hours = drive.time[:-1] / 3600.0
     bell = np.clip(np.cos(np.pi * (hours - 6.0) / 5.0), 0.0, None) * (np.abs(hours - 6.0) < 2.5)
-    spindle = np.abs(runs()[1].loads.columns["spindle_speed"][:STEPS])
+    spindle = np.abs(EXPERIMENT.runs[1].loads.columns["spindle_speed"][:STEPS])
     return Acting(
         power={"bed.stem_left": 60.0 * bell, "headstock.front": 25.0 * (spindle / spindle.max()) ** 1.8},
         film={"bed.z_top": np.full(drive.n_steps, 15.0), "headstock.back": 12.0 * _switched(drive, 1.0, 9.0)},
@@ -66,10 +66,10 @@ def _second(_: int, drive: Drive) -> Acting:
 
 def _lost(_: int, drive: Drive) -> Drive:
     """The spindle's flange keeps a 44th of its conductance for four hours: temperatures jump where none did."""
-    fixed = [name for name, contact in described().contacts.items() if contact.kind == "fixed"]
+    fixed = [name for name, contact in EXPERIMENT.machine.contacts.items() if contact.kind == "fixed"]
     theta = drive.theta.copy()
     kept = 1.0 - (1.0 - 1.0 / 44.0) * _switched(drive, 4.0, 8.0)
-    theta[:, len(described().films) + fixed.index("spindle_flange")] *= kept
+    theta[:, len(EXPERIMENT.machine.films) + fixed.index("spindle_flange")] *= kept
     return replace(drive, theta=theta)
 
 
@@ -82,12 +82,12 @@ CASES = (
 
 def of_full(case: Case, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
     """Temperatures (n + 1, sensors) [degC] and TCP rows (m, 3) [m] of the full model."""
-    known = fast()
-    full, _ = full_with_places()
+    known = reduced(EXPERIMENT)
+    full, _ = full_with_places(EXPERIMENT)
     nominal = pruned(full.thermal, case.heats, case.films)
     there = with_values(nominal, known.parameters, values)
     bare, wanted = pruned(nominal).load_model, pruned(there).load_model
-    run = runs()[case.run]
+    run = EXPERIMENT.runs[case.run]
     logged = evaluate(bare, run.loads.time, signal_values(run, bare.signals), STEP)
     own = case.loads(case.run, rescaled(logged, bare, wanted))
     drive = with_acting(own, there.load_model, case.acting(case.run, own))
@@ -100,16 +100,16 @@ def of_full(case: Case, values: dict[str, float]) -> tuple[np.ndarray, np.ndarra
 
 
 def main() -> None:
-    known = fast()
+    known = reduced(EXPERIMENT)
     print(f"   {sum(b.n for b in known.model.bodies)} states, {len(known.places)} places, {len(RUNS)} runs")
     for case in CASES:
-        values = values_of("null", case.seed)
+        values = values_of(EXPERIMENT, "null", case.seed)
         # `simulate` has the structure of the nominal expansions
         values = {k: v for k, v in values.items() if not k.endswith(".expansion")}
-        effects = Effects(heats=case.heats, films=case.films, acting=case.acting, loads=case.loads)
-        fast_truth(known, values, effects)  # compiled
+        behaviour = Behaviour(heats=case.heats, films=case.films, acting=case.acting, loads=case.loads)
+        clean_runs(EXPERIMENT, values, behaviour)  # compiled
         began = time.perf_counter()
-        clean: Clean = fast_truth(known, values, effects)[case.run]
+        clean: Clean = clean_runs(EXPERIMENT, values, behaviour)[case.run]
         quick = time.perf_counter() - began
         began = time.perf_counter()
         T, tcp = of_full(case, values)

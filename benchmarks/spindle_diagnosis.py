@@ -14,8 +14,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tests.support.measured import VARIABLE, measured_data
-from tests.support.scripts import load_script
+from models.measured import VARIABLE, measured_data
+from models.scripts import load_script
 from twin.cli.main import run as command
 from twin.logs.read import read_run
 from twin.logs.write import write_run

@@ -13,8 +13,8 @@ from types import ModuleType
 
 import numpy as np
 
-from tests.support.measured import VARIABLE, measured_data
-from tests.support.scripts import load_script
+from models.measured import VARIABLE, measured_data
+from models.scripts import load_script
 from twin.calibrate.score.bootstrap import Difference, rms_difference
 from twin.calibrate.score.compare import channels
 from twin.calibrate.transfer_function.identify import Method, identify

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.campaign import machine
-from benchmarks.hidden_draw import draw
+from benchmarks.five_axis import EXPERIMENT, machine
+from twin.build.acting import Acting
+from twin.build.place_training import EVERY, Shared, stepped
+from twin.build.places import pruned
 from twin.build.workers import each
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.acting import Acting
 from twin.diagnose.bench import Bench, fine_drive, make_bench, probed
 from twin.diagnose.march import INNER
-from twin.diagnose.places import pruned
 from twin.diagnose.study import Study, make_study
-from twin.diagnose.training import EVERY, Shared, stepped
+from twin.inject.draw.trial import draw
 from twin.machine.parameters import parameters
 from twin.progress import bar
 
@@ -63,7 +63,7 @@ def rows(bench: Bench, shared: Shared) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def main() -> None:
-    described, runs = machine(), draw("null", 1.0, 0).runs
+    described, runs = machine(), draw(EXPERIMENT, "null", 1.0, 0).runs
     model = probed(described)
     bench = make_bench(described, parameters(described), runs)
     plans = [measured(bench.base, run, b.drive, b.name) for run, b in zip(runs, bench.runs, strict=True)]

@@ -35,8 +35,9 @@ from twin.build.product import build_artefact
 from twin.build.simulate import Noise, simulate_run
 from twin.diagnose.diagnose import Settings, diagnose
 from twin.diagnose.extension import write_extension
-from twin.diagnose.hide import Hidden, hide
 from twin.diagnose.report_page import summary_lines, write_report
+from twin.inject.hide import hide
+from twin.inject.request import When
 from twin.logs.read import read_run
 from twin.logs.write import write_run
 from twin.machine.edit import edited
@@ -87,7 +88,7 @@ rng = np.random.default_rng(SEED)
 off = {p.path: rng.uniform(0.9, 1.1) for p in parameters(machine) if p.nominal}
 other = edited(described, {p.path: off[p.path] * p.nominal for p in parameters(machine) if p.nominal})
 (OUT / "other.toml").write_text(other, encoding="utf-8")
-hide(Hidden("heat_source", "column", f"{HEAT:g} W", signal="pump"), OUT / "other.toml", OUT / "truth")
+hide(OUT / "other.toml", "heat_source", "column", f"{HEAT:g} W", OUT / "truth", When(signal="pump"))
 for path, factor in off.items():
     print(f"{path}: {factor:.3f} of what is declared")
 

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 import pytest
 
-from tests.support.scripts import load_script
+from models.scripts import load_script
 from twin.build.simulate import Noise, simulate_run
 from twin.calibrate.update.live import read_gains, read_state, write_live
 from twin.calibrate.update.methods import Options, learnt, update_run

@@ -11,11 +11,11 @@ from tests.diagnose import small_case
 from twin.cli.main import run
 from twin.diagnose.batch import best, prepared
 from twin.diagnose.catalogue import FAMILIES, explained, family, with_own
-from twin.diagnose.edits import EDITS
 from twin.diagnose.hypotheses import Context
 from twin.diagnose.report_catalogue import BEGIN, END, catalogue_table, renewed
 from twin.diagnose.whiten import Projector
 from twin.errors import TwinError
+from twin.machine.effects.edits import EDITS
 
 PAGE = Path(__file__).parents[2] / "docs" / "diagnosis.md"
 

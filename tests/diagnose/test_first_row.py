@@ -11,10 +11,11 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.damage import Damage, damaged
 from twin.diagnose.gain import _read
 from twin.diagnose.readings import late, play, readings_of
 from twin.diagnose.study import Study, make_study
+from twin.inject.damage.channels import Damage
+from twin.inject.damage.kinds import damaged
 from twin.logs.run import Run
 
 SIZE = 4e-6  # m

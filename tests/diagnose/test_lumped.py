@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from twin.build.places import places_of, with_places
 from twin.cli.main import run as command
-from twin.diagnose.places import places_of, with_places
 from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact
 

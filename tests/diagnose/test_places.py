@@ -7,10 +7,10 @@ import pytest
 
 from tests.diagnose import small_case
 from tests.support.descriptions import SLIDE
+from twin.build.acting import Acting, with_acting
 from twin.build.full_model import assemble
+from twin.build.places import GHOST, PREFIX, places_of, pruned, with_ghosts, with_places
 from twin.build.stepper import CoupledStepper, sensor_temperatures
-from twin.diagnose.acting import Acting, with_acting
-from twin.diagnose.places import GHOST, PREFIX, places_of, pruned, with_ghosts, with_places
 from twin.logs.read import read_run
 from twin.logs.signals import signal_values
 from twin.machine.load import load_machine

@@ -8,8 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from tests.hidden.load import MODEL
-from tests.hidden.trials import TRIALS, trial
+from tests.hidden.trials import MODEL, STATES, trial
 from twin.build.cache import folder
 from twin.build.project import orthonormalise, project
 from twin.calibrate.fit.measured import measured
@@ -45,7 +44,7 @@ class Said:
 def yardstick(settings: Settings = SETTINGS) -> Yardstick:
     """Of the nominal machine on the loads of the trials; minutes on two cores, then in the cache folder."""
     machine = load_machine(MODEL)
-    runs, _ = trial("null_0")
+    runs = trial("null_0").runs
     folder().mkdir(parents=True, exist_ok=True)
     with (folder() / "yardstick.lock").open("w") as lock:  # one process makes it, the others wait
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -54,7 +53,7 @@ def yardstick(settings: Settings = SETTINGS) -> Yardstick:
 
 def said(settings: Settings, name: str) -> Said:
     """The diagnosis of a trial."""
-    runs, _expected = trial(name)
+    runs = trial(name).runs
     if name in OWN:
         yard = prepare(None, load_machine(MODEL), runs[:2], runs[2:], settings)[2]
     else:
@@ -67,7 +66,7 @@ def said(settings: Settings, name: str) -> Said:
     ]
     found = search(yard, measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
-    if states := TRIALS[name].states:
+    if states := STATES.get(name):
         blamed = coarse_model(_few(yard, states), study, settings.temperature_sigma, settings.tcp_sigma)
         verdict, causes = with_faults(verdict, causes, [] if blamed is None else [blamed], "named")
     unknown = unknown_of(found)

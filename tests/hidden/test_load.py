@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.hidden.load import MODEL, RESOLUTION, RUNS, TCP_RESOLUTION, TRUTH, Truth, load, measured, names, plan
-from tests.hidden.load import read as read_truths
-from tests.hidden.load import write as write_truths
-from tests.support.scripts import load_script
+from models.scripts import load_script
+from tests.hidden.trials import EXPERIMENT, MODEL, TRUTH
+from twin.inject.experiment import RUNS, plan
+from twin.inject.stored.files import RESOLUTION, TCP_RESOLUTION, Truth, measured
+from twin.inject.stored.files import read as read_truths
+from twin.inject.stored.files import write as write_truths
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 
@@ -86,8 +88,9 @@ def test_the_script_writes_the_loads(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def test_what_is_stored_comes_back(tmp_path: Path):
     truths = [made_up(run, k) for k, run in enumerate(RUNS)]
-    path = write_truths("trial", truths, {"family": "film_gain", "amplitude": 1.5}, tmp_path)
-    found, about = read_truths("trial", tmp_path)
+    path = tmp_path / "new" / "trial.npz"
+    write_truths(path, truths, {"family": "film_gain", "amplitude": 1.5})
+    found, about = read_truths(EXPERIMENT, path)
     assert about == {"family": "film_gain", "amplitude": 1.5}
     for one, other in zip(truths, found, strict=True):
         assert other.run == one.run
@@ -103,12 +106,12 @@ def test_what_does_not_fit_is_refused(tmp_path: Path):
     truth = made_up(RUNS[0], 1)
     for lost in (np.nan, 1e-3):  # m
         with pytest.raises(ValueError, match="machine tool"):
-            write_truths("trial", [replace(truth, tcp=truth.tcp + lost)], {}, tmp_path)
+            write_truths(tmp_path / "trial.npz", [replace(truth, tcp=truth.tcp + lost)], {})
 
 
 def test_noise_is_drawn_by_seed_and_run():
     truth = made_up(RUNS[0], 3)
-    one, same, other = measured(truth, 1), measured(truth, 1), measured(truth, 2)
+    one, same, other = (measured(EXPERIMENT, truth, seed) for seed in (1, 1, 2))
     assert one.temperatures is not None
     assert same.temperatures is not None
     assert other.temperatures is not None
@@ -120,10 +123,11 @@ def test_noise_is_drawn_by_seed_and_run():
     assert (one.tcp.displacement - truth.tcp).std() == pytest.approx(1e-6, rel=0.15)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", sorted(path.stem for path in TRUTH.glob("*.npz")))
 def test_a_stored_trial_is_small_and_has_the_sensors_of_the_machine(name: str):
     assert (TRUTH / f"{name}.npz").stat().st_size < LARGEST
-    runs, about = load(name)
+    truths, about = read_truths(EXPERIMENT, TRUTH / f"{name}.npz")
+    runs = [measured(EXPERIMENT, truth, 0) for truth in truths]
     assert [run.folder.name for run in runs] == list(RUNS)
     assert "seed" in about
     for run in runs:

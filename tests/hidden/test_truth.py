@@ -5,20 +5,27 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.hidden_truth import ASIDE, FILMS, OFF, _felt, other_parameters, other_text
-from tests.hidden.load import MODEL
+from tests.hidden.trials import EXPERIMENT, MODEL
+from twin.build.full_model import assemble
+from twin.build.simulate import simulate
+from twin.inject.experiment import NOISE, START, STEP, TCP_NOISE
+from twin.inject.truth.other_films import FILMS
+from twin.inject.truth.other_machine import ASIDE, OFF, other_parameters, other_text
+from twin.inject.truth.side_by_side import driven, felt_run, truths_of
 from twin.logs.read import read_run
+from twin.logs.signals import signal_values
 from twin.machine.load import load_machine
+from twin.rom.drive import evaluate
 
 
 @pytest.fixture(scope="module")
 def pair():
-    return load_machine(MODEL / "machine.toml"), load_machine(MODEL / "machine.toml", other_text(4))
+    return load_machine(MODEL / "machine.toml"), load_machine(MODEL / "machine.toml", other_text(EXPERIMENT, 4))
 
 
 def test_a_seed_gives_one_machine():
-    assert other_text(4) == other_text(4)
-    assert other_text(4) != other_text(5)
+    assert other_text(EXPERIMENT, 4) == other_text(EXPERIMENT, 4)
+    assert other_text(EXPERIMENT, 4) != other_text(EXPERIMENT, 5)
 
 
 def test_names_and_wiring_are_those_of_the_shipped_machine(pair):
@@ -51,7 +58,7 @@ def test_sensors_sit_some_millimetres_aside(pair):
 
 def test_parameters_are_off_by_their_half_widths():
     factors: dict[str, list[float]] = {kind: [] for kind in OFF}
-    for p, value in other_parameters(4).values():
+    for p, value in other_parameters(EXPERIMENT, 4).values():
         if p.kind in OFF:
             gain = FILMS[p.path.split(".")[1]].gain if p.kind == "film" else 1.0
             factors[p.kind].append(value / p.nominal / gain)
@@ -64,12 +71,33 @@ def test_parameters_are_off_by_their_half_widths():
 def test_work_before_the_start_and_what_is_not_logged():
     run = read_run(MODEL / "runs" / "diagnosis_1")
     extra = {"hidden_1": np.linspace(0.0, 1.0, len(run.loads.time))}
-    felt, ahead = _felt(run, extra, 1.5)
+    felt, ahead = felt_run(run, extra, 1.5)
     assert ahead == 5400.0
     assert np.all(np.diff(felt.loads.time) == 60.0)
     assert felt.loads.units["hidden_1"] == "1"
     np.testing.assert_array_equal(felt.loads.columns["hidden_1"][90:], extra["hidden_1"])
     np.testing.assert_array_equal(felt.loads.columns["x_speed"][:90], run.loads.columns["x_speed"][:90])
-    same, late = _felt(run, {}, 0.0)
+    same, late = felt_run(run, {}, 0.0)
     assert late == 0.0
     np.testing.assert_array_equal(same.loads.time, run.loads.time)
+
+
+@pytest.mark.slow
+def test_runs_side_by_side_are_those_one_after_the_other():
+    """A minute is one step of second order there; against eight Euler steps, on the shipped mesh."""
+    full, steps = assemble(EXPERIMENT.machine), 35
+    several = [driven(full, run, {}) for run in EXPERIMENT.runs[1:]]
+    (found,) = truths_of([full], several, steps)
+    load = full.thermal.load_model
+    for truth, one, run in zip(found, several, EXPERIMENT.runs[1:], strict=True):
+        drive = evaluate(load, run.loads.time, signal_values(run, load.signals), STEP, steps)
+        rows = one.when <= drive.time[-1]
+        assert rows.any()
+        wanted = simulate(full, drive, one.when[rows], one.where[rows], START, 8)
+        assert truth.sensors == wanted.sensors
+        np.testing.assert_allclose(truth.time, wanted.time)
+        error = truth.temperatures - wanted.temperatures
+        assert np.sqrt((error**2).mean(axis=0)).max() < NOISE  # of the sensor that sees the spindle start
+        assert np.sqrt((error**2).mean()) < 0.25 * NOISE
+        assert np.ptp(wanted.temperatures) > 2.0
+        np.testing.assert_allclose(truth.tcp[rows], wanted.tcp, atol=TCP_NOISE)

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.support.scripts import load_script
+from models.scripts import load_script
 from twin.build.full_model import FullModel
 from twin.build.pipeline import BuildOptions, full_model
 from twin.build.product import build_artefact

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.scripts import load_script
+from models.scripts import load_script
 from twin.build.full_model import FullModel
 from twin.build.pipeline import full_model
 from twin.build.pose_study import study_grids

@@ -12,7 +12,7 @@ import meshio
 import numpy as np
 import pytest
 
-from tests.support.scripts import load_script
+from models.scripts import load_script
 from twin.build.check_meshes import check_meshes
 from twin.build.simulate import simulate_run
 from twin.calibrate.transfer_function.model import TransferFunction

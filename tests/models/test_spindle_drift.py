@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.measured import VARIABLE, measured_data
-from tests.support.scripts import load_script
+from models.measured import VARIABLE, measured_data
+from models.scripts import load_script
 from twin.calibrate.score.compare import channels
 from twin.cli.main import run
 from twin.logs.read import read_run

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.scripts import load_script
+from models.scripts import load_script
 from twin.build.mesh import load_body_meshes
 from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.build.thermal import assemble_thermal

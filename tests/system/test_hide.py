@@ -10,10 +10,10 @@ import pytest
 
 from tests.support.descriptions import MACHINES, SLIDE
 from twin.cli.main import run
-from twin.diagnose.hide import with_files
 from twin.logs.read import read_run
 from twin.logs.run import Table, Tcp
 from twin.logs.write import write_run
+from twin.machine.copy import with_files
 from twin.machine.extend import removed
 from twin.machine.load import load_machine
 

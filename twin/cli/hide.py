@@ -2,7 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Any
+
 import click
+
+if TYPE_CHECKING:
+    from twin.inject.request import When
+
+
+def _with_when(command: Callable[..., None]) -> Callable[..., None]:
+    """The options that say when something acts as one argument, `when`."""
+
+    @wraps(command)
+    def called(
+        history: str, signal: str, exponent: float, start: str | None, end: str | None, **others: Any
+    ) -> None:  # fmt: skip
+        from twin.cli.quantity import option
+        from twin.inject.request import When
+
+        first, last = (None if t is None else option(n, t, "s") for n, t in (("--from", start), ("--to", end)))
+        command(when=When(history, signal, exponent, first, last), **others)
+
+    return called
 
 
 @click.command(
@@ -24,37 +47,27 @@ import click
     "--setting", multiple=True, metavar="NAME=VALUE", help="what a family needs besides: temperature='15 degC'"
 )
 @click.option("--run", "runs", multiple=True, type=click.Path(), help="run that gets the switch; repeat it")
+@_with_when
 def command(
-    family: str, place: str, size: str, target: str, output: str, history: str, signal: str, exponent: float,
-    start: str | None, end: str | None, setting: tuple[str, ...], runs: tuple[str, ...],
+    family: str, place: str, size: str, target: str, output: str, when: When, setting: tuple[str, ...],
+    runs: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Hide an effect of SIZE ('10 W', '0.6 K', '3') at PLACE in a copy of a machine, or of a log.
 
-    FAMILY is one of `twin diagnose`. A machine's copy is a truth for `twin simulate`; sensor, signal, slip,
-    measurement, initial_state and not_thermal damage the copy of a run folder. hidden.json says what was hidden.
+    FAMILY is one of `twin diagnose`. `twin simulate` of a machine's copy is an experiment with a hidden effect; sensor,
+    signal, slip, measurement, initial_state and not_thermal damage the copy of a run folder. hidden.json says what was
+    hidden.
     """
     from pathlib import Path
 
-    from twin.cli.quantity import option
-    from twin.diagnose.hide import Hidden, hide
     from twin.errors import TwinError
+    from twin.inject.hide import hide
 
     settings = dict(s.partition("=")[::2] for s in setting)
     if unset := [s for s in setting if "=" not in s]:
         raise TwinError(f"'{unset[0]}' has no value", "--setting", "write it like --setting temperature='15 degC'")
-    asked = Hidden(
-        family=family,
-        place=place,
-        size=size,
-        history=history,
-        signal=signal,
-        exponent=exponent,
-        start=None if start is None else option("--from", start, "s"),
-        end=None if end is None else option("--to", end, "s"),
-        settings=settings,
-    )
     names = [Path(run).resolve().name for run in runs]
     if twice := sorted({n for n in names if names.count(n) > 1}):
         raise TwinError(f"two runs are called '{twice[0]}'", "--run", "rename a folder: copies keep these names")
-    for line in hide(asked, Path(target), Path(output), [Path(run) for run in runs]):
+    for line in hide(target, family, place, size, output, when, settings, runs):
         click.echo(line)

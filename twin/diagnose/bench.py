@@ -16,13 +16,13 @@ import numpy as np
 from twin.build.cache import cached, machine_hash
 from twin.build.full_model import FullModel, assemble
 from twin.build.pipeline import theta_bounds
+from twin.build.place_training import Shared, snapshots
+from twin.build.places import GHOST, Place, places_of, pruned, with_ghosts, with_places
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
 from twin.diagnose.march import INNER, NestedLoads, loads_for
-from twin.diagnose.places import GHOST, Place, places_of, pruned, with_ghosts, with_places
-from twin.diagnose.training import Shared, snapshots
 from twin.errors import LogError
 from twin.logs.run import Run
 from twin.logs.signals import signal_values

@@ -10,20 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from twin.machine.effects.effect import Window
+
 Verdict = Literal["named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing"]
 VERDICTS: tuple[Verdict, ...] = (
     "named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Window:
-    """A stretch of a run in which a cause acts, and how strongly: several make a history."""
-
-    run: str
-    start: float  # s
-    end: float  # s
-    level: float = 1.0  # times the amplitude
 
 
 @dataclass(frozen=True)

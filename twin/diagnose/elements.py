@@ -23,9 +23,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twin.build.places import beside
 from twin.diagnose.bank import Column, Nominal
 from twin.diagnose.march import INNER, gammas
-from twin.diagnose.places import beside
 from twin.diagnose.study import Study
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place

@@ -18,15 +18,16 @@ from twin.build.product import build_artefact
 from twin.calibrate.fit.problem import run_names
 from twin.diagnose.diagnose import Result
 from twin.diagnose.diagnosis import Cause, Diagnosis, Window
-from twin.diagnose.edits import extended_description, loads_with
-from twin.diagnose.hide import with_files
 from twin.diagnose.report_page import write_report
 from twin.diagnose.study import Study
 from twin.errors import TwinError
 from twin.logs.run import Run
 from twin.logs.write import write_run
+from twin.machine.copy import with_files
 from twin.machine.description import Machine
 from twin.machine.edit import edited
+from twin.machine.effects.edits import extended_description, loads_with
+from twin.machine.effects.effect import Effect
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 
@@ -158,11 +159,11 @@ def _write_description(
     return parameters, said
 
 
-def _as_edited(cause: Cause, study: Study) -> Cause:
-    """A cause with sizes and settings as descriptions take them (`twin.diagnose.edits`)."""
+def _as_edited(cause: Cause, study: Study) -> Effect:
+    """A cause as descriptions take it (`twin.machine.effects.edits`)."""
     bench = study.bench
     settings = dict(cause.settings)
-    amplitude, unit = cause.amplitude, cause.unit
+    amplitude = cause.amplitude
     if cause.family == "forced_convection":
         amplitude = amplitude / float(settings.pop("reference", 1.0)) ** cause.exponent  # at 1 m/s
     if cause.place.startswith("films.") and cause.family == "forced_convection":
@@ -181,4 +182,6 @@ def _as_edited(cause: Cause, study: Study) -> Cause:
     place = cause.place.removesuffix(".expansion") if cause.family == "expansion" else cause.place
     if cause.family == "scale_expansion":
         place = f"axes.{cause.place.removeprefix('axes.')}"
-    return replace(cause, amplitude=amplitude, unit=unit, settings=settings, place=place)
+    return Effect(
+        cause.family, place, amplitude, cause.unit, cause.history, cause.signal, cause.exponent, cause.windows, settings
+    )

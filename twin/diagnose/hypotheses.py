@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.build.places import Place
 from twin.diagnose import bells
 from twin.diagnose.batch import Batch, History
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.elements import Elements
-from twin.diagnose.places import Place
 from twin.diagnose.study import Study
 
 HOUR = 3600.0  # s

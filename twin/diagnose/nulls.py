@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.build.places import beside
 from twin.diagnose.elements import heated_places, own_place
 from twin.diagnose.march import INNER
-from twin.diagnose.places import beside
 from twin.diagnose.slots import Slots
 from twin.diagnose.study import Study
 from twin.run.system import Array

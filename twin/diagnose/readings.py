@@ -24,6 +24,7 @@ from scipy.signal import lfilter
 from twin.diagnose.bank import Nominal
 from twin.diagnose.elements import Key
 from twin.diagnose.study import Planned, Study
+from twin.physics.play import play as follower
 from twin.rom.apply import member_mean
 
 Add = Callable[[Key, Sequence[np.ndarray]], None]  # a column in parts, one per fitted run
@@ -277,8 +278,4 @@ def _play(plan: Planned, nominal: Nominal, c: int, width: float = WIDTH) -> np.n
         return np.zeros(0)
     row = np.asarray(plan.rows.row)[:, c].mean(axis=0)
     w = nominal.states @ row
-    lagging, at = np.zeros_like(w), w[0]
-    for i, value in enumerate(w):
-        at = min(max(at, value - width / 2), value + width / 2)
-        lagging[i] = (at - value) / width
-    return lagging[np.asarray(plan.rows.step)]
+    return ((follower(w, width) - w) / width)[np.asarray(plan.rows.step)]

@@ -1,0 +1,1 @@
+"""Faults of logs: what sensors, signals, clocks and measurements of the tool get wrong."""

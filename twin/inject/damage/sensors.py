@@ -1,0 +1,67 @@
+"""Faults of a temperature sensor: what its column of temperatures.csv shows then."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from twin.errors import LogError
+from twin.inject.damage.channels import Damage, acts, column_at, grown, sensor_of, with_sensors
+from twin.logs.run import Run
+
+
+def offset(run: Run, d: Damage) -> Run:
+    """Reads too much by a constant."""
+    table, name = sensor_of(run, d.place)
+    return with_sensors(run, {name: table.columns[name] + d.size * acts(table.time, d)})
+
+
+def drift(run: Run, d: Damage) -> Run:
+    """Drifts in a straight line, by the size from the start of the fault to its end, and stays there."""
+    table, name = sensor_of(run, d.place)
+    return with_sensors(run, {name: table.columns[name] + d.size * grown(table.time, d)})
+
+
+def lag(run: Run, d: Damage) -> Run:
+    """Follows with a time constant of the size [s]: a sensor in a thick well."""
+    table, name = sensor_of(run, d.place)
+    values = np.array(table.columns[name], dtype=float)
+    last = -1
+    for i in np.flatnonzero(acts(table.time, d) & np.isfinite(values)).tolist():
+        if last >= 0:
+            keep = math.exp(-(table.time[i] - table.time[last]) / d.size)
+            values[i] = keep * values[last] + (1.0 - keep) * values[i]
+        last = i
+    return with_sensors(run, {name: values})
+
+
+def detached(run: Run, d: Damage) -> Run:
+    """Shows its surroundings, a column of either table, by a share: it has come off."""
+    table, name = sensor_of(run, d.place)
+    if not 0.0 < d.size <= 1.0:
+        raise LogError(f"a share of {d.size:g}", d.place, "give the share of the surroundings in what it shows: 0.5")
+    share = d.size * acts(table.time, d)
+    return with_sensors(run, {name: (1.0 - share) * table.columns[name] + share * column_at(run, d.signal, table.time)})
+
+
+def stuck(run: Run, d: Damage) -> Run:
+    """Keeps the value that it has at the start of the fault, for the size [s]."""
+    table, name = sensor_of(run, d.place)
+    values = np.array(table.columns[name], dtype=float)
+    first = table.time[0] if d.start == -math.inf else d.start
+    kept = (table.time >= first) & (table.time < min(first + d.size, d.end))
+    if kept.any():
+        values[kept] = values[np.flatnonzero(kept)[0]]
+    return with_sensors(run, {name: values})
+
+
+def swapped(run: Run, d: Damage) -> Run:
+    """Two sensors with each other's names."""
+    table, name = sensor_of(run, d.place)
+    _, other = sensor_of(run, d.other)
+    if other == name:
+        raise LogError("a sensor is swapped with itself", d.place, "name another sensor")
+    during = acts(table.time, d)
+    a, b = table.columns[name], table.columns[other]
+    return with_sensors(run, {name: np.where(during, b, a), other: np.where(during, a, b)})

@@ -1,0 +1,1 @@
+"""Trials that are kept: how each is made, and the files that hold their truths."""
