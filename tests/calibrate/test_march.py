@@ -53,7 +53,7 @@ def test_equals_the_runtime(case, spread):
     assert np.abs(got - wanted).max() < (1e-9 if made.model.n == a.model.n else 2e-4) * size
 
 
-def test_derivatives(case):
+def test_derivatives_are_those_of_differences(case):
     """Against differences of the outputs, with every kind of parameter; laws are tables with kinks, hence 1e-3."""
     _, made = case
     x = 0.3 * np.random.default_rng(5).standard_normal(len(made.scale))

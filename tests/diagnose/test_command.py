@@ -45,7 +45,7 @@ def refused(arguments, capsys):
     return told.err
 
 
-def test_nothing_to_diagnose(capsys):
+def test_nothing_to_diagnose_is_refused(capsys):
     assert "an artefact and measured runs are needed" in refused([], capsys)
 
 

@@ -19,7 +19,7 @@ from twin.diagnose.diagnosis import Window
 from twin.diagnose.search import _leaking, _restless, refit, search
 from twin.diagnose.search_declared import declared_candidates
 from twin.diagnose.search_look import look
-from twin.diagnose.search_strained import closed, strained
+from twin.diagnose.search_strained import _weak, closed, strained
 from twin.diagnose.settled import settled
 from twin.diagnose.verdict import verdict_of
 
@@ -100,6 +100,18 @@ def test_a_second_cause_explains_more_than_the_first_ones_misfits(monkeypatch):
 
     assert families(10.0) == ["heat_source", "sensor"]
     assert families(1000.0) == ["heat_source"]
+
+
+def test_what_is_named_beside_another_cause_is_well_above_its_threshold():
+    yard = small_case.yardstick()
+    h = in_windows(1).hypothesis
+
+    def weak(times: float, misfits: float = 0.0) -> bool:
+        return _weak(yard, [replace(h, statistic=times * yard.thresholds[h.family])], misfits)
+
+    assert weak(1.3)
+    assert not weak(10.0)
+    assert weak(10.0, misfits=11.0 * yard.thresholds[h.family])  # of the other one
 
 
 @pytest.mark.parametrize("stays", [True, False])

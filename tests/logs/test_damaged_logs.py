@@ -366,7 +366,7 @@ def insert(data: bytearray, k: int, rng: Rng) -> None:
 
 
 @pytest.mark.parametrize("how", [flip, overwrite, digit, delete, insert])
-def test_one_random_byte(tmp_path, how):
+def test_one_random_byte_is_told_or_harmless(tmp_path, how):
     """What stays silent is one cell with a plausible number, within three spreads of its column: docs/run_folder.md."""
     outcomes: Counter[str] = Counter()
     for seed in range(RANDOM_SEEDS):

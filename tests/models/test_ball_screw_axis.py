@@ -142,7 +142,7 @@ def test_radial_flow_in_a_disc():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DESCRIPTIONS)
-def test_interface(name, built):
+def test_every_variant_has_the_same_interface(name, built):
     """Same inputs, same outputs, same units, same flags; `twin run` on the same folder; heat balance to 1e-8."""
     mine = built(name)
     load = mine.artefact.model.load_model
