@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from inspect import signature
 
 from tests.support.descriptions import SLIDE
@@ -15,7 +14,7 @@ def test_every_contact_is_lost_in_some_draws_and_all_else_stays_near_its_prior()
     known = {p.path: p for p in parameters(load_machine(SLIDE))}
     contacts = {path for path, p in known.items() if p.kind in ("joint", "contact")}
     assert contacts
-    lost: Counter[str] = Counter()
+    lost = set[str]()
     for seed in range(1, signature(snapshots).parameters["draws"].default + 1):
         values = values_of(tuple(known.values()), seed)
         assert set(values) == set(known)
@@ -24,6 +23,5 @@ def test_every_contact_is_lost_in_some_draws_and_all_else_stays_near_its_prior()
         assert len(gone) < len(contacts)
         for path in set(known) - gone:
             assert known[path].low <= values[path] <= known[path].high
-    assert set(lost) == contacts
-    assert min(lost.values()) >= 2
+    assert lost == contacts
     assert values_of(tuple(known.values()), 0) == {}
