@@ -73,7 +73,7 @@ def test_of_an_adiabatic_surface(tmp_path):
     assert area == pytest.approx(0.06 * 0.06, rel=1e-9)
 
 
-def test_of_a_node(tmp_path):
+def test_an_additional_film_of_a_node_adds_to_the_first(tmp_path):
     """The other film of the bed has no area of its own either: both act on all of it."""
     start = "[films.moving]"
     more = film("draught", '["bed", "screw"]', 5.0, "additional = true") + start

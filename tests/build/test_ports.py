@@ -80,7 +80,7 @@ def test_rails_on_the_moving_side_see_their_pads_run_backwards(position: float):
     assert abs(on_rail[0] - T[pair.pad_port]) < 1e-10
 
 
-def test_averages_and_spreads():
+def test_averages_of_ports_sum_to_one():
     for body in BODIES:
         P, numbers = port_averages(body, PORTS)
         np.testing.assert_allclose(P.sum(axis=0), 1.0, rtol=1e-13)

@@ -45,7 +45,7 @@ def test_sensors_far_away_are_refused():
     assert e.value.problems[0].where == "sensors.bed.position"
 
 
-def test_curved_elements():
+def test_points_in_curved_elements_are_found():
     ball = MeshTet2.init_ball(nrefs=2)
     part = part_mesh("ball", ball, {"all": ball.boundary_facets()})
     rng = np.random.default_rng(3)

@@ -79,7 +79,7 @@ def test_the_reference_and_the_volume_have_it(machine, full):
             assert told.scale == pytest.approx(wanted, rel=1e-9)
 
 
-def test_reduced_model(machine, full, plain):
+def test_scales_of_the_reduced_model_are_those_of_the_full(machine, full, plain):
     """Equal to the full one at every pose of the grid and between them, within what a build is allowed."""
     reduced = rich_model(machine, full, RichOptions(samples=6))
     drive = draw(reduced.load_model, 5, hours=1.0).drive

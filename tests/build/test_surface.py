@@ -89,7 +89,7 @@ def test_mass_integrates_products():
     assert abs(M - M.T).max() < 1e-18
 
 
-def test_curved_facets():
+def test_curved_facets_have_the_area_of_the_ball():
     ball = MeshTet2.init_ball(nrefs=2)
     part = part_mesh("ball", ball, {"all": ball.boundary_facets()})
     facets = part.facets("all")

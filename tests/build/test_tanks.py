@@ -43,7 +43,7 @@ def models(machine, full) -> dict[str, MachineModel]:
     return {"full": full.thermal, "reduced": rich_model(machine, full, RichOptions(samples=6))}
 
 
-def test_matrices(full):
+def test_matrices_stay_symmetric_and_conserve_heat(full):
     for body, name, capacity, conductance in zip(
         full.thermal.bodies, ("oil", "workpiece"), (5e4, 2e3), (10.0, 25.0), strict=True
     ):
@@ -76,7 +76,7 @@ def test_what_it_takes_leaves_its_surface_evenly(machine, full, tmp_path, monkey
 
 
 @pytest.mark.parametrize("kind", ["full", "reduced"])
-def test_heat_balance(models, kind):
+def test_heat_is_conserved(models, kind):
     model = models[kind]
     stepper = CoupledStepper(model)
     drive = draw(model.load_model, 3, hours=0.5).drive
@@ -115,7 +115,7 @@ def slowest(body, theta) -> float:
     return float(scipy.sparse.linalg.eigsh(A.tocsc(), 1, body.E.tocsc(), sigma=0.0, return_eigenvectors=False)[0])
 
 
-def test_slow_pole(tmp_path, models):
+def test_a_slow_tank_decays_at_its_own_rate(tmp_path, models):
     """A tank much slower than its bed decays with its own capacity and the resistance to the air."""
     described = edited(tmp_path, (BEFORE, OIL.replace("50 kJ/K", "5 MJ/K") + BEFORE))
     slow = load_machine(described)

@@ -126,7 +126,7 @@ def test_sources_ports_and_sensors_are_numbered_as_in_the_machine(model: Machine
     assert bed.G.shape == (0, 3, bed.n)
 
 
-def test_poses(model: MachineModel):
+def test_poses_span_the_stroke(model: MachineModel):
     assert model.pose_axes == ("x",)
     np.testing.assert_allclose(model.poses, np.linspace(-0.2, 0.2, 5)[:, None], atol=1e-16)
 

@@ -414,7 +414,7 @@ OF_Z = {"EXZ", "EYZ", "EZZ", "EAZ", "EBZ", "ECZ", "B0Z", "A0Z"}
         (STANDS, TURN + SWEEP, (17, 17), (16, 14), set()),
     ],
 )
-def test_ranks_of_plans(balls, angles, known, unknown, never):
+def test_plans_determine_as_many_errors_as_documented(balls, angles, known, unknown, never):
     """The table of docs/axis_errors.md: rank and number of determined errors, places of the balls known and not."""
     turned = Rotation.from_euler("YZ", np.array(angles), degrees=True)
     ball = np.repeat(np.arange(len(balls)), len(angles))

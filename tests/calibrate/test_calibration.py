@@ -70,7 +70,7 @@ def test_the_fitted_artefact_predicts_another_run_of_the_truth(case, parameters)
     assert errors[1] < 0.1 * errors[0]
 
 
-def test_stops_and_bounds(parameters):
+def test_a_fit_stops_where_told_and_stays_within_bounds(parameters):
     run = lumped_case.truth(planted(parameters, 2)[1], 2)
     narrow = tuple(replace(p, low=p.value(-0.3), high=p.value(0.3)) if p.kind == "source" else p for p in parameters)
     made = problem(lumped_case.artefact(), [run], narrow, OPTIONS)
@@ -146,7 +146,7 @@ def test_a_film_and_a_source_at_rest_are_not_separable_and_an_experiment_would()
     assert best.sigma_after < best.sigma_before
 
 
-def test_choice_of_parameters():
+def test_held_and_unmeasured_parameters_are_not_fitted():
     a = lumped_case.artefact()
     assert {p.kind for p in chosen(a, hold=("contacts.*",))} >= {"source", "film"}
     assert not any(p.kind in ("joint", "contact") for p in chosen(a, hold=("contacts.*",)))

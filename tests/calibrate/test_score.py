@@ -77,7 +77,7 @@ def figure(found, part, run, segment, output, method):
     return entry.figures
 
 
-def test_temperatures(found):
+def test_temperatures_are_scored_against_holding_the_first(found):
     off, right = figure(found, "scored", "", "", "T01", MODEL), figure(found, "scored", "", "", "T02", MODEL)
     assert off.max_abs == pytest.approx(OFFSET)
     assert right.rms < 1e-9
@@ -106,7 +106,7 @@ def test_tcp_share_and_parts(found, runs):
     assert one.outside_segments == np.sum(runs[0].tcp.time > 8000.0)
 
 
-def test_baselines_stand_beside(found):
+def test_the_difference_is_to_the_best_baseline(found):
     for part in ("scored", "sealed"):
         rms = {m: figure(found, part, "", "", VECTOR, m).rms for m in ("zero", "hold last", "regression", "ARX", "OE")}
         assert min(rms, key=rms.get) == found.best[part]

@@ -45,12 +45,12 @@ def test_table_2_has_the_paper_s_gain_poles_and_zero(table_2):
 @pytest.mark.parametrize(
     ("time", "response"), [(60, -0.767), (600, -5.621), (1800, -10.320), (3600, -13.017), (7200, -15.221)]
 )
-def test_step_anchors(table_2, time, response):
+def test_step_responses_are_those_of_the_paper(table_2, time, response):
     assert table_2.step_response(7201)[time] == pytest.approx(response, abs=6e-4)
     assert table_2.simulate(np.ones(7201))[time] == pytest.approx(response, abs=6e-4)
 
 
-def test_rise_times(table_2):
+def test_rise_times_are_those_of_the_paper(table_2):
     assert table_2.rise_time(1.0 - np.exp(-1.0)) == pytest.approx(1848.0, abs=1.0)
     assert table_2.rise_time(0.95) == pytest.approx(8792.0, abs=1.0)
 

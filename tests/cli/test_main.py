@@ -70,13 +70,13 @@ def test_traceback_on_demand(failing, capsys):
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_interrupt(failing, capsys):
+def test_an_interrupt_leaves_nothing_half_written(failing, capsys):
     failing(KeyboardInterrupt())
     assert main.run(["info"]) == 130
     assert "interrupted, nothing half-written" in capsys.readouterr().err
 
 
-def test_full_disk(failing, capsys):
+def test_a_full_disk_is_told_with_its_remedy(failing, capsys):
     failing(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "A.h5"))
     assert main.run(["info"]) == 2
     assert capsys.readouterr().err == (

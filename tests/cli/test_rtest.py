@@ -39,7 +39,7 @@ def refused(capsys, *arguments: object) -> str:
     return err
 
 
-def test_table(folder, capsys):
+def test_the_table_tells_what_is_determined(folder, capsys):
     out = told(capsys, folder, "--chain", CHAIN)
     assert out.count("15 of 21 determined, rank 15; hidden: EBX, EXY, EZY, EAY, EBY, ECY") == 3
     assert out.count("as the noise allows") == 3
@@ -131,7 +131,7 @@ def test_model_beside_the_measurement(folder, capsys, tmp_path):
         (("--artefact", "nowhere.h5"), "nowhere.h5"),
     ],
 )
-def test_refusals(options, what, folder, capsys):
+def test_wrong_options_are_refused(options, what, folder, capsys):
     assert what in refused(capsys, folder, *options)
 
 

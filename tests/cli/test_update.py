@@ -55,7 +55,7 @@ def test_writes_what_it_found(slide_artefact, measured, tmp_path, method):
         assert [g["axis"] for g in told["rejected_tcp"]] == ["dy"]
 
 
-def test_tells_people(slide_artefact, measured):
+def test_the_summary_compares_with_hold_last(slide_artefact, measured):
     done = invoke(slide_artefact, measured, "--method", "gain", "--interval", "10 min")
     assert done.exit_code == 0, done.output
     assert "3 of 6 TCP measurements used" in done.output

@@ -75,7 +75,7 @@ def test_within_the_tolerance_at_the_last_sample_only_is_not_warm(tmp_path, caps
     assert "not reached" in row
 
 
-def test_json(tmp_path, capsys):
+def test_json_tells_when_it_settles(tmp_path, capsys):
     path = result(tmp_path / "result.h5", hours=4.0)
     assert run(["warmup", str(path), "--json", "--tolerance", "2 um"]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -94,7 +94,7 @@ def test_a_tighter_horizon_settles_a_drift(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["sensors"]["bed"]["settled"]  # 0.06 K in 10 min
 
 
-def test_bad_input(tmp_path, capsys):
+def test_bad_input_is_refused(tmp_path, capsys):
     path = result(tmp_path / "result.h5", hours=1.0)
     for arguments, told in (
         ([str(tmp_path / "nowhere")], "no result here"),

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tests.calibrate import lumped_case
 from tests.diagnose import small_case
 from twin.build.project import orthonormalise, project
-from twin.diagnose.coarse import COARSE, coarse_model
+from twin.diagnose.coarse import coarse_model
+from twin.diagnose.diagnosis import Cause
 from twin.rom.model import MachineModel
 
 NOISE = small_case.NOISE, small_case.TCP_NOISE
@@ -28,12 +30,28 @@ def with_states(model: MachineModel, n: int) -> MachineModel:
 def test_an_artefact_of_too_few_states_is_named():
     cause = coarse_model(with_states(lumped_case.artefact().model, 2), small_case.study(), *NOISE)
     assert cause is not None
-    assert (cause.family, cause.place, cause.threshold) == ("coarse_model", "artefact", COARSE)
+    assert (cause.family, cause.place) == ("coarse_model", "artefact")
+    assert cause.statistic > cause.threshold
     # all its states in other coordinates: what is left are steps in time, at bearings of some seconds
     study = small_case.study()
     looked_at = replace(study, bench=replace(study.bench, reduction=(1e-9, 1e-15)))
     whole = coarse_model(with_states(lumped_case.artefact().model, 1000), looked_at, *NOISE)
     assert cause.statistic > 10.0 * (0.0 if whole is None else whole.statistic)
+
+
+def test_an_artefact_may_differ_by_the_noise_of_a_reading():
+    model, study = with_states(lumped_case.artefact().model, 2), small_case.study()
+    cause = coarse_model(model, study, *NOISE)
+    assert cause is not None
+
+    def at(share: float) -> Cause | None:
+        """With noise of which the model differs by this share."""
+        return coarse_model(model, study, *(sigma * cause.statistic / share for sigma in NOISE))
+
+    twice = at(2.0)
+    assert twice is not None
+    assert twice.statistic == pytest.approx(2.0)
+    assert at(0.5) is None
 
 
 def test_one_of_all_states_is_not():

@@ -18,7 +18,6 @@ from twin.cli.diagnose import command
 from twin.cli.main import run
 from twin.diagnose.diagnose import Result, Settings, diagnose, machine_of
 from twin.diagnose.diagnosis import Cause, Window
-from twin.diagnose.yardstick import FORM, NULLS
 from twin.errors import ArtefactError
 from twin.logs.read import read_run
 from twin.logs.run import Table
@@ -46,7 +45,7 @@ def refused(arguments, capsys):
     return told.err
 
 
-def test_nothing_to_diagnose(capsys):
+def test_nothing_to_diagnose_is_refused(capsys):
     assert "an artefact and measured runs are needed" in refused([], capsys)
 
 
@@ -105,8 +104,8 @@ def test_a_machine_that_has_moved(artefact, tmp_path, capsys):
 
 def test_defaults_are_those_of_the_library():
     options = {p.name: p for p in command.params}
-    assert options["nulls"].default == NULLS
-    assert f"; {FORM} more show errors of form" in options["nulls"].help
+    assert options["nulls"].default == Settings().nulls
+    assert f"; {Settings().form} more show errors of form" in options["nulls"].help
 
 
 def test_a_seed_that_is_none(artefact, tmp_path, capsys):

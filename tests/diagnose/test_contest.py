@@ -13,14 +13,6 @@ from twin.diagnose.accepted import Accepted
 from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.contest import (
-    AMPLITUDE,
-    EDGE,
-    ENTRANTS,
-    FROZEN,
-    HIGH,
-    LOW,
-    TRIAL,
-    WET,
     _liquid,
     _moved,
     beginning,
@@ -34,8 +26,7 @@ from twin.diagnose.contest import (
     worth,
 )
 from twin.diagnose.diagnosis import Window
-from twin.diagnose.growth import GROWTH
-from twin.diagnose.verdict import OWN, cause_of
+from twin.diagnose.verdict import cause_of
 
 
 def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
@@ -50,9 +41,11 @@ def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
 def test_freedom_has_its_price():
     assert worth(hypothesis()) == 100.0
     assert worth(hypothesis(places=10)) == pytest.approx(100.0 - 2.0 * np.log(10.0))
-    assert worth(hypothesis(windows=1)) == 100.0
-    assert worth(hypothesis(windows=3)) == 100.0 - 2.0 * GROWTH
-    assert worth(hypothesis(q=2)) == 100.0 - AMPLITUDE
+    one, two, three = (worth(hypothesis(windows=n)) for n in (1, 2, 3))
+    assert one == 100.0
+    assert one - two == pytest.approx(two - three)
+    assert 4.0 < one - two < 36.0  # more than chance gives, less than a cause
+    assert 2.0 < one - worth(hypothesis(q=2)) < 36.0
 
 
 def test_fitted_edges_and_further_windows_are_no_proof():
@@ -65,8 +58,9 @@ def test_fitted_edges_and_further_windows_are_no_proof():
         return replace(h, when=replace(h.when, windows=own))
 
     assert proof(yard, hypothesis()) == 100.0
-    assert proof(yard, windows(1.0)) == 100.0 - 2 * EDGE
-    assert proof(yard, windows(1.0, 2.0)) == 100.0 - 2 * EDGE - GROWTH
+    one, two = proof(yard, windows(1.0)), proof(yard, windows(1.0, 2.0))
+    assert 2.0 < 100.0 - one < 36.0  # its two edges: more than chance gives, less than a cause
+    assert one - two == pytest.approx(worth(windows(1.0)) - worth(windows(1.0, 2.0)))  # edges of the second included
     reading = replace(windows(1.0), batch=replace(hypothesis().batch, kind="step"))
     assert proof(yard, reading) == 100.0
 
@@ -75,8 +69,10 @@ def test_fitted_edges_and_further_windows_are_no_proof():
 @pytest.mark.parametrize("a", [-0.9, -0.2, 0.0, 3.0])
 def test_conductances_stay_positive(a, step):
     (after,) = _moved(np.array([a]), np.array([step]), True, 0)
-    assert LOW <= after <= HIGH
     assert np.sign(after - a) in (0.0, np.sign(step))
+    for _ in range(100):
+        assert -0.985 < after < 100.0  # beyond the lower one the time integration has no derivative left
+        (after,) = _moved(np.array([after]), np.array([step]), True, 0)
 
 
 def test_a_small_step_of_a_conductance_is_taken_as_it_is():
@@ -107,7 +103,10 @@ def test_what_a_cause_may_be():
     coolant = hypothesis(q=2)
     coolant = replace(coolant, batch=replace(coolant.batch, kind="coolant", family="coolant", smallest=5.0))
     np.testing.assert_array_equal(lowest(yard, coolant), [5.0, -np.inf])
-    assert [p[0] for p in priors(coolant)] == [WET, WET**-2]
+    mean, inverse = priors(coolant)
+    assert 20.0 < mean[0] < 200.0  # W/(m^2 K), of a liquid that runs down a wall
+    assert inverse[0] ** -0.5 == pytest.approx(mean[0])
+    assert (mean[1], inverse[1]) == (0.0, 0.0)  # its heat is left to the data
     sun = hypothesis(q=2)
     assert np.all(lowest(yard, replace(sun, batch=replace(sun.batch, family="sun"))) == 0.0)
     assert np.all(np.isneginf(lowest(yard, sun)))
@@ -145,7 +144,7 @@ def test_no_medium_is_frozen():
     yard = small_case.yardstick()
     h = a_coolant(0, 5.0, -1.0)
     area = next(p.area for p in yard.study.bench.places if p.name == h.name)
-    above = yard.study.bench.base.reference_temperature - FROZEN
+    above = yard.study.bench.base.reference_temperature  # K above 0 degC, at which water freezes
     cold = -10.0 * area * above
     np.testing.assert_allclose(_liquid(yard.study, h, np.array([5.0, cold])), [10.0, cold])
     for kept in ([12.0, cold], [5.0, -cold]):
@@ -157,9 +156,9 @@ def test_no_medium_is_frozen():
 def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
     """A straight line ranks the face behind first; after some passes from its last start the wetted one leads."""
     contest = sys.modules[worth.__module__]
-    behind, wetted = (replace(a_coolant(p, 5.0, -1.0), statistic=s) for p, s in ((0, 1000.0), (1, 700.0)))
+    behind, wetted = (replace(a_coolant(p, 5.0, -1.0), statistic=s) for p, s in ((0, 1000.0), (1, 900.0)))
     cold = replace(wetted, amplitude=(7.0, -2.0))
-    heat = replace(hypothesis(), statistic=900.0)
+    heat = replace(hypothesis(), statistic=850.0)
     passes = []
 
     def exact(yard, y, fitted, h, most):
@@ -168,11 +167,13 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
 
     monkeypatch.setattr(contest, "exact", exact)
     nothing = np.zeros(0)
-    far = replace(wetted, statistic=0.5 * behind.statistic)
+    far = replace(wetted, statistic=0.2 * behind.statistic)
     order = tried(None, nothing, None, [(heat,), (behind,), (wetted, cold), (far,)])
     assert order.pop() == (far,)
-    assert [starts[0].statistic for starts in order] == [1100.0, 950.0, 900.0]
-    assert (order[0][0].amplitude, passes) == (cold.amplitude, [TRIAL, TRIAL])
+    assert [starts[0].statistic for starts in order] == [1100.0, 950.0, 850.0]
+    assert order[0][0].amplitude == cold.amplitude
+    assert len(passes) == 2
+    assert passes[0] == passes[1] > 0  # some, not as many as a refit needs
     heat = replace(heat, statistic=2000.0)
     order = tried(None, nothing, None, [(behind,), (heat,), (wetted, cold)])
     assert order == [(heat,), (behind,), (wetted, cold)]  # as they were
@@ -181,14 +182,14 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
 
 
 def test_a_capacity_further_behind_is_refitted(monkeypatch):
-    """Heat in many windows explains more; a capacity that scores two thirds of it explains as much when refitted."""
+    """Heat in many windows explains more; a capacity that scores three quarters of it may explain as much."""
     contest = sys.modules[worth.__module__]
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
 
     def kind(name: str, statistic: float) -> Hypothesis:
         return replace(bent, batch=replace(bent.batch, kind=name), statistic=statistic)
 
-    heat, tank, film = kind("moved", 328.0), kind("capacity", 226.0), kind("film", 226.0)
+    heat, tank, film = kind("moved", 328.0), kind("capacity", 250.0), kind("film", 250.0)
     monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=h.statistic + 1.0))
     nothing = np.zeros(0)
     proved, others = judged(None, nothing, None, [(heat,), (tank,), (film,)])
@@ -200,11 +201,11 @@ def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
     """One gains 20 % by its edges, as the other would; a refit that finds several times more is not brought back."""
     contest = sys.modules[worth.__module__]
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
-    lead, near, far = (replace(bent, statistic=s) for s in (1000.0, 900.0, 600.0))
+    lead, near, far = (replace(bent, statistic=s) for s in (1000.0, 950.0, 600.0))
     nothing = np.zeros(0)
     monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=1.2 * h.statistic))
     proved, others = judged(None, nothing, None, [(lead,), (near,), (far,)])
-    assert ([h.statistic for h in proved], others) == ([1200.0, 1080.0], [far])
+    assert ([h.statistic for h in proved], others) == ([1200.0, 1140.0], [far])
     monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=5.0 * h.statistic))
     proved, others = judged(None, nothing, None, [(lead,), (near,), (far,)])
     assert ([h.statistic for h in proved], others) == ([5000.0], [near, far])
@@ -213,17 +214,19 @@ def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
 def test_candidates_of_one_kind_do_not_keep_others_out(monkeypatch):
     contest = sys.modules[worth.__module__]
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
-    many = [replace(bent, statistic=100.0 - k) for k in range(ENTRANTS + 1)]
+    many = [replace(bent, statistic=100.0 - 0.1 * k) for k in range(40)]
     film = replace(bent, batch=replace(bent.batch, kind="film"), statistic=93.0)
     monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: h)
     proved, others = judged(None, np.zeros(0), None, [(h,) for h in (*many, film)])
-    assert proved == [*many[:ENTRANTS], film]
-    assert others == many[ENTRANTS:]
+    assert 2 <= len(proved) <= 20
+    few = len(proved) - 1
+    assert proved == [*many[:few], film]
+    assert others == many[few:]
 
 
 def test_a_bent_calibration_is_no_place_to_begin():
-    np.testing.assert_array_equal(beginning(np.array([1.0, -2.0])), [1.0, -2.0])
-    np.testing.assert_array_equal(beginning(np.array([1.0, -4.0])), [0.0, 0.0])
+    np.testing.assert_array_equal(beginning(np.array([1.0, -1.2])), [1.0, -1.2])
+    np.testing.assert_array_equal(beginning(np.array([1.0, -6.0])), [0.0, 0.0])
 
 
 def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch):
@@ -248,13 +251,21 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
     assert refitted == [straight]
 
 
-@pytest.mark.parametrize(("film", "wrong"), [(WET / 2.0, WET), (2.0 * WET, 2.0 * WET)])
-def test_a_coolants_film_has_an_error_of_form_of_its_own(film, wrong):
+def test_a_coolants_film_has_an_error_of_form_of_its_own():
     """As a share of it, but of no less than the film that is presumed."""
-    yard = small_case.yardstick()
-    h = a_coolant(0, film, -10.0)
-    cause = cause_of(
-        Accepted(h, units_of(yard.study, h), np.array([film, -10.0]), np.zeros((2, 2)), 100.0, 36.0, ()), yard.study
-    )
-    assert cause.amplitude == film
-    np.testing.assert_allclose(cause.ci95, film + 1.96 * OWN["coolant"] * wrong * np.array([-1.0, 1.0]))
+    study = small_case.yardstick().study
+
+    def half(film: float) -> float:
+        """Of the interval where the data leave nothing open."""
+        h = a_coolant(0, film, -10.0)
+        one = Accepted(h, units_of(study, h), np.array([film, -10.0]), np.zeros((2, 2)), 100.0, 36.0, ())
+        cause = cause_of(one, study)
+        assert cause.amplitude == film
+        low, high = cause.ci95
+        assert high - film == pytest.approx(film - low)
+        return high - film
+
+    assert half(10.0) == pytest.approx(half(20.0))
+    assert half(1000.0) == pytest.approx(2.0 * half(500.0))
+    assert 0.1 * 500.0 < half(500.0) < 500.0
+    assert half(20.0) < half(500.0)

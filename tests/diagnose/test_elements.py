@@ -10,7 +10,7 @@ import pytest
 from tests.diagnose import small_case
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.hypotheses import Context
-from twin.diagnose.readings import DAY, readings_of
+from twin.diagnose.readings import readings_of
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_sensor_faults_touch_one_sensor(read):
         assert not w.any()
     hours = study.runs[0].measured.bin_time
     T, _ = study.runs[0].split(columns[:first, index["drift", "housing", "always"]])
-    np.testing.assert_allclose(T[:, 1], hours / DAY, rtol=1e-5)
+    np.testing.assert_allclose(T[:, 1], hours / 86400.0, rtol=1e-5)
     # two swapped sensors show what the other showed
     T, _ = study.runs[0].split(columns[:first, index["swapped", "front<>housing", "always"]])
     own, _ = study.runs[0].split(outputs[0])

@@ -10,7 +10,7 @@ from twin.diagnose.accepted import Accepted, curved_change, freed, parameter_of
 from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.contest import LOW, exact
+from twin.diagnose.contest import exact
 from twin.diagnose.readings import late
 from twin.diagnose.refit import refit
 from twin.diagnose.search import search
@@ -198,8 +198,7 @@ def test_a_joint_that_conducts_nothing_any_more_keeps_its_evidence():
         [study.outputs(k, x, slots_with(study, yard.elements, units, k), [-0.98]) for k in study.fitted]
     )
     _, (found,) = refit(yard, y, x, [Accepted(h, units, np.array([-0.95]), np.eye(1), 100.0, 36.0, ())])
-    assert found.amplitude[0] == pytest.approx(LOW, abs=0.01)
-    assert found.amplitude[0] >= LOW
+    assert -0.98 < found.amplitude[0] < -0.9  # nearly all of it, and short of where it is held
     assert 0.0 < found.covariance[0, 0] < 0.1
 
 

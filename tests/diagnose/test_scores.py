@@ -10,9 +10,9 @@ from twin.calibrate.fit.noise import Channels
 from twin.diagnose.batch import Batch, History, best, prepared, score
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.growth import grown
-from twin.diagnose.unknown import MEMORY, SIGMAS, evidence, heat_of, history, with_information
+from twin.diagnose.unknown import evidence, heat_of, history, with_information
 from twin.diagnose.whiten import Projector, Whitener, measured_of, missing, offsets
-from twin.diagnose.yardstick import ALARM, FLOOR, thresholds_of
+from twin.diagnose.yardstick import thresholds_of
 
 M, L = 60, 4
 
@@ -108,7 +108,7 @@ def test_further_windows_join_where_the_data_ask_for_them(made):
 def test_thresholds_let_the_stated_share_of_nulls_pass():
     """Families of different sizes and tails; on nulls of the same law that were not used."""
     rng = np.random.default_rng(2)
-    scale, at = np.array([3.0, 5.0, 2.0, 8.0]), np.array([28.0, 35.0, 26.0, 50.0])
+    scale, at = np.array([3.0, 5.0, 2.0, 8.0]), np.array([128.0, 135.0, 126.0, 150.0])
 
     def drawn(n):
         return {f"f{k}": at[k] + scale[k] * rng.gumbel(size=n) for k in range(4)}
@@ -118,17 +118,19 @@ def test_thresholds_let_the_stated_share_of_nulls_pass():
 
     known = drawn(210)
     found = thresholds_of(known)
-    assert alarms(found, known) <= ALARM
-    assert 0.005 < alarms(found, drawn(20000)) < 2.5 * ALARM
-    strict = thresholds_of(known, alarm=0.005)
-    assert all(strict[f] > found[f] for f in found)
+    assert 0.0 < alarms(found, known) <= 0.05  # README: at most one false alarm in twenty
+    assert 0.005 < alarms(found, drawn(20000)) < 0.15
+    strict, loose = (thresholds_of(known, alarm=share) for share in (0.005, 0.3))
+    assert all(strict[f] > found[f] > loose[f] for f in found)
+    assert 0.2 < alarms(loose, known) <= 0.3
 
 
 def test_families_without_nulls_above_zero_have_a_floor():
-    found = thresholds_of({"a": np.zeros(50), "b": 5.0 + np.random.default_rng(3).gumbel(size=50)})
-    assert found["a"] == FLOOR
-    assert found["b"] >= FLOOR
-    assert thresholds_of({"a": np.zeros(5)}) == {"a": FLOOR}
+    chance = np.random.default_rng(3).gumbel(size=50)
+    found = thresholds_of({"a": np.zeros(50), "b": 5.0 + chance, "c": 200.0 + chance})
+    assert found["a"] > 16.0  # four standard deviations of one number
+    assert found["a"] == found["b"] < 200.0 < found["c"]
+    assert thresholds_of({"a": np.zeros(5)}) == {"a": found["a"]}
 
 
 def test_whitening_goes_run_by_run_and_weights_tcp_rows():
@@ -211,14 +213,15 @@ def test_evidence_is_that_of_a_gaussian_process(seen):
     base = np.eye(len(r)) + projector.N @ projector.N.T
     n = D.shape[1]
     when = np.arange(n / 2)
-    one = np.exp(-0.5 * ((when[:, None] - when) / MEMORY) ** 2) + 1e-6 * np.eye(n // 2)
+    one = np.exp(-0.5 * ((when[:, None] - when) / 2.0) ** 2) + 1e-6 * np.eye(n // 2)  # docs/diagnosis.md: two hours
     np.testing.assert_allclose(heat.R, np.kron(np.eye(2), one), atol=2e-6)
     ratios = []
-    for sigma in SIGMAS:
+    for sigma in np.geomspace(0.1, 1000.0, 200):  # W
         wide = base + sigma**2 * D @ heat.R @ D.T
         ratios.append(
             r @ np.linalg.solve(base, r) - r @ np.linalg.solve(wide, r)
             + np.linalg.slogdet(base)[1] - np.linalg.slogdet(wide)[1]
         )  # fmt: skip
     found = evidence(heat, white.T @ projector(r))["housing"]
-    assert found == pytest.approx(max(ratios), rel=1e-3)
+    # the best of some amplitudes is no more than that of all, and little less
+    assert 0.75 * max(ratios) < found < (1.0 + 1e-3) * max(ratios)

@@ -15,10 +15,9 @@ from twin.diagnose.batch import Batch, History, Hypothesis
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.search import search
 from twin.diagnose.search_look import look
-from twin.diagnose.search_strained import COVERS, PULLED, strained
+from twin.diagnose.search_strained import strained
 from twin.diagnose.verdict import (
     CALIBRATED,
-    STRAINED,
     _more_alike,
     limits_at,
     limits_of,
@@ -79,7 +78,7 @@ def test_a_source_beyond_its_tolerance_is_out_of_it(pull, wanted):
     parameter = study.bench.parameters[source]
     (cause,) = causes
     assert (cause.family, cause.place, cause.history) == ("loss_law", parameter.path.removesuffix(".gain"), "always")
-    assert cause.statistic > PULLED**2
+    assert cause.statistic > cause.threshold > 1.0
     assert 1.0 < cause.ci95[0] < np.exp(parameter.sigma * pull) < cause.ci95[1]  # freed of its tolerance
 
 
@@ -110,14 +109,16 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     glance = look(yard, fitted)
     freed = strained(yard, y, fitted, x, half, glance)
     assert freed is not None
-    most = (1.0 - COVERS) * freed[1].statistic  # that its own wrong form may leave
-    sure = replace(glance[1][0], statistic=0.9 * most)
     module = sys.modules[strained.__module__]
-    monkeypatch.setattr(module, "FAINT", 0.9)  # of the misfit in this test, which is small
-    assert 0.9 * sure.statistic > glance[1][0].statistic
-    assert strained(yard, y, fitted, x, half, (glance[0], [sure], glance[2])) is not None
-    much = replace(sure, statistic=1.1 * most)
-    assert strained(yard, y, fitted, x, half, (glance[0], [much], glance[2])) is None  # that would be left
+    monkeypatch.setattr(module, "_scored", lambda *_: 0.0)  # by its derivative, as of a film many times as large
+
+    def beside(share: float) -> bool:
+        """Whether it is told where something else explains this share of what it does."""
+        sure = replace(glance[1][0], statistic=share * freed[1].statistic)
+        return strained(yard, y, fitted, x, half, (glance[0], [sure], glance[2])) is not None
+
+    assert beside(0.02)  # its own wrong form may leave that
+    assert not beside(0.5)
     gone = lambda *a: (fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
     monkeypatch.setattr(module, "refit", gone)
     assert strained(yard, y, fitted, x, half, glance) is None
@@ -131,12 +132,15 @@ def test_contacts_that_calibration_strains_are_told_with_what_they_became():
     found = search(yard, y)
     assert strained_of(found) == ()
     x0 = found.x0.copy()
-    x0[contact] = -1.2 * STRAINED
+    x0[contact] = -1.0
+    assert strained_of(replace(found, x0=x0)) == ()
+    x0[contact] = -6.0
     (cause,) = strained_of(replace(found, x0=x0))
     assert (cause.family, cause.parameter, cause.history) == ("joint", parameters[contact].path, CALIBRATED)
-    assert cause.statistic == pytest.approx(1.44 * cause.threshold)
+    assert cause.statistic == pytest.approx(6.0**2)
+    assert cause.statistic > cause.threshold > 1.0
     assert cause.ci95[0] < cause.amplitude < cause.ci95[1]
-    assert cause.amplitude == pytest.approx(np.exp(-1.2 * STRAINED * parameters[contact].sigma))
+    assert cause.amplitude == pytest.approx(np.exp(-6.0 * parameters[contact].sigma))
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from tests.support import synthetic
 from twin.cli.main import run
 from twin.errors import LogError
 from twin.logs.block_file import append, decode, encode, read_blocks
-from twin.logs.blocks import LEAP, Block, Counts, Damaged, Resolver, group, in_order, resolve, tables
+from twin.logs.blocks import Block, Counts, Damaged, Resolver, group, in_order, resolve, tables
 from twin.logs.check import check_run
 from twin.logs.compress import compress_loads
 from twin.logs.read import read_run
@@ -29,6 +29,7 @@ from twin.rom.drive import evaluate
 NAMES, UNITS = ("x", "i", "v"), ("m", "A", "m/s")
 T_CORE = 0.01
 START = 1.772e9  # POSIX
+MILLION = 10**6  # further away than that a number counts as damaged (docs/load_blocks.md)
 
 
 def blocks(n: int, size: int = 5, start: float = START, stream: int = 7) -> list[Block]:
@@ -152,9 +153,9 @@ def test_a_sender_that_starts_anew_begins_another_stream():
 def test_a_number_far_ahead_costs_no_memory():
     made = blocks(2)
     resolver = Resolver(window=8)
-    out = [*resolver.push(made[0]), *resolver.push(replace(made[1], sequence=LEAP))]
-    assert [b.sequence for b in out + resolver.finish()] == [0, LEAP]
-    assert resolver.counts == Counts(delivered=2, lost=LEAP - 1)
+    out = [*resolver.push(made[0]), *resolver.push(replace(made[1], sequence=MILLION))]
+    assert [b.sequence for b in out + resolver.finish()] == [0, MILLION]
+    assert resolver.counts == Counts(delivered=2, lost=MILLION - 1)
 
 
 @pytest.mark.parametrize("at", [0, 3, 6])
@@ -169,7 +170,7 @@ def test_one_absurd_number_is_damaged_and_loses_nothing(at: int, window: int | N
 
 def test_two_numbers_from_elsewhere_are_where_the_sender_counts():
     """A log that begins in midstream, and a sender that starts its numbers anew within a stream: nothing is lost."""
-    made = [replace(b, sequence=b.sequence + 3 * LEAP) for b in blocks(5)]
+    made = [replace(b, sequence=b.sequence + 3 * MILLION) for b in blocks(5)]
     assert resolve(made).counts == Counts(delivered=5)
     assert resolve([made[1], made[0], *made[2:]]).counts == Counts(delivered=5, reordered=1)
     anew = blocks(4, start=START + 10.0)

@@ -78,7 +78,7 @@ def test_signal_values_turn_peaks_into_rms(tmp_path):
     assert values["x"] == pytest.approx([1e-3])
 
 
-def test_gap(tmp_path):
+def test_a_gap_is_told_with_its_line(tmp_path):
     time = np.where(np.arange(200) < 50, TIME, TIME + 300.0)
     (gap,) = found(tmp_path, {"time [s]": time, "x [m]": WAVE})
     assert gap.warning

@@ -44,7 +44,7 @@ def test_a_current_that_rests_at_the_other_limit():
         ("x_peaked", "rms", ""),
     ],
 )
-def test_names(column, kind, says):
+def test_names_that_contradict_the_kind_are_told(column, kind, says):
     # below every limit, so that names alone speak
     what = told({column: 0.5 * RMS}, signal(column, kind))
     assert [says in w for w in what] == ([True] if says else [])

@@ -385,7 +385,7 @@ def assert_one_plausible_cell(wrong: dict, name: str, true: Run, run: Run) -> No
 
 
 @pytest.mark.parametrize("how", [flip, overwrite, digit, delete, insert])
-def test_one_random_byte(tmp_path, how):
+def test_one_random_byte_is_told_or_harmless(tmp_path, how):
     """What stays silent is one cell with a plausible number, within three spreads of its column: docs/run_folder.md."""
     outcomes: Counter[str] = Counter()
     for seed in range(RANDOM_SEEDS):

@@ -79,7 +79,7 @@ def test_iso_times_define_the_start_where_it_is_unknown(tmp_path):
     assert run.start == datetime.fromisoformat("2026-03-02T08:00:10+01:00")
 
 
-def test_naive_iso_times(tmp_path):
+def test_naive_iso_times_beside_a_zone_are_refused(tmp_path):
     text = "time,x [mm]\n2026-03-02T08:00:10,1\n2026-03-02T08:00:20,2\n"
     run = read_run(write(tmp_path, text))
     assert run.loads.naive
@@ -151,7 +151,7 @@ def test_empty_cells_are_missing_values(tmp_path):
     np.testing.assert_array_equal(run.loads.columns["T"], [np.nan, 20])
 
 
-def test_tcp_table(tmp_path):
+def test_a_tcp_table_becomes_si_without_rotary_axes(tmp_path):
     tcp = "time [s],x [mm],b [deg],dx [um],dy [um],dz [m],sigma [um]\n60,100,90,1,2,3e-6,0.5\n"
     run = read_run(write(tmp_path, "time [s],x [mm]\n0,1\n", tcp=tcp))
     assert run.tcp.axes == ("x",)  # rotary axes are at angle zero for the structure
@@ -218,7 +218,7 @@ def test_refused_run_toml(tmp_path, run, says):
     assert says in refused(write(tmp_path, "time [s],x [mm]\n0,1\n", run=run))
 
 
-def test_missing_files(tmp_path):
+def test_missing_files_are_named(tmp_path):
     assert "no run.toml" in refused(tmp_path)
     (tmp_path / "run.toml").write_text("")
     assert "no loads.csv" in refused(tmp_path)
@@ -286,7 +286,7 @@ def test_nothing_but_log_errors_ever_comes_out(tmp_path, delimiter, header, rows
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=60), run=st.binary(max_size=40))
-def test_any_bytes(tmp_path, content, run):
+def test_any_bytes_are_read_or_refused(tmp_path, content, run):
     folder = write(tmp_path / "run", content)
     (folder / "run.toml").write_bytes(run)
     try:

@@ -30,7 +30,7 @@ def test_segments_and_tcp_reference_are_read_in_si(tmp_path):
     assert (plain.segments, plain.tcp_reference) == ((), "absolute")
 
 
-def test_round_trip(tmp_path):
+def test_segments_come_back_as_written(tmp_path):
     segments = (Segment('heat "up"', 0.0, 100.1), Segment("kühlen", 100.1, 360.0))
     write_run(tmp_path / "run", replace(RUN, segments=segments, tcp_reference="first"))
     back = read_run(tmp_path / "run")
@@ -61,7 +61,7 @@ def test_round_trip(tmp_path):
         ('tcp_reference = "last"', 'write "absolute", or "first"'),
     ],
 )
-def test_refused(tmp_path, text, says):
+def test_wrong_segments_are_refused(tmp_path, text, says):
     with pytest.raises(LogError) as caught:
         read_run(write(tmp_path, LOADS, run=text))
     assert says in str(caught.value)

@@ -47,7 +47,7 @@ def told(columns: dict[str, np.ndarray]) -> list:
     return check_run(Run(loads, Table(time, columns, dict.fromkeys(columns, "degC"))))
 
 
-def test_frozen_sensor():
+def test_a_frozen_sensor_is_found():
     columns = temperatures()
     assert told(columns) == []
     columns["b"][300:] = columns["b"][300]
@@ -82,7 +82,7 @@ def test_single_wrong_temperature(size):
     assert all("(line 79)" in p.where for p in found if "leaps" in p.what or "otherwise" in p.what)
 
 
-def test_leap_that_stays():
+def test_a_leap_that_stays_is_found():
     columns = temperatures()
     columns["a"][400:] += 5.0
     (found,) = told(columns)

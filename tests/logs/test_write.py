@@ -41,7 +41,7 @@ RUN = Run(
 )
 
 
-def test_round_trip(tmp_path):
+def test_a_run_comes_back_as_written(tmp_path):
     write_run(tmp_path / "run", RUN)
     back = read_run(tmp_path / "run")
     for field in ("start", "zone", "sampling", "provenance", "synthetic", "initial_temperature", "machine"):

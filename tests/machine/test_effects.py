@@ -212,7 +212,7 @@ def test_joints_and_zones_change_or_are_switched():
     assert (air.gradient, air.height) == (2.0, 0.1)
 
 
-def test_declarations_of_signals():
+def test_wrong_signals_get_their_declaration_corrected():
     assert (
         extended("slide", effect("signal", "signals.x_current", 2.0, history="factor")).signals["x_current"].factor
         == 2.0
@@ -224,7 +224,7 @@ def test_declarations_of_signals():
     ).text == TEXTS["slide"]  # fmt: skip
 
 
-def test_expansions():
+def test_expansions_change_one_material_part_or_scale():
     assert extended("slide", effect("expansion", "materials.steel", 1.1)).materials["steel"].expansion == pytest.approx(
         1.1 * 11.5e-6
     )

@@ -190,7 +190,7 @@ def test_a_screw_needs_one_nut(tmp_path):
         ('"3.2 um/K"', "3.2", "tcp.expansion.shaft", "ten metres", False),
     ],
 )
-def test_oddities(tmp_path, old, new, place, says, warning):
+def test_odd_descriptions_are_reported_with_their_place(tmp_path, old, new, place, says, warning):
     (problem,) = check_machine(load_machine(edited(tmp_path, (old, new))))
     assert problem.where == f"machine.toml: {place}"
     assert says in problem.what

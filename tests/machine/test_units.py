@@ -34,7 +34,7 @@ from twin.units import parse_unit, to_si
         ("7", "1", 7.0),
     ],
 )
-def test_to_si(value, unit, expected):
+def test_quantities_become_si(value, unit, expected):
     assert to_si(value, unit) == pytest.approx(expected, rel=1e-12)
 
 
@@ -46,7 +46,7 @@ def test_to_si(value, unit, expected):
         ("1 __import__", "m"), ([1], "m"), ("7", "m"),
     ],
 )  # fmt: skip
-def test_refused(value, unit):
+def test_what_is_no_quantity_of_the_unit_is_refused(value, unit):
     with pytest.raises(ValueError):
         to_si(value, unit)
 
@@ -89,7 +89,7 @@ def test_table_agrees_with_pint():
             assert factor == pytest.approx(expected, rel=1e-12), text
 
 
-def test_si_names():
+def test_every_unit_knows_its_si_unit():
     assert parse_unit("m/min").si == "m/s"
     assert parse_unit("°C").si == "degC"
     assert parse_unit("K").si == "degC"

@@ -135,7 +135,7 @@ def working_day(artefact):
 
 
 @pytest.mark.slow
-def test_build_and_verify(artefact, capsys):
+def test_the_built_artefact_passes_verification(artefact, capsys):
     assert run(["verify", str(artefact)]) == 0
     assert "passed" in capsys.readouterr().out
 

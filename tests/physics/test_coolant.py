@@ -72,7 +72,7 @@ def test_transition_is_a_straight_line_between_its_ends():
     assert coolant.tube(6150.0, PR, 0.005) == pytest.approx((low + high) / 2, rel=1e-12)
 
 
-def test_where_it_holds():
+def test_it_holds_up_to_its_flow_and_down_to_its_length():
     holds = coolant.coolant_channel_holds
     assert bool(holds(flow(5e3), **CHANNEL))
     assert bool(holds(0.0, **CHANNEL))

@@ -17,7 +17,7 @@ def joint(**changed: float) -> dict[str, float]:
     return defaults | JOINT | changed
 
 
-def test_bolts():
+def test_tightened_bolts_give_the_pressure():
     """Eq (10) with E-004-5: 4 x M12 at 80 N m: 41.26 kN each, 8.25 MPa on 0.02 m^2."""
     force = float(joints.bolt_force(80.0, 1.75e-3, 10.863e-3, 0.12, 13.5e-3, 16.6e-3))
     assert force == pytest.approx(41.26e3, abs=5.0)
@@ -76,7 +76,7 @@ def test_without_pressure_and_bolts_there_is_no_joint():
     assert joints.bolted_joint(**joint()) == 0.0
 
 
-def test_where_it_holds():
+def test_it_holds_within_its_pressures_and_gaps():
     assert bool(joints.bolted_joint_holds(**joint(**BOLTS)))
     assert not bool(joints.bolted_joint_holds(**joint(pressure=1e8)))  # p/H = 0.038
     assert not bool(joints.bolted_joint_holds(**joint(pressure=1e3)))  # p/H = 4e-7

@@ -50,7 +50,7 @@ def test_hilpert_on_both_sides_of_each_switch(re, below, above):
         assert nu.cylinder_hilpert(re * factor, PR) == pytest.approx(c * re**m * PR ** (1 / 3), rel=1e-8)
 
 
-def test_bars():
+def test_bars_have_jakobs_numbers():
     """Jakob's constants: a square, face on and edge on, and a hexagon at Re = 1e4."""
     for c, m, number in ((0.102, 0.675, 45.606), (0.246, 0.588, 49.357), (0.153, 0.638, 48.653)):
         assert nu.bar(1e4, PR, c, m) == pytest.approx(number, rel=1e-4)

@@ -22,7 +22,7 @@ def test_times_the_difference_it_is_the_heat_of_stefan_and_boltzmann():
     np.testing.assert_allclose(radiation_coefficient(jnp.asarray(surface), radiant, 0.8), h, rtol=1e-15)
 
 
-def test_gradient():
+def test_the_gradient_is_the_analytic_one():
     assert jax.grad(radiation_coefficient)(25.0, 25.0, 0.9) == pytest.approx(
         0.9 * 5.670374419e-8 * 6 * 298.15**2, rel=1e-9
     )

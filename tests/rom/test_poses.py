@@ -34,7 +34,7 @@ def test_cubic_reproduces_cubics_and_lagrange_the_fourth_power():
 
 
 @pytest.mark.parametrize(("kind", "order"), [("linear", 2.0), ("cubic", 4.0)])
-def test_order_of_interpolation(kind, order):
+def test_interpolation_converges_at_its_order(kind, order):
     s = RNG.uniform(0.0, 1.0, 2000)
     error = []
     for n in (17, 33):

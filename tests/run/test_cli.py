@@ -86,7 +86,7 @@ def test_flags_are_told(inputs, tmp_path):
     assert "substep shorter than the certified 15 s: 121 steps" in told.output
 
 
-def test_info(inputs):
+def test_info_tells_states_poses_and_parameters(inputs):
     told = call(info, inputs[0])
     assert told.exit_code == 0
     for word in ("36 states", "9 poses", "body_1", "films.body_0_natural", "sources.x_nut.gain", "4 .. 16 W/(m^2*K)"):

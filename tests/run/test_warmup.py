@@ -11,7 +11,7 @@ TIME = np.arange(0.0, 12 * TAU + 1.0, 10.0)
 RISE = 1.0 - np.exp(-TIME / TAU)
 
 
-def test_one_time_constant():
+def test_one_time_constant_settles_as_its_exponential():
     s = settling(TIME, 40e-6 * RISE, 1e-6)
     assert s.settled
     assert s.change == pytest.approx(40e-6, rel=1e-5)

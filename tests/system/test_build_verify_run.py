@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.system.conftest import SLIDE
-from twin.build.pipeline import VERIFY_SEED, full_model
+from twin.build.pipeline import full_model
 from twin.build.scenario import draw
 from twin.build.stepper import CoupledStepper, sensor_temperatures, tcp_at_poses
 from twin.cli.main import run
@@ -96,7 +96,7 @@ def test_simulate_never_replaces_the_run_it_reads(tmp_path, capsys):
 def test_runtime_equals_the_offline_stepper_on_the_same_model(slide_artefact):
     artefact = read_artefact(slide_artefact)
     model = artefact.model
-    scenario = draw(model.load_model, VERIFY_SEED + 3, hours=1.0)
+    scenario = draw(model.load_model, 9003, hours=1.0)
     drive = scenario.drive
     position = drive.position[0]
     result = replay_drive(artefact, drive, position, 4, scenario.start)

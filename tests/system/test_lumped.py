@@ -116,7 +116,7 @@ def test_the_tool_moves_with_the_axis_that_its_nut_rides_on(artefact, tmp_path):
     assert poses_in_space(machine, ("x",), POSES) == pytest.approx(-POSES * [[1, 0, 0]])
 
 
-def test_losses_and_warmup(result, capsys):
+def test_losses_and_warmup_take_a_lumped_machine(result, capsys):
     assert run(["losses", str(SPINDLE), "--explain", "contacts.front_outer"]) == 0
     assert "14 W/K" in capsys.readouterr().out
     assert run(["losses", str(SPINDLE)]) == 0
@@ -124,7 +124,7 @@ def test_losses_and_warmup(result, capsys):
     assert run(["warmup", str(result), "--json"]) == 0
 
 
-def test_poses_and_correction(artefact, result, tmp_path, capsys):
+def test_poses_and_correction_take_a_lumped_machine(artefact, result, tmp_path, capsys):
     assert run(["poses", str(SPINDLE), str(WARM_UP), "--random", "50", "--most", "5", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["axes"] == ["x"]

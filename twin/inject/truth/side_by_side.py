@@ -1,27 +1,28 @@
 """The full model of a machine in several runs at once, without noise.
 
 One factor per body solves for all runs, at coefficients between theirs, and what differs goes to the right side. A
-minute is one step of a method of second order with two stages (Alexander, SIAM J. Numer. Anal. 14, 1977: L-stable),
-which costs what two Euler steps cost.
+minute is one step of SDIRK2 (`twin.rom.tableau`), which costs what two Euler steps cost.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from twin.build.full_model import FullModel
-from twin.build.stepper import CoupledStepper, Loads, contact_matrix, sensor_temperatures
+from twin.build.stepper import CoupledStepper, contact_matrix, sensor_temperatures
 from twin.inject.experiment import START, STEP, plan
 from twin.inject.stored.files import Truth
 from twin.logs.run import Run, Table
 from twin.logs.signals import signal_values
 from twin.rom.drive import Drive, evaluate, measured_air
+from twin.rom.step_loads import StepLoads
+from twin.rom.tableau import SDIRK2, stages
 
-GAMMA = 1.0 - 0.5**0.5  # of both stages, in steps
 WITHIN = 0.9  # of the coefficients of a factor: stable below 1
 KEPT = 12  # factors per body
 
@@ -47,31 +48,27 @@ class SideBySide(CoupledStepper):
         own = [[xb[:, r] for xb in x] for r in range(len(drives))]
         loads = [self.loads(d, i, s) for d, i, s in zip(drives, at, own, strict=True)]
         gammas = [contact_matrix(self.model, d, i) for d, i in zip(drives, at, strict=True)]
-        forcing = [np.column_stack(f) for f in zip(*(self.forcing(v) for v in loads), strict=True)]
+        forcing = np.column_stack([np.concatenate(self.forcing(v)) for v in loads])
         h = drives[0].time[1] - drives[0].time[0]
-        factors = [self._common(b, loads, 1.0 / (GAMMA * h)) for b in range(len(self.model.bodies))]
+        factors = [self._common(b, loads, 1.0 / (SDIRK2.diagonal * h)) for b in range(len(self.model.bodies))]
+        across = [self.across(factors, gamma) for gamma in gammas]
         theta = np.column_stack([v.theta for v in loads])
 
-        def stage(base: list[np.ndarray], seen: list[np.ndarray]) -> list[np.ndarray]:
+        def solve(right: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             y = []
-            for b, (body, f) in enumerate(zip(self.model.bodies, factors, strict=True)):
+            parts = zip(self.model.bodies, factors, self._parts(right), self._parts(near), strict=True)
+            for body, f, known, seen in parts:
                 more = theta[list(body.theta)] - f.theta[:, None]
-                rest = sum((d * (a @ seen[b]) for d, a in zip(more, body.A, strict=True)), np.zeros_like(seen[b]))
-                y.append(f.solve(f.rate * (body.E @ base[b]) + forcing[b] - rest))
-            for r, gamma in enumerate(gammas):  # joins the bodies, as `CoupledStepper.solve`
-                Q, t = np.zeros_like(gamma), np.zeros(len(gamma))
-                for body, f, yb in zip(self.model.bodies, factors, y, strict=True):
-                    ports = list(body.ports)
-                    Q[np.ix_(ports, ports)], t[ports] = f.Q, body.port_rows @ yb[:, r]
-                q = gamma @ np.linalg.solve(np.eye(len(gamma)) + Q @ gamma, t)
-                for body, f, yb in zip(self.model.bodies, factors, y, strict=True):
-                    yb[:, r] -= f.X @ q[list(body.ports)]
-            return y
+                y.append(f.solve(known - sum((d * (a @ seen) for d, a in zip(more, body.A, strict=True)), 0.0 * seen)))
+            for r, gamma in enumerate(gammas):
+                alone = self.joined([yb[:, r] for yb in y], factors, gamma, across[r])
+                for yb, state in zip(y, alone, strict=True):
+                    yb[:, r] = state
+            return np.concatenate(y), near
 
-        first = stage(x, x)
-        return stage([a + (1.0 - GAMMA) / GAMMA * (b - a) for a, b in zip(x, first, strict=True)], first)
+        return self._parts(stages(SDIRK2, solve, partial(self._capacity, factors), np.concatenate(x), forcing)[-1][0])
 
-    def _common(self, b: int, loads: Sequence[Loads], rate: float) -> Any:
+    def _common(self, b: int, loads: Sequence[StepLoads], rate: float) -> Any:
         """A factor of body b with the coefficients of all drives WITHIN its own."""
         own = np.array([v.theta[list(self.model.bodies[b].theta)] for v in loads])
         for factor in reversed(self._cache[b]):
