@@ -12,12 +12,12 @@ import numpy as np
 
 from twin.build.full_model import FullModel
 from twin.build.pipeline import full_model
-from twin.build.remesh import remesh
 from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.errors import LogError
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.logs.signals import signal_values
+from twin.machine.description import Machine
 from twin.machine.load import load_machine
 from twin.progress import Progress, silent
 from twin.rom.drive import Drive, evaluate, measured_air
@@ -95,9 +95,8 @@ def simulate(
 
 
 def simulate_run(
-    machine_path: Path,
-    run_folder: Path,
-    mesh_size: float | None = None,
+    machine: Machine | Path,
+    run: Run | Path,
     dt: float = 60.0,
     substeps: int = 4,
     hours: float | None = None,
@@ -105,32 +104,23 @@ def simulate_run(
     noise: Noise = Noise(),
     progress: Progress = silent,
 ) -> tuple[Run, float]:
-    """The full model of a description driven by the loads of a run folder, as a run, and its worst heat balance error.
+    """The full model of a description driven by the loads of a run, as a run, and its worst heat balance error.
 
-    mesh_size [m]: mesh anew with the model's geometry.py. TCP rows lie at the times and positions of the run's tcp.csv,
-    else every `tcp_every` [s] at the logged axis positions. The machine starts at the run's initial temperature, else
-    at that of the air around it.
+    machine, run: or where they lie; a machine to be meshed otherwise comes from `remesh`. TCP rows lie at the times
+    and positions of the run's tcp.csv, else every `tcp_every` [s] at the logged axis positions. The machine starts at
+    the run's initial temperature, else at that of the air around it.
     """
-    machine = load_machine(machine_path)
-    if mesh_size is not None:
-        machine = remesh(machine, mesh_size)
+    machine = machine if isinstance(machine, Machine) else load_machine(machine)
     full = full_model(machine, progress)
-    run = read_run(run_folder)
+    run = run if isinstance(run, Run) else read_run(run)
     load = full.thermal.load_model
     span = float(run.loads.time[-1] - run.loads.time[0]) / 3600.0
     if hours is not None and hours > span + dt / 3600.0:
-        raise LogError(f"the log covers {span:g} h, not {hours:g} h", str(run_folder), "give --hours within the log")
+        raise LogError(f"the log covers {span:g} h, not {hours:g} h", str(run.folder), "give --hours within the log")
     n_steps = None if hours is None else int(np.ceil(hours * 3600.0 / dt))
     drive = evaluate(load, run.loads.time, signal_values(run, load.signals), dt, n_steps)
     axes = full.thermal.pose_axes
-    if run.tcp is not None:
-        column = {name: i for i, name in enumerate(run.tcp.axes)}
-        tcp_time, positions = run.tcp.time, run.tcp.position[:, [column[a] for a in axes]]
-    else:
-        every = max(1, round(tcp_every / dt))
-        steps = np.arange(every - 1, drive.n_steps, every)
-        order = [[a.name for a in load.axes].index(a) for a in axes]
-        tcp_time, positions = drive.time[steps + 1], drive.position[steps][:, order]
+    tcp_time, positions = _tcp_rows(full, run, drive, max(1, round(tcp_every / dt)))
     inside = tcp_time <= drive.time[-1]
     start = run.initial_temperature
     if start is None:
@@ -156,3 +146,14 @@ def simulate_run(
         initial_temperature=start,
     )
     return simulated, float(result.balance_error.max(initial=0.0))
+
+
+def _tcp_rows(full: FullModel, run: Run, drive: Drive, every: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times (m,) [s] and positions (m, n_axes) [m] of the run's tcp.csv, else of every so many steps."""
+    axes = full.thermal.pose_axes
+    if run.tcp is not None:
+        column = {name: i for i, name in enumerate(run.tcp.axes)}
+        return run.tcp.time, run.tcp.position[:, [column[a] for a in axes]]
+    steps = np.arange(every - 1, drive.n_steps, every)
+    order = [[a.name for a in full.thermal.load_model.axes].index(a) for a in axes]
+    return drive.time[steps + 1], drive.position[steps][:, order]

@@ -23,10 +23,12 @@ from pathlib import Path
 
 import numpy as np
 
+from twin.build.remesh import remesh
 from twin.build.simulate import simulate_run
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.logs.write import refuse_to_destroy, write_run, write_tcp
+from twin.machine.load import load_machine
 
 HERE = Path(__file__).parent
 EXPERIMENTS = ("experiment_a", "experiment_b")
@@ -78,7 +80,8 @@ def truth(machine: Path, name: str, size: float | None) -> Run:
             np.vstack([middle.displacement, path.displacement]),
         )  # fmt: skip
         write_tcp(Path(folder) / "tcp.csv", both)
-        found, balance = simulate_run(machine, Path(folder), mesh_size=size)
+        described = load_machine(machine)
+        found, balance = simulate_run(remesh(described, size) if size else described, Path(folder))
     print(f"{name}: heat balance closes to {balance:.1e} of the throughput", flush=True)
     return found
 
