@@ -12,6 +12,8 @@ from twin.face.inputs import Quantity, listed, positive, run_of
 from twin.progress import Progress, reporter
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from twin.diagnose.catalogue import Family
     from twin.diagnose.diagnose import Result, Settings
     from twin.diagnose.diagnosis import Cause
@@ -83,6 +85,32 @@ class Diagnosis:
         from twin.diagnose.report_page import summary_lines
 
         return "\n".join(summary_lines(self.findings))
+
+    def draw(self, sensor: str, run: str = "") -> Figure:
+        """Measured minus simulated at a sensor over a run, by default the last one: as delivered, recalibrated, and
+        extended by the causes. Raises TwinError for a sensor or a run that there is not."""
+        import matplotlib
+
+        from twin.nearest import did_you_mean
+        from twin.pictures.style import RC, figure
+
+        runs = {series.run: series for series in self.findings.series}
+        run = run or list(runs)[-1]
+        if run not in runs:
+            raise TwinError(f"no run '{run}'", "run", did_you_mean(run, runs, "runs"))
+        series = runs[run]
+        if sensor not in series.sensors:
+            raise TwinError(f"no sensor '{sensor}'", "sensor", did_you_mean(sensor, series.sensors, "sensors"))
+        column = series.sensors.index(sensor)
+        with matplotlib.rc_context(RC):
+            drawn = figure(8.0, 3.0)
+            axes = drawn.subplots()
+            for label in ("delivered", "recalibrated", "extended"):
+                axes.plot(series.time / 3600.0, getattr(series, label)[:, column], label=label)
+            axes.axhline(0.0, color="0.6", linewidth=0.8)
+            axes.set(xlabel=f"hours of {run}", ylabel="K", title=f"{sensor}: measured minus simulated")
+            axes.legend(frameon=False)
+        return drawn
 
     def report(self, folder: str | Path, build: bool = True, progress: Progress | bool | None = None) -> Report:
         """Write index.html and report.json, and, where a cause belongs into the description, machine.toml with the

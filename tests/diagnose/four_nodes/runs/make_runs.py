@@ -1,4 +1,4 @@
-"""Three days of production for the machine of the tests: jobs at their own speeds and currents, pauses, air that swings.
+"""Three days of production for the machine of the tests: jobs at their own speeds and currents, pauses, swinging air.
 
 usage: python tests/diagnose/four_nodes/runs/make_runs.py
 """
