@@ -91,7 +91,7 @@ result.plot.workspace()
 # The numbers have named dimensions and units (xarray).
 
 # %%
-result.tcp.sel(component="z").max("time")[:, 2, 2]
+print(result.tcp.sel(component="z").max("time").isel(y=2, z=2))
 
 # %% [markdown]
 # ## Is it right?
