@@ -9,7 +9,7 @@ from pathlib import Path
 
 from benchmarks.five_axis import FOLDER
 from twin.build.product import build_artefact, verify_artefact
-from twin.cli.certificate_text import lines
+from twin.face.certificate import Certificate
 from twin.progress import bar
 
 
@@ -28,4 +28,4 @@ def main() -> None:
             os.environ.pop("TWIN_CACHE")
             if kept is not None:
                 os.environ["TWIN_CACHE"] = kept
-    print("\n".join("   " + line for line in lines(result)))
+    print("\n".join("   " + line for line in Certificate(result.to_json()).lines()))

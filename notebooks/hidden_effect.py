@@ -23,32 +23,16 @@
 # commands `twin build`, `hide`, `simulate` and `diagnose` do the same.
 
 # %%
-from io import BytesIO
 from pathlib import Path
-from tempfile import mkdtemp
 
 import numpy as np
-from IPython.display import Image, Markdown
-from matplotlib.figure import Figure
 
-from twin.build.product import build_artefact
-from twin.build.simulate import Noise, simulate_run
-from twin.diagnose.diagnose import Settings, diagnose
-from twin.diagnose.extension import write_extension
-from twin.diagnose.report_page import summary_lines, write_report
-from twin.inject.hide import hide
-from twin.inject.request import When
-from twin.logs.read import read_run
-from twin.logs.write import write_run
-from twin.machine.edit import edited
-from twin.machine.load import load_machine
-from twin.machine.parameters import parameters
-from twin.rom.artefact import read_artefact
+import twin
 
 FOLDER = Path("tests/diagnose/four_nodes")
-OUT = Path(mkdtemp())
+OUT = Path("out/hidden_effect")
 SEED = 1
-SENSOR_NOISE, TCP_NOISE = 0.1, 1e-6  # K, m
+noise = {"noise_temperature": "0.1 K", "noise_tcp": "1 um"}  # of the measurements
 
 # %% [markdown]
 # ## The model under test
@@ -64,13 +48,13 @@ range = [0.0, 1.0]
 """
 
 described = (FOLDER / "machine.toml").read_text("utf-8") + PUMP
+OUT.mkdir(parents=True, exist_ok=True)
 (OUT / "described.toml").write_text(described, encoding="utf-8")
-build_artefact(OUT / "described.toml", OUT / "machine.h5")
-artefact = read_artefact(OUT / "machine.h5")
-machine = load_machine(OUT / "described.toml")
-for name, source in machine.sources.items():
+machine = twin.load(OUT / "described.toml")
+model = twin.build(machine)
+for name, source in machine.description.sources.items():
     print(f"source {name}: {source.law} at {source.surface}")
-print(f"sensors: {', '.join(artefact.model.sensors)}")
+print(f"sensors: {', '.join(model.sensors)}")
 
 # %% [markdown]
 # ## The machine that misbehaves
@@ -85,10 +69,10 @@ print(f"sensors: {', '.join(artefact.model.sensors)}")
 HEAT = 40.0  # W
 
 rng = np.random.default_rng(SEED)
-off = {p.path: rng.uniform(0.9, 1.1) for p in parameters(machine) if p.nominal}
-other = edited(described, {p.path: off[p.path] * p.nominal for p in parameters(machine) if p.nominal})
-(OUT / "other.toml").write_text(other, encoding="utf-8")
-hide(OUT / "other.toml", "heat_source", "column", f"{HEAT:g} W", OUT / "truth", When(signal="pump"))
+off = {path: rng.uniform(0.9, 1.1) for path, nominal in machine.parameters.items() if nominal}
+other = machine.edited({path: off[path] * machine.parameters[path] for path in off}, OUT / "other.toml")
+follows = twin.HideOptions(signal="pump")
+truth = twin.hide(other, "heat_source", "column", f"{HEAT:g} W", OUT / "truth", follows)
 for path, factor in off.items():
     print(f"{path}: {factor:.3f} of what is declared")
 
@@ -114,7 +98,7 @@ def loads(folder: Path, seed: int) -> Path:
     for start in range(0, 480, 60):  # in most hours once
         pump[start + rng.integers(0, 30) : start + rng.integers(30, 60)] = rng.random() < 0.7
     air = 20.0 + 1.5 * np.sin(2 * np.pi * time / (14 * 3600.0) + seed)
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     header = "time [s],speed [1/min],current [A],pump [1],air [degC]"
     rows = np.column_stack([time, speed, current, pump, air])
     np.savetxt(folder / "loads.csv", rows, "%.6g", ",", header=header, comments="")
@@ -123,12 +107,12 @@ def loads(folder: Path, seed: int) -> Path:
     return folder
 
 
+days = []
 for k, day in enumerate(("monday", "tuesday", "wednesday")):
-    noise = Noise(SENSOR_NOISE, TCP_NOISE, 10 * SEED + k)
     planned = loads(OUT / "loads" / day, 10 * SEED + k)
-    measured, _ = simulate_run(OUT / "truth" / "machine.toml", planned, dt=20.0, tcp_every=1200.0, noise=noise)
-    write_run(OUT / day, measured)
-monday, tuesday, wednesday = (read_run(OUT / day) for day in ("monday", "tuesday", "wednesday"))
+    options = twin.SimulateOptions(dt="20 s", tcp_every="20 min", seed=10 * SEED + k, **noise)
+    days.append(twin.simulate(truth, planned, OUT / day, options))
+monday, tuesday, wednesday = days
 assert monday.temperatures is not None
 assert monday.tcp is not None
 print(f"a day: {len(monday.temperatures.time)} rows of temperatures, {len(monday.tcp.time)} measured displacements")
@@ -137,24 +121,24 @@ print(f"a day: {len(monday.temperatures.time)} rows of temperatures, {len(monday
 # ## The diagnosis
 #
 # First everything that can be calibrated is calibrated; a cause must explain what that leaves. How much chance and
-# errors of form explain is known from simulated measurements without any effect: 40 here, 200 by default. They set
+# model discrepancy explain is known from simulated measurements without any effect: 40 here, 200 by default. They set
 # the threshold that a cause must pass.
 
 # %%
-settings = Settings(SENSOR_NOISE, TCP_NOISE, nulls=40)
-result = diagnose(artefact, machine, [monday, tuesday], [wednesday], settings)
-diagnosis, _ = write_extension(result, artefact, machine, [monday, tuesday, wednesday], OUT / "diagnosis")
-write_report(diagnosis, OUT / "diagnosis")
-print("\n".join(summary_lines(diagnosis)))
+options = twin.DiagnoseOptions(nulls=40)
+found = twin.diagnose(model, [monday, tuesday], sealed=[wednesday], options=options)
+report = found.report(OUT / "diagnosis")
+diagnosis = report.findings
+print(found)
 
 # %% [markdown]
 # These are the lines that the command prints; `index.html` shows the pictures. Beside the cause stand its rivals. Their
 # cosine says how alike the traces are in these data, with everything that can be calibrated projected out.
 
 # %%
-rows = ["| candidate | at | history | statistic | cosine |", "|---|---|---|---|---|"]
-rows += [f"| {r.family} | {r.place} | {r.history} | {r.statistic:.0f} | {r.cosine:.2f} |" for r in diagnosis.ranked[:5]]
-Markdown("\n".join(rows))
+print(f"{'candidate':<14} {'at':<14} {'statistic':>9} {'cosine':>7}   history")
+for r in diagnosis.ranked[:5]:
+    print(f"{r.family:<14} {r.place:<14} {r.statistic:>9.0f} {r.cosine:>7.2f}   {r.history}")
 
 # %% [markdown]
 # ## Is it right?
@@ -176,10 +160,10 @@ print(f"hidden:  {HEAT:.1f} W")
 # text: read it, change it, take it out again. `extended.h5` is the artefact built from it.
 
 # %%
-text = (OUT / "diagnosis" / "machine.toml").read_text("utf-8")
+text = report.machine.text
 entry = text[text.index("[sources.found_1]") :].strip()
 print(entry)
-extended = read_artefact(OUT / "diagnosis" / "extended.h5")
+extended = report.model
 
 # %% [markdown]
 # ## What it is worth
@@ -189,38 +173,28 @@ extended = read_artefact(OUT / "diagnosis" / "extended.h5")
 # and what they lack is a matter of calibration.
 
 # %%
-rows = ["| channel | delivered | recalibrated | extended | gain, 95 % interval |", "|---|---|---|---|---|"]
+print(f"{'channel':<8} {'delivered':>11} {'recalibrated':>13} {'extended':>11}   gain, 95 % interval")
 for g in diagnosis.gain:
     scale, unit = (1.0, "K") if g.unit == "K" else (1e6, "µm")
-    three = " | ".join(f"{scale * v:.2f} {unit}" for v in (g.delivered, g.recalibrated, g.extended))
-    rows.append(f"| {g.channel} | {three} | {scale * g.ci95[0]:.2f} to {scale * g.ci95[1]:.2f} {unit} |")
-Markdown("\n".join(rows))
+    three = (f"{scale * v:.2f} {unit}" for v in (g.delivered, g.recalibrated, g.extended))
+    cells = "{:>11} {:>13} {:>11}".format(*three)
+    print(f"{g.channel:<8} {cells}   {scale * g.ci95[0]:.2f} to {scale * g.ci95[1]:.2f} {unit}")
 
 # %%
-sealed = diagnosis.series[-1]
-column = sealed.sensors.index("column")
-figure = Figure(figsize=(8, 3), layout="constrained")
-axes = figure.subplots()
-for label in ("delivered", "recalibrated", "extended"):
-    axes.plot(sealed.time / 3600.0, getattr(sealed, label)[:, column], label=label)
-axes.axhline(0.0, color="0.6", linewidth=0.8)
-axes.set(xlabel="hours of Wednesday", ylabel="K", title="column: measured minus simulated")
-axes.legend(frameon=False)
-png = BytesIO()
-figure.savefig(png, format="png", dpi=80)
-Image(png.getvalue())
+found.draw("column")
 
 # %% [markdown]
 # The numbers above are asserted whenever this notebook is executed.
 
 # %%
 gain = {g.channel: g for g in diagnosis.gain}
+sealed = diagnosis.series[-1]
 assert diagnosis.verdict == "named"
 assert (cause.family, cause.place, cause.history) == ("heat_source", "column", "pump")
 assert low < HEAT < high
 assert high - low < 0.3 * HEAT
 assert cause.statistic > 2 * cause.threshold
-assert {s.name for s in extended.model.load_model.sources} == {"motor", "bearings", "found_1"}
+assert {s.name for s in extended.artefact.model.load_model.sources} == {"motor", "bearings", "found_1"}
 assert 'surface = "column"' in entry
 assert sealed.sealed
 assert sealed.run == "wednesday"

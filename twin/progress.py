@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from typing import TextIO
 
 import click
 
@@ -29,11 +31,20 @@ def silent(label: str, steps: int) -> Iterator[Advance]:
     yield lambda _detail: None
 
 
+def bar(label: str, steps: int) -> AbstractContextManager[Advance]:
+    """A progress bar on a terminal, one line per stage elsewhere; on standard output."""
+    return _bar(label, steps, None)
+
+
+def error_bar(label: str, steps: int) -> AbstractContextManager[Advance]:
+    """The same on standard error, which leaves a program's output alone."""
+    return _bar(label, steps, sys.stderr)
+
+
 @contextmanager
-def bar(label: str, steps: int) -> Iterator[Advance]:
-    """A progress bar on a terminal, one line per stage elsewhere."""
+def _bar(label: str, steps: int, file: TextIO | None) -> Iterator[Advance]:
     with click.progressbar(
-        length=steps, label=f"{label:<28}", item_show_func=lambda detail: detail or "", width=24
+        length=steps, label=f"{label:<28}", item_show_func=lambda detail: detail or "", width=24, file=file
     ) as progress:
 
         def advance(detail: str) -> None:
@@ -42,3 +53,12 @@ def bar(label: str, steps: int) -> Iterator[Advance]:
             progress.update(1, detail[:60])
 
         yield advance
+
+
+def reporter(progress: Progress | bool | None) -> Progress:
+    """What a `progress` argument asks for: True a bar, False nothing, None a bar where standard error is a terminal."""
+    if callable(progress):
+        return progress
+    if progress is None:
+        progress = sys.stderr is not None and sys.stderr.isatty()
+    return error_bar if progress else silent

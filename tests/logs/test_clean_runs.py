@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from twin.cli.check import _expected
+from twin.face.check import expected as expected_of
 from twin.logs.check import check_run
 from twin.logs.read import parse_run
 
@@ -27,7 +27,7 @@ TRUE = (  # what is so: axes that stand still, rotary axes beyond the angle that
 @pytest.mark.parametrize("folder", RUNS, ids=lambda p: f"{p.parent.parent.name}/{p.name}")
 def test_runs_of_the_models(folder):
     run = parse_run(folder)
-    expected = _expected(folder, run.machine, None)
+    expected = expected_of(folder, run.machine, None)
     problems = check_run(run, expected.signals, expected.axes, expected.sensors, expected.core, expected.strokes)
     spurious = [str(p) for p in problems if not any(re.fullmatch(true, p.what) for true in TRUE)]
     assert spurious == []

@@ -11,8 +11,9 @@ import pytest
 
 from tests.logs.test_check import TIME, Signal
 from tests.logs.test_check import found as found_in
-from twin.cli.check import Expected, _expected
 from twin.errors import Problem
+from twin.face.check import Expected
+from twin.face.check import expected as expected_of
 from twin.logs.check import check_run
 from twin.logs.read import parse_run
 from twin.logs.run import Run, Table, Tcp
@@ -28,7 +29,7 @@ FIVE, RAM, UNIT, SCREW = (
 @cache
 def loaded(folder: str) -> tuple[Run, Expected]:
     run = parse_run(ROOT / folder)
-    expected = _expected(ROOT / folder, None, None)
+    expected = expected_of(ROOT / folder, None, None)
     assert expected is not None
     return run, expected
 

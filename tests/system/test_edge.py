@@ -20,7 +20,10 @@ def python(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("package", ["twin.run", "twin.rom", "twin.logs", "twin.physics", "twin.calibrate"])
+PACKAGES = ("twin.run", "twin.rom", "twin.logs", "twin.physics", "twin.calibrate", "twin.face")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
 def test_every_module_of_the_edge_imports_without_the_workshop(package):
     done = python(
         BLOCK + f"package = importlib.import_module({package!r})\n"

@@ -80,24 +80,39 @@ def verify_artefact(
     one it started from.
     """
     artefact: Artefact = read_artefact(path)
-    origin = Path(machine_path or artefact.provenance.get("machine", ""))
-    if not origin.exists():
-        raise ArtefactError(f"its machine description is not at {origin}", str(path), "name it with --machine")
-    calibrated = "calibrated_from" in artefact.provenance and not machine_path
-    machine = load_machine(origin, artefact.description if calibrated else None)
-    if not calibrated and machine_hash(machine) != artefact.provenance.get("machine_hash"):
-        raise ArtefactError(
-            f"{origin} is not the machine this artefact was built from (description or meshes differ)",
-            str(path),
-            "build again, or name the right description with --machine",
-        )
-    full = full_model(machine, progress)
-    rich = rich_model(machine, full, options.rich, progress)
-    result = certificate(
-        machine, rich, artefact.model, full.thermal, options, VERIFY_SEED, full_scenarios, progress=progress
-    )
+    result = verified(artefact, machine_path, options, full_scenarios, progress, str(path))
     write_artefact(
         path, artefact.model, artefact.description, result.to_json(), artefact.provenance, artefact.fields,
         parameters=artefact.parameters,
     )  # fmt: skip
     return result
+
+
+def verified(
+    artefact: Artefact,
+    machine_path: Path | None = None,
+    options: BuildOptions = BuildOptions(),
+    full_scenarios: int = 2,
+    progress: Progress = silent,
+    where: str = "",
+) -> Certificate:
+    """The certificate that `verify_artefact` stores; with no full scenarios of compact against rich only.
+
+    where: the artefact's name in messages.
+    """
+    where = where or artefact.model.name
+    origin = Path(machine_path or artefact.provenance.get("machine", ""))
+    if not origin.exists():
+        raise ArtefactError(f"its machine description is not at {origin}", where, "name it with --machine")
+    calibrated = "calibrated_from" in artefact.provenance and not machine_path
+    machine = load_machine(origin, artefact.description if calibrated else None)
+    if not calibrated and machine_hash(machine) != artefact.provenance.get("machine_hash"):
+        raise ArtefactError(
+            f"{origin} is not the machine this artefact was built from (description or meshes differ)",
+            where,
+            "build again, or name the right description with --machine",
+        )
+    full = full_model(machine, progress)
+    rich = rich_model(machine, full, options.rich, progress)
+    of_full = full.thermal if full_scenarios else None
+    return certificate(machine, rich, artefact.model, of_full, options, VERIFY_SEED, full_scenarios, progress=progress)

@@ -96,7 +96,7 @@ def simulate(
 
 def simulate_run(
     machine: Machine | Path,
-    run_folder: Path,
+    run: Run | Path,
     dt: float = 60.0,
     substeps: int = 4,
     hours: float | None = None,
@@ -104,19 +104,19 @@ def simulate_run(
     noise: Noise = Noise(),
     progress: Progress = silent,
 ) -> tuple[Run, float]:
-    """The full model of a description driven by the loads of a run folder, as a run, and its worst heat balance error.
+    """The full model of a description driven by the loads of a run, as a run, and its worst heat balance error.
 
-    machine: a description, or where it lies; one to be meshed otherwise comes from `remesh`. TCP rows lie at the times
+    machine, run: or where they lie; a machine to be meshed otherwise comes from `remesh`. TCP rows lie at the times
     and positions of the run's tcp.csv, else every `tcp_every` [s] at the logged axis positions. The machine starts at
     the run's initial temperature, else at that of the air around it.
     """
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     full = full_model(machine, progress)
-    run = read_run(run_folder)
+    run = run if isinstance(run, Run) else read_run(run)
     load = full.thermal.load_model
     span = float(run.loads.time[-1] - run.loads.time[0]) / 3600.0
     if hours is not None and hours > span + dt / 3600.0:
-        raise LogError(f"the log covers {span:g} h, not {hours:g} h", str(run_folder), "give --hours within the log")
+        raise LogError(f"the log covers {span:g} h, not {hours:g} h", str(run.folder), "give --hours within the log")
     n_steps = None if hours is None else int(np.ceil(hours * 3600.0 / dt))
     drive = evaluate(load, run.loads.time, signal_values(run, load.signals), dt, n_steps)
     axes = full.thermal.pose_axes

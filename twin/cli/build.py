@@ -20,28 +20,13 @@ import click
 @click.option("--training", default=90, show_default=True, type=click.IntRange(1), help="training scenarios")
 def command(machine: str, output: str, method: str, states: int, samples: int, training: int) -> int:
     """Reduce MACHINE to a compact artefact and certify it against the rich model on held-out scenarios."""
-    from dataclasses import replace
-    from pathlib import Path
-
-    import h5py
-
-    from twin.atomic import check_file
     from twin.build.pipeline import BuildOptions
-    from twin.build.product import build_artefact
-    from twin.cli.certificate_text import lines
-    from twin.cli.sound import require_sound
-    from twin.errors import TwinError
+    from twin.build.rich_basis import RichOptions
+    from twin.face.build import build
     from twin.progress import bar
 
-    options = BuildOptions(method=method, states=states, training=training)  # type: ignore[arg-type]
-    options = replace(options, rich=replace(options.rich, samples=samples))
-    check_file(Path(output))
-    if Path(output).suffix in (".toml", ".msh", ".csv"):
-        raise TwinError("would replace an input", output, "name an artefact with -o, for example -o out/machine.h5")
-    if Path(output).is_file() and Path(output).stat().st_size and not h5py.is_hdf5(output):
-        raise TwinError("exists and is no artefact", output, "name a new file with -o; it would be replaced")
-    require_sound(Path(machine))
-    result = build_artefact(Path(machine), Path(output), options, bar)
-    hint = f"twin verify {output}" if result.passed else "more --states, or larger [limits] in the description"
-    click.echo("\n".join([f"wrote {output}", *lines(result), f"next: {hint}"]))
-    return 0 if result.passed else 1
+    options = BuildOptions(method, states, RichOptions(samples=samples), training)  # type: ignore[arg-type]
+    certificate = build(machine, output, options, bar).certificate
+    hint = f"twin verify {output}" if certificate.passed else "more --states, or larger [limits] in the description"
+    click.echo("\n".join([f"wrote {output}", *certificate.lines(), f"next: {hint}"]))
+    return 0 if certificate.passed else 1

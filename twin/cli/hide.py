@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from twin.cli.bundle import bundled
+from twin.cli.quantity import Quantity
+
 if TYPE_CHECKING:
-    from twin.inject.request import When
+    from twin.face.hide import HideOptions
 
 
-def _with_when(command: Callable[..., None]) -> Callable[..., None]:
-    """The options that say when something acts as one argument, `when`."""
+def _options() -> type[Any]:
+    from twin.face.hide import HideOptions
 
-    @wraps(command)
-    def called(
-        history: str, signal: str, exponent: float, start: str | None, end: str | None, **others: Any
-    ) -> None:  # fmt: skip
-        from twin.cli.quantity import option
-        from twin.inject.request import When
+    return HideOptions
 
-        first, last = (None if t is None else option(n, t, "s") for n, t in (("--from", start), ("--to", end)))
-        command(when=When(history, signal, exponent, first, last), **others)
 
-    return called
+def _settings(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+    """NAME=VALUE of every --setting."""
+    from twin.errors import TwinError
+
+    if unset := [s for s in given if "=" not in s]:
+        raise TwinError(f"'{unset[0]}' has no value", "--setting", "write it like --setting temperature='15 degC'")
+    return dict(s.partition("=")[::2] for s in given)
 
 
 @click.command(
@@ -41,33 +41,24 @@ def _with_when(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--history", default="", help="kind of a fault of a log: offset, drift, lag, ...")
 @click.option("--signal", default="", help="logged signal that it follows")
 @click.option("--exponent", default=1.0, show_default=True, help="of that signal")
-@click.option("--from", "start", help="time at which it begins, e.g. '4 h'")
-@click.option("--to", "end", help="time at which it ends")
+@click.option("--from", "start", type=Quantity("s", negative=True), help="time at which it begins, e.g. '4 h'")
+@click.option("--to", "end", type=Quantity("s", negative=True), help="time at which it ends")
 @click.option(
-    "--setting", multiple=True, metavar="NAME=VALUE", help="what a family needs besides: temperature='15 degC'"
-)
+    "--setting", "settings", multiple=True, callback=_settings, metavar="NAME=VALUE",
+    help="what a family needs besides: temperature='15 degC'",
+)  # fmt: skip
 @click.option("--run", "runs", multiple=True, type=click.Path(), help="run that gets the switch; repeat it")
-@_with_when
+@bundled(_options)
 def command(
-    family: str, place: str, size: str, target: str, output: str, when: When, setting: tuple[str, ...],
-    runs: tuple[str, ...],
-) -> None:  # fmt: skip
+    family: str, place: str, size: str, target: str, output: str, options: HideOptions, runs: tuple[str, ...]
+) -> None:
     """Hide an effect of SIZE ('10 W', '0.6 K', '3') at PLACE in a copy of a machine, or of a log.
 
     FAMILY is one of `twin diagnose`. `twin simulate` of a machine's copy is an experiment with a hidden effect; sensor,
     signal, slip, measurement, initial_state and not_thermal damage the copy of a run folder. hidden.json says what was
     hidden.
     """
-    from pathlib import Path
+    from twin.face.hide import told
 
-    from twin.errors import TwinError
-    from twin.inject.hide import hide
-
-    settings = dict(s.partition("=")[::2] for s in setting)
-    if unset := [s for s in setting if "=" not in s]:
-        raise TwinError(f"'{unset[0]}' has no value", "--setting", "write it like --setting temperature='15 degC'")
-    names = [Path(run).resolve().name for run in runs]
-    if twice := sorted({n for n in names if names.count(n) > 1}):
-        raise TwinError(f"two runs are called '{twice[0]}'", "--run", "rename a folder: copies keep these names")
-    for line in hide(target, family, place, size, output, when, settings, runs):
+    for line in told(target, family, place, size, output, options, runs):
         click.echo(line)

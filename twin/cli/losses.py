@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from twin.face.losses import over_time, whole
+
 if TYPE_CHECKING:
     from twin.machine.explain import Explanation, Load
 
@@ -24,25 +26,18 @@ def command(machine: str, path: str | None, run_folder: str | None, settings: tu
     and energy over its samples; powers are averaged, never the signals. Meshes are not read.
     """
     import json
-    from pathlib import Path
 
-    from twin.logs.read import read_run
-    from twin.machine.explain import explain, load_of, paths
-    from twin.machine.load import load_machine
+    from twin.face.losses import losses
 
-    described = load_machine(Path(machine))
-    run = read_run(Path(run_folder)) if run_folder is not None else None
-    load = load_of(described, _pairs(settings), run)
+    found = losses(machine, path, run_folder, _pairs(settings))
     if path is not None:
-        one = explain(described, path, load)
-        click.echo(json.dumps(_facts(one, load), indent=1) if as_json else _page(one, load))
+        click.echo(json.dumps(found.facts()[0], indent=1) if as_json else _page(found.laws[0], found.load))
         return
-    every = [explain(described, p, load) for p in paths(described)]
+    at = _load_text(run_folder, settings)
     if as_json:
-        told = [_facts(e, load) for e in every]
-        click.echo(json.dumps({"load": _load_text(run_folder, settings), "laws": told}, indent=1))
+        click.echo(json.dumps({"load": at, "laws": found.facts()}, indent=1))
     else:
-        click.echo(_tables(every, load, _load_text(run_folder, settings)))
+        click.echo(_tables(list(found.laws), found.load, at))
 
 
 def _pairs(settings: tuple[str, ...]) -> dict[str, str]:
@@ -74,25 +69,10 @@ def _spread(values: Any, unit: str, load: Load) -> str:
     return f"{_number(load.mean(values), unit)} ({low:.4g} to {high:.4g})"
 
 
-def _over_time(one: Explanation, load: Load) -> dict[str, float]:
-    """Mean and maximum, and of heat its energy."""
-    values = _whole(one.value, load)
-    told = {"mean": load.mean(values), "max": float(values.max())}
-    if one.unit == "W":
-        told["energy_J"] = told["mean"] * float(load.time[-1] - load.time[0])
-    return told
-
-
-def _whole(values: Any, load: Load) -> Any:
-    import numpy as np
-
-    return np.broadcast_to(values, load.time.shape)
-
-
 def _holds(one: Explanation, load: Load) -> str:
     if not one.validity:
         return "no published limits"
-    outside = int((~_whole(one.holds, load)).sum())
+    outside = int((~whole(one.holds, load)).sum())
     n = len(load.time)
     if n == 1:
         return f"{one.validity}: {'does NOT hold' if outside else 'holds'}"
@@ -104,7 +84,7 @@ def _page(one: Explanation, load: Load) -> str:
     lines = [f"{one.path}: {one.law or 'a given value'}", f"  formula   {one.formula}", f"  source    {one.citation}"]
     lines.append(f"  acts on   {one.place}")
     width = max(len(i.name) for i in one.inputs)
-    shown = [_spread(_whole(i.value, load), i.unit, load) for i in one.inputs]
+    shown = [_spread(whole(i.value, load), i.unit, load) for i in one.inputs]
     wide = max(len(s) for s in shown)
     lines.append("  inputs")
     lines += [f"    {i.name:<{width}}  {s:<{wide}}  {i.meaning}; {i.origin}"
@@ -117,44 +97,24 @@ def _page(one: Explanation, load: Load) -> str:
 
 def _result(one: Explanation, load: Load) -> str:
     if one.radiation is not None:
-        convection, radiation = _whole(one.value, load), _whole(one.radiation, load)
+        convection, radiation = whole(one.value, load), whole(one.radiation, load)
         parts = f"{_spread(convection, one.unit, load)} convection + {_spread(radiation, one.unit, load)} radiation"
         return parts + f" = {_spread(convection + radiation, one.unit, load)}"
     if len(load.time) == 1:
         return _number(float(one.value[0]), one.unit)
-    told = _over_time(one, load)
+    told = over_time(one, load)
     text = f"mean {_number(told['mean'], one.unit)}, largest {_number(told['max'], one.unit)}"
     hours = float(load.time[-1] - load.time[0]) / 3600
     return text + (f", {told['energy_J'] / 3600:.4g} Wh in {hours:.3g} h" if "energy_J" in told else "")
 
 
 def _tables(every: list[Explanation], load: Load, at: str) -> str:
-    """Sources, films and joints, one line each."""
-    from twin.machine.explain import WARMER
-
-    many = len(load.time) > 1
+    """Sources, films and joints, one line each; then what is assumed, and where laws do not hold."""
+    of = {kind: [e for e in every if e.kind == kind] for kind in ("source", "film", "contact")}
     lines = [f"load: {at}"]
-    sources = [e for e in every if e.kind == "source"]
-    if sources:
-        head = ["source", "law", "mean [W]", "max [W]", "energy [Wh]"] if many else ["source", "law", "heat [W]"]
-        told = [_over_time(e, load) for e in sources]
-        rows = [[e.path.partition(".")[2], e.law, *_columns(t, many)] for e, t in zip(sources, told, strict=True)]
-        whole = _columns({key: sum(t[key] for t in told) for key in told[0]}, many)
-        if many:
-            whole[1] = ""  # largest values do not come together
-        lines += ["", *_aligned([head, *rows, ["all", "", *whole]])]
-    films = [e for e in every if e.kind == "film"]
-    if films:
-        air = "" if {"surface", "ambient"} & set(load.states) else f", surfaces {WARMER:g} K above their environment"
-        lines += ["", f"films, W/(m^2*K){', mean' if many else ''}{air}:"]
-        rows = [
-            [e.path.partition(".")[2], e.law, *(f"{load.mean(_whole(v, load)):.4g}" for v in _parts(e))] for e in films
-        ]
-        lines += _aligned([["film", "law", "convection", "radiation", "both"], *rows])
-    joints = [e for e in every if e.kind == "contact" and e.law]
-    if joints:
-        rows = [[e.path.partition(".")[2], e.law, f"{float(e.value[0]):.4g}"] for e in joints]
-        lines += ["", *_aligned([["joint", "law", "W/(m^2*K)"], *rows])]
+    lines += _source_table(of["source"], load)
+    lines += _film_table(of["film"], load)
+    lines += _joint_table([e for e in of["contact"] if e.law])
     assumed = [e.path for e in every if e.citation.startswith("assumed")]
     if assumed:
         lines += ["", f"assumed values: {', '.join(assumed)}"]
@@ -162,6 +122,42 @@ def _tables(every: list[Explanation], load: Load, at: str) -> str:
     if broken:
         lines += ["", "outside the validity of their laws:", *(f"  {e.path}: {_holds(e, load)}" for e in broken)]
     return "\n".join(lines)
+
+
+def _name(one: Explanation) -> str:
+    return one.path.partition(".")[2]
+
+
+def _source_table(sources: list[Explanation], load: Load) -> list[str]:
+    if not sources:
+        return []
+    many = len(load.time) > 1
+    head = ["source", "law", "mean [W]", "max [W]", "energy [Wh]"] if many else ["source", "law", "heat [W]"]
+    told = [over_time(e, load) for e in sources]
+    rows = [[_name(e), e.law, *_columns(t, many)] for e, t in zip(sources, told, strict=True)]
+    total = _columns({key: sum(t[key] for t in told) for key in told[0]}, many)
+    if many:
+        total[1] = ""  # largest values do not come together
+    return ["", *_aligned([head, *rows, ["all", "", *total]])]
+
+
+def _film_table(films: list[Explanation], load: Load) -> list[str]:
+    from twin.machine.explain import WARMER
+
+    if not films:
+        return []
+    mean = ", mean" if len(load.time) > 1 else ""
+    air = "" if {"surface", "ambient"} & set(load.states) else f", surfaces {WARMER:g} K above their environment"
+    rows = [[_name(e), e.law, *(f"{load.mean(whole(v, load)):.4g}" for v in _parts(e))] for e in films]
+    head = ["film", "law", "convection", "radiation", "both"]
+    return ["", f"films, W/(m^2*K){mean}{air}:", *_aligned([head, *rows])]
+
+
+def _joint_table(joints: list[Explanation]) -> list[str]:
+    if not joints:
+        return []
+    rows = [[_name(e), e.law, f"{float(e.value[0]):.4g}"] for e in joints]
+    return ["", *_aligned([["joint", "law", "W/(m^2*K)"], *rows])]
 
 
 def _parts(film: Explanation) -> list[Any]:
@@ -182,27 +178,3 @@ def _aligned(rows: list[list[str]]) -> list[str]:
         cells = [t.ljust(w) if c < 2 else t.rjust(w) for c, (t, w) in enumerate(zip(row, widths, strict=True))]
         lines.append("  ".join(cells).rstrip())
     return lines
-
-
-def _facts(one: Explanation, load: Load) -> dict[str, Any]:
-    """As JSON, SI."""
-    told: dict[str, Any] = {"path": one.path, "kind": one.kind, "law": one.law or None, "formula": one.formula,
-                            "source": one.citation, "acts_on": one.place, "unit": one.unit}  # fmt: skip
-    told["inputs"] = [
-        {"name": i.name, "unit": i.unit, "meaning": i.meaning, "origin": i.origin, **_statistics(i.value, load)}
-        for i in one.inputs
-    ]
-    told["result"] = _over_time(one, load) if len(load.time) > 1 else {"value": float(one.value[0])}
-    if one.radiation is not None:
-        told["radiation"] = _statistics(one.radiation, load)
-    told["validity"] = one.validity or None
-    told["holds"] = bool(one.holds.all())
-    told["samples_outside"] = int((~_whole(one.holds, load)).sum())
-    return told
-
-
-def _statistics(values: Any, load: Load) -> dict[str, float]:
-    whole = _whole(values, load)
-    if float(whole.min()) == float(whole.max()):
-        return {"value": float(whole[0])}
-    return {"mean": load.mean(whole), "min": float(whole.min()), "max": float(whole.max())}

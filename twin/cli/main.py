@@ -17,6 +17,7 @@ import click
 from twin import __version__
 from twin.errors import TwinError
 from twin.progress import interrupt
+from twin.threads import one_thread_each
 
 # name -> what `twin --help` says about it; the command object is twin.cli.NAME.command
 COMMANDS = {
@@ -51,11 +52,7 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
             return None
-        # JAX calls SciPy's OpenBLAS; with its threads small factorisations take 9 to 22 ms instead of 0.1, and on two
-        # cores a whole build takes twice as long. It reads this once, when numpy is imported.
-        # MKL likewise: builds work on several things at once, each in one thread, so that equal input gives equal bits.
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        os.environ.setdefault("MKL_NUM_THREADS", "1")
+        one_thread_each()
         command: click.Command = importlib.import_module(f"twin.cli.{name}").command
         if command.epilog and not command.epilog.startswith("\b"):
             command.epilog = f"\b\n{command.epilog}"  # an example that is wrapped cannot be pasted

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import math
-
-from twin.errors import TwinError
-from twin.units import to_si
+import click
 
 
-def option(name: str, text: str, unit: str) -> float:
-    """The value in SI. Raises TwinError naming the option."""
-    try:
-        try:
-            return to_si(float(text), unit)
-        except ValueError:
-            return to_si(text, unit)
-    except ValueError as e:
-        raise TwinError(str(e), name, f"write a number with a unit of {unit}, for example {name} '1 {unit}'") from e
+class Quantity(click.ParamType):
+    """An option with a unit; its value is a number in SI."""
 
+    name = "text"
 
-def positive(name: str, text: str, unit: str, zero: bool = False) -> float:
-    """The same above zero, or from zero on."""
-    value = option(name, text, unit)
-    if not math.isfinite(value) or value < 0.0 or (value == 0.0 and not zero):
-        wanted = "zero or a positive value" if zero else "a positive value"
-        raise TwinError(f"{text} is out of range", name, f"give {wanted}, for example {name} '1 {unit}'")
-    return value
+    def __init__(self, unit: str, zero: bool = False, negative: bool = False):
+        self.unit, self.zero, self.negative = unit, zero, negative
+
+    def convert(self, value: str | float, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The value in SI. Raises TwinError naming the option."""
+        from twin.face.inputs import positive, quantity
+
+        if isinstance(value, float):  # click may ask twice
+            return value
+        name = param.opts[0] if param is not None else ""
+        if self.negative:
+            return quantity(name, value, self.unit)
+        return positive(name, value, self.unit, self.zero)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 
-def text(told: dict[str, Any]) -> str:
+def text(told: Mapping[str, Any]) -> str:
     ranges = ", ".join(
         f"{a} {1e3 * low:.0f} to {1e3 * high:.0f} mm" for a, (low, high) in sorted(told["ranges_m"].items())
     )

@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import click
+
+from twin.cli.bundle import bundled
+from twin.cli.quantity import Quantity
+
+if TYPE_CHECKING:
+    from twin.face.simulate import SimulateOptions
+
+
+def _options() -> type[Any]:
+    from twin.face.simulate import SimulateOptions
+
+    return SimulateOptions
 
 
 @click.command(
@@ -12,66 +26,23 @@ import click
 @click.argument("machine", type=click.Path())
 @click.argument("run", type=click.Path())
 @click.option("-o", "--output", required=True, type=click.Path(), help="run folder to write")
-@click.option("--size", help="mesh size for new meshes by the model's geometry.py, e.g. '80 mm' (needs the mesh extra)")
-@click.option("--dt", default="60 s", show_default=True, help="time step")
+@click.option("--size", type=Quantity("m"),
+              help="mesh size for new meshes by the model's geometry.py, e.g. '80 mm' "
+              "(needs the mesh extra)")  # fmt: skip
+@click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
 @click.option("--substeps", default=4, show_default=True, type=click.IntRange(1), help="implicit Euler steps per step")
 @click.option("--hours", type=click.FloatRange(0, min_open=True), help="stop after this time; the whole run by default")
-@click.option("--tcp-every", default="30 min", show_default=True, help="TCP rows, where the run has no tcp.csv")
-@click.option("--noise-temperature", default="0 K", show_default=True, help="standard deviation at sensors")
-@click.option("--noise-tcp", default="0 um", show_default=True, help="standard deviation of TCP rows")
+@click.option("--tcp-every", default="30 min", show_default=True, type=Quantity("s"),
+              help="TCP rows, where the run has no tcp.csv")  # fmt: skip
+@click.option("--noise-temperature", default="0 K", show_default=True, type=Quantity("delta_degC", zero=True),
+              help="standard deviation at sensors")  # fmt: skip
+@click.option("--noise-tcp", default="0 um", show_default=True, type=Quantity("m", zero=True),
+              help="standard deviation of TCP rows")  # fmt: skip
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="of the noise")
-def command(
-    machine: str,
-    run: str,
-    output: str,
-    size: str | None,
-    dt: str,
-    substeps: int,
-    hours: float | None,
-    tcp_every: str,
-    noise_temperature: str,
-    noise_tcp: str,
-    seed: int,
-) -> None:
+@bundled(_options)
+def command(machine: str, run: str, output: str, options: SimulateOptions) -> None:
     """Step the full model of MACHINE through the loads of RUN; writes temperatures and TCP rows to OUTPUT."""
-    from pathlib import Path
-
-    from twin.build.remesh import remesh
-    from twin.build.simulate import Noise, simulate_run
-    from twin.cli.quantity import positive
-    from twin.cli.sound import require_sound
-    from twin.errors import LogError
-    from twin.logs.write import refuse_to_destroy, write_run
-    from twin.machine.load import load_machine
+    from twin.face.simulate import simulation
     from twin.progress import bar
 
-    noise = Noise(
-        positive("--noise-temperature", noise_temperature, "delta_degC", zero=True),
-        positive("--noise-tcp", noise_tcp, "m", zero=True),
-        seed,
-    )
-    mesh_size = positive("--size", size, "m") if size else None
-    step, every = positive("--dt", dt, "s"), positive("--tcp-every", tcp_every, "s")
-    if Path(output).resolve() == Path(run).resolve():
-        raise LogError("is the run that is read", output, "choose another folder with -o")
-    refuse_to_destroy(Path(output))  # now, not after hours
-    require_sound(Path(machine))
-    described = load_machine(Path(machine))
-    result, balance = simulate_run(
-        described if mesh_size is None else remesh(described, mesh_size),
-        Path(run),
-        dt=step,
-        substeps=substeps,
-        hours=hours,
-        tcp_every=every,
-        noise=noise,
-        progress=bar,
-    )
-    write_run(Path(output), result)
-    rows = 0 if result.tcp is None else len(result.tcp.time)
-    temperatures = result.temperatures
-    counts = (0, 0) if temperatures is None else (len(temperatures.time), len(temperatures.columns))
-    click.echo(
-        f"{output}: {counts[0]} rows of {counts[1]} temperatures, "
-        f"{rows} TCP rows; heat balance closes to {balance:.1e} of the throughput"
-    )
+    click.echo(f"{output}: {simulation(machine, run, output, options, bar)}")

@@ -21,11 +21,12 @@ def command(artefact: str, machine: str | None, full: int, as_json: bool) -> int
     from pathlib import Path
 
     from twin.build.product import verify_artefact
-    from twin.cli.certificate_text import lines
+    from twin.face.certificate import Certificate
     from twin.progress import bar, silent
 
     result = verify_artefact(
         Path(artefact), Path(machine) if machine else None, full_scenarios=full, progress=silent if as_json else bar
     )
-    click.echo(json.dumps(result.to_json(), indent=1) if as_json else "\n".join(lines(result, every_output=True)))
+    told = result.to_json()
+    click.echo(json.dumps(told, indent=1) if as_json else "\n".join(Certificate(told).lines(every_output=True)))
     return 0 if result.passed else 1

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-if TYPE_CHECKING:
-    from twin.run.warmup import History, Settling, WarmUp
+from twin.cli.quantity import Quantity
 
 
 @click.command(epilog="Example: twin warmup out/experiment_a --tolerance '2 um'")
 @click.argument("result", type=click.Path())
-@click.option("--tolerance", default="1 um", show_default=True, help="of the TCP displacement")
-@click.option("--temperature", default="0.1 K", show_default=True, help="tolerance of the sensors")
-@click.option("--horizon", default="1 h", show_default=True,
+@click.option("--tolerance", default="1 um", show_default=True, type=Quantity("m"), help="of the TCP displacement")
+@click.option("--temperature", default="0.1 K", show_default=True, type=Quantity("delta_degC"),
+              help="tolerance of the sensors")  # fmt: skip
+@click.option("--horizon", default="1 h", show_default=True, type=Quantity("s"),
               help="settled: at the rate of the end, the drift in this time is less than the tolerance")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="machine-readable")
-def command(result: str, tolerance: str, temperature: str, horizon: str, as_json: bool) -> None:
+def command(result: str, tolerance: float, temperature: float, horizon: float, as_json: bool) -> None:
     """Tell when the machine of RESULT, the folder or result.h5 of a `twin run`, has warmed up.
 
     Per TCP component (at the actual position, which moves with the axes, and at the pose where it changes most) and per
@@ -28,46 +28,11 @@ def command(result: str, tolerance: str, temperature: str, horizon: str, as_json
     stopped. The verdict in the first line is that of the TCP at its worst poses; sensors are counted beside it.
     """
     import json
-    from pathlib import Path
 
-    from twin.cli.quantity import positive
-    from twin.run.warmup import read_history, warm_up
+    from twin.face.warmup import warm_up
 
-    band, kelvin = positive("--tolerance", tolerance, "m"), positive("--temperature", temperature, "delta_degC")
-    ahead = positive("--horizon", horizon, "s")
-    history = read_history(Path(result))
-    found = warm_up(history, band, kelvin, ahead)
-    told = facts(history, found, {"tolerance_m": band, "tolerance_K": kelvin, "horizon_s": ahead})
+    told = warm_up(result, tolerance, temperature, horizon)
     click.echo(json.dumps(told, indent=2) if as_json else text(result, told))
-
-
-def facts(history: History, found: WarmUp, options: dict[str, float]) -> dict[str, Any]:
-    """Everything `twin warmup` tells, as JSON values: SI units in the names, null for "not reached"."""
-
-    def entry(s: Settling, unit: str) -> dict[str, Any]:
-        return {
-            f"change_{unit}": s.change,
-            f"final_{unit}": s.final,
-            "settled": s.settled,
-            "time_s": s.time,
-            "t63_s": s.t63,
-            "t95_s": s.t95,
-            f"end_rate_{unit}_per_s": s.rate,
-        }
-
-    def pose(index: int) -> dict[str, float]:
-        return dict(zip(history.pose_axes, history.poses[index].tolist(), strict=True))
-
-    return {
-        **options,
-        "duration_s": found.duration,
-        "rate_window_s": found.window,
-        "settled": found.settled,
-        "time_s": found.time,
-        "tcp_actual": {f"d{name}": entry(s, "m") for name, s in found.actual.items()},
-        "tcp_worst": {f"d{name}": {"pose_m": pose(k), **entry(s, "m")} for name, (k, s) in found.worst.items()},
-        "sensors": {name: entry(s, "K") for name, s in found.sensors.items()},
-    }
 
 
 def text(result: str, told: dict[str, Any]) -> str:

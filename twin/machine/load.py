@@ -30,7 +30,7 @@ def load_machine(path: Path, text: str | None = None) -> Machine:
     """
     path = Path(path)
     path = path / "machine.toml" if path.is_dir() else path
-    text = _read(path) if text is None else text
+    text = read_text(path) if text is None else text
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as e:
@@ -71,7 +71,8 @@ def write_schema(path: Path) -> None:
         temporary.write_text(json.dumps(json_schema(), indent=1) + "\n", encoding="utf-8")
 
 
-def _read(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """The text of a description, its line ends as in Unix. Raises DescriptionError where it cannot be read."""
     try:
         return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError as e:

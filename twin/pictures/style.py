@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import Any
-
-import matplotlib
-
-matplotlib.use("Agg")  # files only; no display needed
 
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -15,6 +12,7 @@ AXIS_COLOURS = {"x": "#d55e00", "y": "#009e73", "z": "#0072b2"}  # Okabe-Ito: to
 MARKED = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c564b", "#5b4b9a")
 MUTED = "#b8bcc2"
 INK = "#22262b"
+SHOWN_DPI = 80  # in notebooks
 # pale where cold: the shape stays visible under the shading
 TEMPERATURE_MAP = LinearSegmentedColormap.from_list(
     "heat", ["#e6ecf2", "#cfdbe2", "#fbe6a6", "#f8b04f", "#e4602e", "#a81e36", "#5c0f3a"]
@@ -44,6 +42,15 @@ RC: dict[Any, Any] = {
 }
 
 
+class ShownFigure(Figure):
+    """A figure that a notebook shows as the value of a cell, without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        png = BytesIO()
+        self.savefig(png, format="png", dpi=SHOWN_DPI)
+        return png.getvalue()
+
+
 def figure(width: float, height: float) -> Figure:
     """A figure of width x height [inches] that needs no global state. Call inside `matplotlib.rc_context(RC)`."""
-    return Figure(figsize=(width, height), layout="constrained")
+    return ShownFigure(figsize=(width, height), layout="constrained")

@@ -1,0 +1,1 @@
+"""What `import twin` offers and the command line calls: objects or paths in, objects out."""

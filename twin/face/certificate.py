@@ -1,0 +1,84 @@
+"""The certificate of a model: how far it may be from the full one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+
+class Certificate(Mapping[str, Any]):
+    """Figures of a certificate by name, as the artefact stores them (docs/artefact.md); K and m."""
+
+    def __init__(self, figures: Mapping[str, Any]):
+        self._figures = figures
+
+    def __getitem__(self, name: str) -> Any:
+        return self._figures[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._figures)
+
+    def __len__(self) -> int:
+        return len(self._figures)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every error is within the machine's limits; False where there is no certificate."""
+        return bool(self.get("passed", False))
+
+    @property
+    def temperature_error(self) -> float:
+        """K: the largest error of any sensor, in a case of the size that the limits are for."""
+        return float(self["max_temperature_error_in_case"])
+
+    @property
+    def displacement_error(self) -> float:
+        """m: the largest error of the TCP displacement at any pose, likewise."""
+        return float(self["max_displacement_error_in_case"])
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines()) if self else "no certificate"
+
+    def __repr__(self) -> str:
+        return f"Certificate(passed={self.passed})"
+
+    def lines(self, every_output: bool = False) -> list[str]:
+        """Summary lines, one per figure; with `every_output` also a line per sensor."""
+        error_T, span_T = (_largest(self[f"temperature_{k}"]) for k in ("error", "range"))
+        error_u, span_u = (_largest(self[f"displacement_{k}"]) for k in ("error", "range"))
+        text = [
+            f"certificate over {len(self['scenarios'])} held-out scenarios of {self['hours']:g} h and their steady "
+            f"states (compact against rich, a new one exceeds any one maximum with probability <= "
+            f"{1 - self['confidence']:.0%}):",
+            f"  sensors   {self.temperature_error:.4f} K in a {self['case_temperature']:g} K case "
+            f"(limit {self['limit_temperature']:g} K); as drawn {error_T:.3f} K at ranges up to {span_T:.0f} K: "
+            f"{self['worst_temperature']}",
+            f"  TCP       {1e6 * self.displacement_error:.3f} um in a {1e6 * self['case_displacement']:g} um case "
+            f"(limit {1e6 * self['limit_displacement']:g} um); as drawn {1e6 * error_u:.2f} um at ranges up to "
+            f"{1e6 * span_u:.0f} um: {self['worst_displacement']}",
+            f"  worst output relative to its own range: {100 * self['worst_relative']:.2f} % "
+            f"(limit {100 * self['limit_relative']:g} %)",
+        ]
+        rich_T, rich_u = self["rich_temperature_error"], self["rich_displacement_error"]
+        if rich_T is not None and rich_u is not None:
+            full = self["full_scenarios"]
+            text.append(
+                f"  of which rich against full, on {len(full)}: {rich_T:.1e} K, {1e6 * rich_u:.1e} um "
+                f"({'; '.join(full)})"
+            )
+        else:
+            text.append("  the full model is not in this chain yet: twin verify puts it there")
+        if every_output:
+            columns = ("sensors", "temperature_error_in_case", "temperature_error", "temperature_range")
+            text += [
+                f"    {name:<24} {case:.4f} K in the case; as drawn {error:.4f} K of {span:.1f} K"
+                for name, case, error, span in zip(*(self[c] for c in columns), strict=True)
+            ]
+        text.append("passed" if self.passed else "FAILED: an error is above its limit")
+        return text
+
+
+def _largest(table: Any) -> float:
+    return float(np.max(table, initial=0.0))

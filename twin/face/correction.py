@@ -1,0 +1,93 @@
+"""Polynomials of the TCP error for the control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from twin.errors import TwinError
+from twin.face.inputs import Quantity, positive, quantity
+
+if TYPE_CHECKING:
+    from twin.face.model import Model
+    from twin.run.correction import Correction, Quality
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A correction that was written, and what it leaves."""
+
+    correction: Correction
+    quality: Quality
+    axes: tuple[str, ...]
+    time: float  # s since the start of the run
+
+
+def correct(
+    model: Model | str | Path,
+    result: str | Path,
+    output: str | Path,
+    time: Quantity | None = None,
+    degree: str | None = None,
+    form: Literal["full", "product"] = "full",
+    zero_at: Quantity | None = None,
+) -> Corrected:
+    """Compress the TCP error that `twin.run` wrote to the folder `result`, at one time, for the control.
+
+    time: since the start of the run, by default its end. degree: of the polynomial, "2", or "x=4,y=2". form: all
+    products of powers, or one factor per axis. zero_at: position of the only axis where the error is held at zero.
+    Raises TwinError for results of another model, times outside the run, and an output that is no correction.
+    """
+    from twin.atomic import check_file
+    from twin.face.model import read
+    from twin.run.correction import check_zero, default_degrees, fit_correction, quality
+    from twin.run.correction_axes import axis_jacobian
+    from twin.run.correction_file import read_pose_errors, write_correction
+
+    wanted = None if time is None else positive("time", time, "s", zero=True)
+    zero = None if zero_at is None else quantity("zero_at", zero_at, "m")
+    check_file(Path(output))
+    _check_output(Path(output))
+    loaded = read(model).artefact
+    errors, at = read_pose_errors(Path(result), loaded.digest, wanted)
+    if zero is not None:
+        check_zero(zero, errors.axes, loaded.model.load_model.axes)
+    degrees = _degrees(degree, errors.axes, default_degrees(errors))
+    correction = fit_correction(errors, axis_jacobian(loaded, errors.axes), degrees, form, zero)
+    found = quality(correction, errors)
+    facts = {"machine": loaded.model.name, "artefact": loaded.digest, "result": str(result), "time_s": at}
+    write_correction(Path(output), correction, found, facts)
+    return Corrected(correction, found, errors.axes, at)
+
+
+def _check_output(path: Path) -> None:
+    """Raises TwinError where `path` is a file that is no correction of this program: it is not for us to replace."""
+    from twin.run.correction_file import read_correction
+
+    if not path.exists():
+        return
+    try:
+        read_correction(path)
+    except TwinError as e:
+        what = "exists and is not a correction of this version, so it is not replaced"
+        raise TwinError(what, str(path), "choose another file with -o") from e
+
+
+def _degrees(text: str | None, axes: tuple[str, ...], default: tuple[int, ...]) -> tuple[int, ...]:
+    """Degrees per axis from '2' or 'x=4,y=2'. Raises TwinError for unknown axes and what is no whole number."""
+    from twin.nearest import did_you_mean
+
+    if text is None:
+        return default
+    degrees = dict(zip(axes, default, strict=True))
+    for item in text.split(","):
+        axis, equals, number = item.strip().rpartition("=")
+        value = int(number) if number.strip().isdecimal() and len(number.strip()) < 9 else -1
+        if value < 0:
+            raise TwinError(f"'{item.strip()}' is no degree", "--degree", "write --degree 2, or --degree x=4,y=2")
+        if equals and axis.strip() not in degrees:
+            remedy = did_you_mean(axis.strip(), axes, "axes of the poses")
+            raise TwinError(f"no axis '{axis.strip()}'", "--degree", remedy)
+        degrees |= {axis.strip(): value} if equals else dict.fromkeys(axes, value)
+    return tuple(degrees[a] for a in axes)
