@@ -43,11 +43,20 @@ def test_help_lists_every_command(capsys):
     assert all(f"\n  {name} " in listed for name in COMMANDS)
 
 
-def test_every_command_in_the_readme_exists(monkeypatch):
+def calls_of(page):
+    """The words after `.venv/bin/twin` of every command that a page shows in an indented block."""
+    lines = [line.split("#")[0] for line in (ROOT / page).read_text(encoding="utf-8").splitlines()]
+    return [shlex.split(line)[1:] for line in lines if line.startswith("    .venv/bin/twin ")]
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/commands.md"])
+def test_every_command_on_the_page_exists(page, monkeypatch):
     monkeypatch.chdir(ROOT)
-    lines = [line.split("#")[0] for line in (ROOT / "README.md").read_text(encoding="utf-8").splitlines()]
-    calls = [shlex.split(line) for line in lines if line.startswith("    .venv/bin/twin ")]
-    assert {call[1] for call in calls} == set(COMMANDS) - {"demo"}
-    for _, name, *arguments in calls:
+    for name, *arguments in calls_of(page):
         load(name).make_context(name, list(arguments))
-        assert all(Path(a).exists() for a in arguments if a.startswith("models/"))
+        assert all(Path(a).exists() for a in arguments if a.startswith(("models/", "tests/")))
+
+
+def test_the_list_of_commands_is_complete():
+    assert {name for name, *_ in calls_of("docs/commands.md")} == set(COMMANDS) - {"demo"}
+    assert {name for name, *_ in calls_of("README.md")} == {"check", "build", "run", "calibrate", "diagnose"}
