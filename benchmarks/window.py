@@ -13,9 +13,10 @@ from benchmarks.hidden_draw import draw
 from twin.build.workers import each
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.acting import Acting
-from twin.diagnose.bench import Bench, fine_drive, make_bench, probed
+from twin.diagnose.bench import Bench, fine_drive, make_bench
 from twin.diagnose.march import INNER
 from twin.diagnose.places import pruned
+from twin.diagnose.probed import probed
 from twin.diagnose.study import Study, make_study
 from twin.diagnose.training import EVERY, Shared, stepped
 from twin.machine.parameters import parameters
