@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
 import pickle
@@ -129,8 +130,6 @@ class Hostile:
 
 def signed(content: bytes) -> bytes:
     """With the checksum that an attacker can make as well as we can."""
-    import hashlib
-
     return content + hashlib.sha256(content).digest()
 
 

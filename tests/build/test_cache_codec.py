@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,11 +13,13 @@ import scipy.sparse as sp
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from skfem import MeshTet2
 
 from twin.build.cache_codec import decode, encode
-from twin.build.full_model import SurfaceMesh
+from twin.build.full_model import SurfaceMesh, assemble
 from twin.build.mesh import body_mesh, part_mesh
 from twin.build.stored_model import restored, stored
+from twin.machine.load import load_machine
 from twin.rom.load_model import EnvironmentWiring, LawUse
 
 PLAIN = st.none() | st.booleans() | st.integers() | st.floats() | st.text()
@@ -147,15 +150,7 @@ def test_meshes_are_numbered_as_before(two_part_model):
 @pytest.fixture(params=["straight", "curved"])
 def two_part_model(request):
     """The full model of the small machine, whose first part is curved or straight."""
-    from dataclasses import replace
-
-    from skfem import MeshTet2
-
-    from tests.conftest import ROOT
-    from twin.build.full_model import assemble
-    from twin.machine.load import load_machine
-
-    full = assemble(load_machine(ROOT / "tests" / "machines" / "slide"))
+    full = assemble(load_machine(Path(__file__).parents[1] / "machines" / "slide"))
     if request.param == "straight":
         return full
     first, *others = full.bodies

@@ -25,8 +25,8 @@ from twin.errors import ModelError, TwinError
 from twin.machine.description import Machine
 
 T = TypeVar("T")
-BUDGET = 20_000_000_000  # bytes; some ten machines in use: docs/decisions/0013-cache.md
-ENTRY = re.compile(r"[a-z]+-[0-9a-f]{24}\.(npz|pickle)")  # pickles are entries of versions before 2026-12, never read
+BUDGET = 20_000_000_000  # bytes: twelve machines with a diagnosis each, docs/decisions/0013-cache.md
+ENTRY = re.compile(r"[a-z]+-[0-9a-f]{24}\.(npz|pickle)")  # pickles: of older versions, never read
 _log = logging.getLogger(__name__)
 
 
