@@ -14,8 +14,9 @@ from twin.build.place_training import EVERY, Shared, stepped
 from twin.build.places import pruned
 from twin.build.workers import each
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.bench import Bench, fine_drive, make_bench, probed
+from twin.diagnose.bench import Bench, fine_drive, make_bench
 from twin.diagnose.march import INNER
+from twin.diagnose.probed import probed
 from twin.diagnose.study import Study, make_study
 from twin.inject.draw.trial import draw
 from twin.machine.parameters import parameters

@@ -6,9 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from tests.build.test_cache_codec import equal
 from tests.diagnose import small_case
+from twin.build.cache_file import read_entry, write_entry
 from twin.diagnose import diagnose
 from twin.diagnose.bench import Bench
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.yardstick import instruments_of, make_yardstick, stored
 
 
 @pytest.fixture
@@ -16,8 +20,8 @@ def keys(monkeypatch):
     """The keys that yardsticks are looked for by; none is made."""
     seen = []
 
-    def cached(stage, key, make):
-        seen.append(key)
+    def cached(stage, module, inputs, make):
+        seen.append(inputs)
         raise InterruptedError
 
     monkeypatch.setattr(diagnose, "cached", cached)
@@ -40,3 +44,12 @@ def test_a_yardstick_belongs_to_the_coordinates_it_was_made_in(keys, monkeypatch
             diagnose.prepare(None, small_case.machine(), runs[:2], runs[2:], diagnose.Settings())
     first, again, apart = keys
     assert first == again != apart
+
+
+def test_a_yardstick_comes_back_from_its_entry_as_it_was_made(tmp_path):
+    study = small_case.study()
+    made = make_yardstick(study, FAMILIES[:4], instruments_of(study, 0.05, 0.3e-6), counts=(2, 4))
+    write_entry(tmp_path / "entry.npz", stored(made), 10**9)
+    read = read_entry(tmp_path / "entry.npz").of(study)
+    assert equal(stored(read), stored(made))
+    assert read.study is read.fitter.study is read.whiten.study is study

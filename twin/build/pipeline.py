@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from twin.build.cache import cached, machine_hash
+from twin.build.cached_models import full_model as full_model  # the first stages, offered beside the others
+from twin.build.cached_models import rich_model as rich_model
 from twin.build.certificate import Certificate, Comparison, certify, compare
 from twin.build.compress import Tolerances, balanced, galerkin, trajectories
-from twin.build.full_model import FullModel, assemble
-from twin.build.project import project
-from twin.build.rich_basis import RichOptions, rich_basis
-from twin.build.scenario import Scenario, draw, theta_bounds
+from twin.build.rich_basis import RichOptions
+from twin.build.scenario import Scenario, draw
 from twin.build.workers import LONG
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
@@ -40,32 +39,6 @@ class BuildOptions:
     hours: float = 2.0  # of every held-out scenario; its steady state comes on top
     step: float = 60.0  # s
     substeps: int = 4  # of the held-out scenarios, as many as `twin run` takes
-
-
-def full_model(machine: Machine, progress: Progress = silent) -> FullModel:
-    """The assembled full model, cached."""
-    return cached("full", (machine_hash(machine),), lambda: assemble(machine, progress))
-
-
-def rich_model(
-    machine: Machine, full: FullModel | None, options: RichOptions, progress: Progress = silent
-) -> MachineModel:
-    """The full model projected on the rich bases of its bodies, cached."""
-
-    def make() -> MachineModel:
-        model = (full or full_model(machine, progress)).thermal
-        if machine.lumped:  # small already: the rich model is the full one, in coordinates with E = 1
-            own = (project(body, np.diag(body.E.diagonal() ** -0.5)) for body in model.bodies)
-            return replace(model, bodies=tuple(own))
-        low, high = theta_bounds(model.load_model)
-        bodies = []
-        with progress("rich basis", options.samples * len(model.bodies)) as advance:
-            for body in model.bodies:
-                projected = project(body, rich_basis(body, low, high, options, advance))
-                bodies.append(replace(projected, E=np.eye(projected.n)))  # it is, but for the last digits
-        return replace(model, bodies=tuple(bodies))
-
-    return cached("rich", (machine_hash(machine), options), make)
 
 
 def training_scenarios(load: LoadModel, options: BuildOptions, still: bool = False) -> list[Scenario]:

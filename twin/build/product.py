@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from twin import __version__
-from twin.build.cache import machine_hash, source_hash
+from twin.build.cache import machine_hash
 from twin.build.certificate import Certificate
+from twin.build.import_closure import closure_hash
 from twin.build.pipeline import (
     BUILD_SEED,
     VERIFY_SEED,
@@ -52,7 +53,7 @@ def build_artefact(
     provenance = {
         "machine": str(description.resolve()),
         "machine_hash": machine_hash(machine),
-        "source_hash": source_hash(),
+        "source_hash": closure_hash(__name__),
         "twin": __version__,
         **{f"package_{name}": importlib.metadata.version(name) for name in PACKAGES},
         "command": f"twin build --method {options.method} --states {options.states} --samples {options.rich.samples} "

@@ -6,23 +6,18 @@ Measurements come later, so that hundreds of synthetic ones may share it.
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from twin.build.cache import cached, machine_hash
-from twin.build.full_model import FullModel, assemble
-from twin.build.pipeline import theta_bounds
+from twin.build.cache import arrays_hash, cached, machine_hash
 from twin.build.place_training import Shared, snapshots
-from twin.build.places import GHOST, Place, places_of, pruned, with_ghosts, with_places
-from twin.build.project import project
-from twin.build.rich_basis import RichOptions, rich_basis
+from twin.build.places import GHOST, Place, pruned
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
 from twin.diagnose.march import INNER, NestedLoads, loads_for
+from twin.diagnose.probed import Probed, probed
 from twin.errors import LogError
 from twin.logs.run import Run
 from twin.logs.signals import signal_values
@@ -30,27 +25,18 @@ from twin.machine.description import Machine
 from twin.progress import Progress, silent
 from twin.rom.contact_matrix import ContactPlaces
 from twin.rom.drive import Drive, evaluate, measured_air
+from twin.rom.load_model import LoadModel
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
 from twin.rom.sampling import Intervals, cut
 from twin.run.system import Layout, System, prepare
 
-RICH = RichOptions(samples=10, tolerance=2e-2)
 FINE = 60.0  # s, steps of loads and of the truth beside them
 TRAINING_STEP = 120.0  # s
 TAIL = 6e-7  # share of the squared trajectories, in units of the noise, that is left out
 LARGEST = 220  # states
 MEAN_OF = {"A": 2.0, "W": 1.0, "m/s": 1.0, "1/s": 1.0, "1": 1.0}  # by unit: e of |s|^e, which acts; else s
 LEAST = 3600.0  # s, of a log
-
-
-@dataclass(frozen=True)
-class Probed:
-    """The rich model of a machine with places and ghosts of its sensors, cached."""
-
-    rich: MachineModel
-    places: tuple[Place, ...]
-    height: tuple[np.ndarray, ...]  # per body (n, n_films of the description): A_k @ height [m^3]
 
 
 @dataclass(frozen=True)
@@ -82,54 +68,6 @@ class Bench:
     ghosts: np.ndarray  # (n_sensors, r): sensors moved aside; the sensors themselves on lumped machines
     runs: tuple[BenchRun, ...]
     reduction: tuple[float, float]  # K, m: rms of what the window leaves of held-out trajectories at the worst output
-
-
-def probed(machine: Machine, progress: Progress = silent) -> Probed:
-    """The rich model with places, cached by description and meshes."""
-
-    def make() -> Probed:
-        full = assemble(with_ghosts(machine), progress)
-        places = places_of(machine, full)
-        model = with_places(full, places)
-        height = _heights(machine, full, model)
-        n_films = len(full.thermal.load_model.films)
-        if machine.lumped:
-            bases = [np.diag(np.asarray(body.E.diagonal()) ** -0.5) for body in model.bodies]
-        else:
-            low, high = theta_bounds(model.load_model)
-            with progress("rich basis with places", RICH.samples * len(model.bodies)) as advance:
-                bases = [rich_basis(body, low, high, RICH, advance) for body in model.bodies]
-        bodies, heights = [], []
-        for body, V, h in zip(model.bodies, bases, height, strict=True):
-            small = project(replace(body, F=None), V)
-            bodies.append(replace(small, E=np.eye(small.n)))
-            heights.append(V.T @ h[:, :n_films])
-        return Probed(replace(model, bodies=tuple(bodies)), places, tuple(heights))
-
-    return cached("probed", (machine_hash(machine), RICH, _code(places_of)), make)
-
-
-def _code(function: Callable) -> str:
-    """Hash of the module of a function: the cache knows the code of builds alone."""
-    return hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).hexdigest()
-
-
-def _heights(machine: Machine, full: FullModel, model: MachineModel) -> list[np.ndarray]:
-    """Per body A_k @ height (n, n_films) of the description's films."""
-    axis = "xyz".index(machine.machine.vertical)
-    n_films = len(full.thermal.load_model.films)
-    result = []
-    for b, body in enumerate(model.bodies):
-        H = np.zeros((body.n, n_films))
-        if full.bodies:
-            z = np.zeros(body.n)
-            nodes = full.bodies[b].nodes[:, axis]
-            z[: len(nodes)] = nodes
-            for term, k in zip(body.A, body.theta, strict=True):
-                if k < n_films:
-                    H[:, k] = term @ z
-        result.append(H)
-    return result
 
 
 def fine_drive(model: MachineModel, run: Run, dt: float = FINE) -> Drive:
@@ -167,10 +105,6 @@ def make_bench(
         else float(measured_air(load, drive)[0, load.surroundings])
         for run, drive in zip(runs, drives, strict=True)
     ]  # fmt: skip
-    digest = hashlib.sha256()
-    for drive, start in zip(drives, starts, strict=True):
-        for part in (*drive_arrays(drive), np.array(start)):
-            digest.update(np.ascontiguousarray(part).tobytes())
     known = tuple((p.path, p.nominal, p.sigma, p.low, p.high) for p in parameters)
 
     def make() -> tuple[np.ndarray, tuple[float, float]]:
@@ -190,10 +124,17 @@ def make_bench(
     if machine.lumped:
         V, reduction = np.eye(rich.rich.n), (0.0, 0.0)
     else:
-        V, reduction = cached(
-            "window", (machine_hash(machine), known, digest.hexdigest(), TAIL, LARGEST, _code(snapshots)), make
-        )  # fmt: skip
+        inputs = (machine_hash(machine), known, tuple(starts), arrays_hash(_logged(load, runs)))
+        V, reduction = cached("window", __name__, inputs, make)
     return _assembled(rich, V, parameters, runs, names, drives, starts, reduction)
+
+
+def _logged(load: LoadModel, runs: Sequence[Run]) -> Iterator[np.ndarray]:
+    """All of the runs' logs that drives are made from."""
+    for run in runs:
+        yield run.loads.time
+        columns = signal_values(run, load.signals)
+        yield from (np.asarray(columns[name]) for name in sorted(columns))
 
 
 def _rows(model: MachineModel) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from twin import __version__
-from twin.build.cache import cached, machine_hash
+from twin.build.cache import arrays_hash, cached, machine_hash
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
 from twin.diagnose.bench import Bench, drive_arrays, make_bench
@@ -26,7 +25,7 @@ from twin.diagnose.settled import settled
 from twin.diagnose.study import Study, make_study
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
-from twin.diagnose.yardstick import FORM, NULLS, Yardstick, instruments_of, make_yardstick
+from twin.diagnose.yardstick import FORM, NULLS, Yardstick, instruments_of, make_yardstick, stored
 from twin.errors import ArtefactError, LogError
 from twin.logs.run import Run
 from twin.machine.description import Machine
@@ -99,61 +98,38 @@ def prepare(
             f"two hours of one sensor of the machine, or {LEAST} TCP rows",
         )  # fmt: skip
     instruments = instruments_of(study, settings.temperature_sigma, settings.tcp_sigma)
-    key = hashlib.sha256()
+    parts = []
     for planned in study.runs:
         m, drive, signals = planned.measured, planned.run.drive, planned.run.signals
-        for part in (m.mean_of, m.column, np.nan_to_num(m.count), m.tcp_step, m.tcp_share, m.pose, planned.z0,
-                     np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
-                     *(signals[name] for name in sorted(signals))):  # fmt: skip
-            key.update(np.ascontiguousarray(part).tobytes())
+        parts += [m.mean_of, m.column, np.nan_to_num(m.count), m.tcp_step, m.tcp_share, m.pose, planned.z0,
+                  np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
+                  *(signals[name] for name in sorted(signals))]  # fmt: skip
     # the window's coordinates: made anew on other cores they may be others, and z0 is zero at the reference temperature
-    for rows in (bench.B, *(body.C for body in bench.base.bodies)):
-        key.update(np.ascontiguousarray(rows).tobytes())
+    parts += [bench.B, *(body.C for body in bench.base.bodies)]
     asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)
     names = tuple((f.name, f.number, f.file) for f in settings.families)
     tolerance = tuple((p.path, p.nominal, p.sigma) for p in known)
-    yard = cached(
-        "yardstick",
-        (
-            machine_hash(machine),
-            asked,
-            tuple(study.fitted),
-            key.hexdigest(),
-            instruments,
-            names,
-            tolerance,
-            settings.form,
-            settings.nulls,
-            _code(),
-        ),
-        lambda: make_yardstick(
-            study, settings.families, instruments, Form(), (settings.form, settings.nulls), progress
-        ),
+    counts = (settings.form, settings.nulls)
+    inputs = (
+        machine_hash(machine),
+        asked,
+        tuple(study.fitted),
+        arrays_hash(parts),
+        instruments,
+        names,
+        tolerance,
+        counts,
     )
-    fitter = replace(yard.fitter, study=study, whiten=replace(yard.whiten, study=study))
-    return bench, study, replace(yard, study=study, fitter=fitter), plans
+    yard = cached(
+        "yardstick", make_yardstick.__module__, inputs,
+        lambda: stored(make_yardstick(study, settings.families, instruments, Form(), counts, progress)),
+    )  # fmt: skip
+    return bench, study, yard.of(study), plans
 
 
 def _closed(m: Measured) -> Measured:
     """The plan of a sealed run without its numbers."""
     return replace(m, temperature=np.full_like(m.temperature, np.nan), tcp=np.full_like(m.tcp, np.nan))
-
-
-AFTER = (  # modules that only use a yardstick
-    "accepted", "channels", "coarse", "contest", "damage", "diagnose", "diagnosis", "edges", "edit", "extension",
-    "gain", "growth", "hide", "hotter", "refit", "report", "search", "settled", "site", "sizes", "verdict",
-)  # fmt: skip
-
-
-def _code() -> str:
-    """Hash of the code that makes yardsticks, beside that of builds."""
-    own = Path(__file__).parent
-    files = [path for path in own.glob("*.py") if not path.name.startswith(AFTER)]
-    files += [path for layer in ("calibrate", "run") for path in (own.parent / layer).rglob("*.py")]
-    digest = hashlib.sha256()
-    for path in sorted(files):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 def diagnose(

@@ -26,7 +26,7 @@ from twin.diagnose.nulls import Form, Instruments, null
 from twin.diagnose.readings import readings_of
 from twin.diagnose.sight import Columns, sight
 from twin.diagnose.study import Study
-from twin.diagnose.surrogate import make_surrogate
+from twin.diagnose.surrogate import Surrogate, make_surrogate
 from twin.diagnose.unknown import heat_of
 from twin.diagnose.whiten import Whitener, offsets
 from twin.diagnose.windy import wind_columns
@@ -57,6 +57,37 @@ class Yardstick:
     @property
     def whiten(self) -> Whitener:
         return self.fitter.whiten
+
+
+@dataclass(frozen=True)
+class StoredYardstick:
+    """A yardstick without the study, whose measurements come later: what the cache keeps."""
+
+    surrogate: Surrogate
+    channels: tuple[tuple[Channels, Channels], ...]
+    others: np.ndarray  # (m, q) white
+    elements: Elements
+    nominal: tuple[Nominal, ...]
+    index: dict[tuple[str, str, str], int]
+    columns: Columns
+    nulls: dict[str, np.ndarray]
+    thresholds: dict[str, float]
+    lost: Lost
+
+    def of(self, study: Study) -> Yardstick:
+        """The yardstick of a study that differs from the one it was made for in its measured values alone."""
+        fitter = Fitter(study, self.surrogate, Whitener(study, self.channels), self.others)
+        return Yardstick(
+            study, fitter, self.elements, self.nominal, self.index, self.columns, self.nulls, self.thresholds, self.lost
+        )
+
+
+def stored(yard: Yardstick) -> StoredYardstick:
+    fitter = yard.fitter
+    return StoredYardstick(
+        fitter.surrogate, fitter.whiten.channels, fitter.others, yard.elements, yard.nominal, yard.index, yard.columns,
+        yard.nulls, yard.thresholds, yard.lost,
+    )  # fmt: skip
 
 
 def _null_residual(shared: tuple[Fitter, list[np.ndarray], Instruments, Form], seed: int) -> np.ndarray:

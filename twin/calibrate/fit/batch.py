@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from twin.calibrate.fit.problem import FitRun, Problem, outputs_of
+from twin.calibrate.fit.problem import FitRun, Form, Problem, outputs_of
 
 CHUNK = 64  # samples stepped together: their matrices stay in the cache of a core
 
@@ -50,8 +50,8 @@ def batch(problem: Problem, run: FitRun, samples: np.ndarray, advance: Callable[
     return Batch(np.array(T), np.array(w))
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def _many(*arguments: Any) -> jax.Array:
+@partial(jax.jit, static_argnums=0)
+def _many(form: Form, *arguments: Any) -> jax.Array:
     shared, u = arguments[:-1], arguments[-1]
-    one: Callable[[jax.Array], jax.Array] = partial(outputs_of, False, *shared)
+    one: Callable[[jax.Array], jax.Array] = partial(outputs_of, form, *shared)
     return jax.vmap(one)(u)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -41,6 +41,16 @@ class FitRun:
     loads: WindowLoads
     rows: Rows
     z0: np.ndarray  # (r,)
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a compiled program is specialised on."""
+
+    layout: Layout
+    places: ContactPlaces
+    from_first: bool  # displacements are those since the first measurement
+    derivative: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,7 +119,7 @@ class Problem:
     def call(self, function: Any, run: FitRun, u: jax.Array) -> jax.Array:
         m = run.measured
         return function(
-            self.layout, self.places, m.from_first, self.system, self._effects(run), run.loads, run.rows,
+            Form(self.layout, self.places, m.from_first), self.system, self._effects(run), run.loads, run.rows,
             (m.mean_of, m.column), run.z0, u,
         )  # fmt: skip
 
@@ -122,26 +132,25 @@ class Problem:
 
 
 def outputs_of(
-    derivative: bool, layout: Layout, places: ContactPlaces, from_first: bool, system: System, effects: Effects,
-    loads: WindowLoads, rows: Rows, bins: tuple[jax.Array, jax.Array], z0: jax.Array, u: jax.Array,
+    form: Form, system: System, effects: Effects, loads: WindowLoads, rows: Rows,
+    bins: tuple[jax.Array, jax.Array], z0: jax.Array, u: jax.Array,
 ) -> jax.Array:  # fmt: skip
-    states = trajectory(layout, places, derivative, system, effects, loads, z0, u)
+    states = trajectory(form.layout, form.places, form.derivative, system, effects, loads, z0, u)
     mean_of, column = bins
     T = jnp.asarray(mean_of) @ temperatures(system, states)[:, column]
     w = displacements(effects, rows, states, u)
-    if from_first:
+    if form.from_first:
         w = w - w[0]
     return jnp.concatenate([T.ravel(), w.ravel()])
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def _outputs(*arguments: Any) -> jax.Array:
-    return outputs_of(False, *arguments)
+_outputs = partial(jax.jit, static_argnums=0)(outputs_of)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def _jacobian(*arguments: Any) -> jax.Array:
-    return jax.jacfwd(partial(outputs_of, True), argnums=len(arguments) - 1)(*arguments)
+@partial(jax.jit, static_argnums=0)
+def _jacobian(form: Form, *arguments: Any) -> jax.Array:
+    own = replace(form, derivative=True)
+    return jax.jacfwd(partial(outputs_of, own), argnums=len(arguments) - 1)(*arguments)
 
 
 def run_names(runs: Sequence[Run]) -> list[str]:

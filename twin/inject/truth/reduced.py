@@ -18,11 +18,11 @@ import numpy as np
 from twin.build.cache import cached
 from twin.build.compress import Tolerances, galerkin
 from twin.build.full_model import FullModel, assemble
-from twin.build.pipeline import theta_bounds
 from twin.build.place_training import DRAWS, Draw, Shared, trajectory
 from twin.build.places import PREFIX, Place, places_of, pruned, with_places
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
+from twin.build.scenario import theta_bounds
 from twin.build.workers import each
 from twin.inject.experiment import RUNS, START, STEP, Experiment, plan
 from twin.inject.truth.other_machine import OTHER_MESH, other_machine, other_text
@@ -59,7 +59,7 @@ def reduced(experiment: Experiment) -> Reduced:
     for name in RUNS:
         loads.update((experiment.folder / "runs" / name / "loads.csv").read_bytes())
     known = (other_text(experiment, STRUCTURE), RICH, TRAINING_STEP, DRAWS, STATES, UNIT, OTHER_MESH)
-    return cached("hidden", (*known, loads.hexdigest()), lambda: _made(experiment))
+    return cached("hidden", __name__, (*known, loads.hexdigest()), lambda: _made(experiment))
 
 
 @lru_cache(maxsize=2)

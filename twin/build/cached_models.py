@@ -1,0 +1,45 @@
+"""The models of a build that take long and depend on the description alone: kept in the cache."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from twin.build.cache import cached, machine_hash
+from twin.build.full_model import FullModel, assemble
+from twin.build.project import project
+from twin.build.rich_basis import RichOptions, rich_basis
+from twin.build.scenario import theta_bounds
+from twin.build.stored_model import restored, stored
+from twin.machine.description import Machine
+from twin.progress import Progress, silent
+from twin.rom.model import MachineModel
+
+
+def full_model(machine: Machine, progress: Progress = silent) -> FullModel:
+    """The assembled full model, cached."""
+    return restored(
+        cached("full", stored.__module__, (machine_hash(machine),), lambda: stored(assemble(machine, progress)))
+    )
+
+
+def rich_model(
+    machine: Machine, full: FullModel | None, options: RichOptions, progress: Progress = silent
+) -> MachineModel:
+    """The full model projected on the rich bases of its bodies, cached."""
+
+    def make() -> MachineModel:
+        model = (full or full_model(machine, progress)).thermal
+        if machine.lumped:  # small already: the rich model is the full one, in coordinates with E = 1
+            own = (project(body, np.diag(body.E.diagonal() ** -0.5)) for body in model.bodies)
+            return replace(model, bodies=tuple(own))
+        low, high = theta_bounds(model.load_model)
+        bodies = []
+        with progress("rich basis", options.samples * len(model.bodies)) as advance:
+            for body in model.bodies:
+                projected = project(body, rich_basis(body, low, high, options, advance))
+                bodies.append(replace(projected, E=np.eye(projected.n)))  # it is, but for the last digits
+        return replace(model, bodies=tuple(bodies))
+
+    return cached("rich", __name__, (machine_hash(machine), options), make)

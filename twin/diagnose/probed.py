@@ -1,0 +1,71 @@
+"""The rich model of a machine that has seen heat and films at every named surface, made once per machine and cached."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.build.cache import cached, machine_hash
+from twin.build.full_model import FullModel, assemble
+from twin.build.places import Place, places_of, with_ghosts, with_places
+from twin.build.project import project
+from twin.build.rich_basis import RichOptions, rich_basis
+from twin.build.scenario import theta_bounds
+from twin.machine.description import Machine
+from twin.progress import Progress, silent
+from twin.rom.model import MachineModel
+
+RICH = RichOptions(samples=10, tolerance=2e-2)
+
+
+@dataclass(frozen=True)
+class Probed:
+    """The rich model of a machine with places and ghosts of its sensors, cached."""
+
+    rich: MachineModel
+    places: tuple[Place, ...]
+    height: tuple[np.ndarray, ...]  # per body (n, n_films of the description): A_k @ height [m^3]
+
+
+def probed(machine: Machine, progress: Progress = silent) -> Probed:
+    """The rich model with places, cached by description and meshes."""
+
+    def make() -> Probed:
+        full = assemble(with_ghosts(machine), progress)
+        places = places_of(machine, full)
+        model = with_places(full, places)
+        height = _heights(machine, full, model)
+        n_films = len(full.thermal.load_model.films)
+        if machine.lumped:
+            bases = [np.diag(np.asarray(body.E.diagonal()) ** -0.5) for body in model.bodies]
+        else:
+            low, high = theta_bounds(model.load_model)
+            with progress("rich basis with places", RICH.samples * len(model.bodies)) as advance:
+                bases = [rich_basis(body, low, high, RICH, advance) for body in model.bodies]
+        bodies, heights = [], []
+        for body, V, h in zip(model.bodies, bases, height, strict=True):
+            small = project(replace(body, F=None), V)
+            bodies.append(replace(small, E=np.eye(small.n)))
+            heights.append(V.T @ h[:, :n_films])
+        return Probed(replace(model, bodies=tuple(bodies)), places, tuple(heights))
+
+    return cached("probed", __name__, (machine_hash(machine),), make)
+
+
+def _heights(machine: Machine, full: FullModel, model: MachineModel) -> list[np.ndarray]:
+    """Per body A_k @ height (n, n_films) of the description's films."""
+    axis = "xyz".index(machine.machine.vertical)
+    n_films = len(full.thermal.load_model.films)
+    result = []
+    for b, body in enumerate(model.bodies):
+        H = np.zeros((body.n, n_films))
+        if full.bodies:
+            z = np.zeros(body.n)
+            nodes = full.bodies[b].nodes[:, axis]
+            z[: len(nodes)] = nodes
+            for term, k in zip(body.A, body.theta, strict=True):
+                if k < n_films:
+                    H[:, k] = term @ z
+        result.append(H)
+    return result
