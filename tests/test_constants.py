@@ -20,12 +20,15 @@ PUBLISHED = {
     "twin.rom.following.DIFFERENCES": "nodes of film tables: tests compute laws there",
     "twin.units._TABLE": "factors to SI units: a test reads a number in every one of them",
 }
-# Bounds of memory and work, on which no result depends: a test makes them small, that a small case has several portions
+# Bounds of memory and work: a test makes them small, that a small case has several portions, or is made quickly
 PATCHED = {
     "AT_ONCE": "columns that are stepped together",
     "CHUNK": "elements that are assembled together",
     "_CHUNK": "pixels that are drawn together",
     "MAX_ITERATIONS": "after which a solver that stalls says so",
+    "DRAWS": "trajectories that the reduced machine of trials is made from",
+    "RICH": "its rich basis",
+    "STATES": "its states at most",
     "MOST": "nodes of a surface that a tank is connected to",
 }
 

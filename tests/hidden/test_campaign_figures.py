@@ -90,7 +90,7 @@ def test_goals_are_counted_rightly():
     assert found["false unknown, cause in the catalogue"] == ("0.143", "1 of 7")
     assert found["size within its 95 % interval"] == ("0.500", "1 of 2")
     assert found["reducible held-out variance recovered (median)"] == ("0.750", "2")
-    assert found["seconds per diagnosis, yardstick ready (median)"][0] == "4.0"
+    assert found["seconds per diagnosis, thresholds ready (median)"][0] == "4.0"
 
 
 def test_failed_trials_stand_beside_their_figure():

@@ -7,7 +7,7 @@ a fixed contact joins are one place; the pads of a moving contact are one place,
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -210,41 +210,41 @@ def _on_body(mesh: BodyMesh | None, body: AffineBody, place: Place) -> tuple[np.
 def pruned(model: MachineModel, sources: Collection[str] = (), films: Collection[str] = ()) -> MachineModel:
     """The model of `with_places`, full or reduced, with the sources and films of these places only."""
     load = model.load_model
-    keep_source = [k for k, s in enumerate(load.sources) if _stays(s.name, sources)]
-    keep_film = [k for k, f in enumerate(load.films) if _stays(f.name, films)]
-    keep_air = [k for k, e in enumerate(load.environments) if _stays(e.name, films)]
+    source = _renumbered([s.name for s in load.sources], sources)
+    film = _renumbered([f.name for f in load.films], films)
+    air = _renumbered([e.name for e in load.environments], films)
     n_films = len(load.films)
-    joint = range(n_films, n_films + len(load.joints))
-    theta = {old: new for new, old in enumerate([*keep_film, *joint])}
-    source = {old: new for new, old in enumerate(keep_source)}
-    air = {old: new for new, old in enumerate(keep_air)}
-    bodies = []
-    for body in model.bodies:
-        terms = [i for i, k in enumerate(body.theta) if k in theta]
-        own = [i for i, k in enumerate(body.sources) if k in source]
-        bodies.append(
-            replace(
-                body,
-                A=tuple(body.A[i] for i in terms),
-                theta=tuple(theta[body.theta[i]] for i in terms),
-                M=body.M[:, terms],
-                H=None if body.H is None else body.H[:, terms],
-                B=body.B[:, own],
-                B_out=None if body.B_out is None else body.B_out[:, own],
-                sources=tuple(source[body.sources[i]] for i in own),
-            )
-        )
+    theta = film | {n_films + k: len(film) + k for k in range(len(load.joints))}
+    bodies = tuple(_body_with(body, theta, source) for body in model.bodies)
     load = replace(
         load,
-        sources=tuple(load.sources[k] for k in keep_source),
+        sources=tuple(load.sources[k] for k in source),
         films=tuple(
             replace(load.films[k], environment=air[load.films[k].environment], radiant=air[load.films[k].radiant])
-            for k in keep_film
+            for k in film
         ),
-        environments=tuple(load.environments[k] for k in keep_air),
+        environments=tuple(load.environments[k] for k in air),
     )
-    return replace(model, bodies=tuple(bodies), load_model=load)
+    return replace(model, bodies=bodies, load_model=load)
 
 
-def _stays(name: str, wanted: Collection[str]) -> bool:
-    return not name.startswith(PREFIX) or name[len(PREFIX) :] in wanted
+def _renumbered(names: Sequence[str], wanted: Collection[str]) -> dict[int, int]:
+    """Old number -> new one, of those that are in the description or wanted."""
+    kept = [k for k, n in enumerate(names) if not n.startswith(PREFIX) or n[len(PREFIX) :] in wanted]
+    return {old: new for new, old in enumerate(kept)}
+
+
+def _body_with(body: AffineBody, theta: Mapping[int, int], source: Mapping[int, int]) -> AffineBody:
+    """A body with these films, joints and sources (old number -> new one) only."""
+    terms = [i for i, k in enumerate(body.theta) if k in theta]
+    own = [i for i, k in enumerate(body.sources) if k in source]
+    return replace(
+        body,
+        A=tuple(body.A[i] for i in terms),
+        theta=tuple(theta[body.theta[i]] for i in terms),
+        M=body.M[:, terms],
+        H=None if body.H is None else body.H[:, terms],
+        B=body.B[:, own],
+        B_out=None if body.B_out is None else body.B_out[:, own],
+        sources=tuple(source[body.sources[i]] for i in own),
+    )

@@ -7,6 +7,7 @@ no product with it and the row that reads off the stored heat is also the test v
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import twin.run.jax_setup  # noqa: F401  isort: skip
@@ -187,39 +188,17 @@ def prepare(model: MachineModel) -> Prepared:
     bodies, back = zip(*(_normalised(b) for b in model.bodies), strict=True)
     load = model.load_model
     order = [np.argsort(b.ports, kind="stable") for b in bodies]
-    ports = tuple(tuple(int(b.ports[i]) for i in o) for b, o in zip(bodies, order, strict=True))
-    couplings = _couplings(model, ports)
-    layout = Layout(
-        symmetric=all(b.symmetric for b in bodies),
-        sizes=tuple(b.n for b in bodies),
-        ports=ports,
-        terms=tuple(tuple(int(k) for k in b.theta) for b in bodies),
-        couplings=couplings,
-        elimination=plan(len(bodies), {(c.rail_body, c.pad_body) for c in couplings}),
-        n_films=len(load.films),
-        following_films=tuple(k for k, f in enumerate(load.films) if states_of(f.use)),
-        following_losses=tuple(k for k, s in enumerate(load.sources) if states_of(s.use)),
-    )
+    layout = _layout(model, bodies, order)
     N, n_films, offsets = model.n, len(load.films), layout.offsets
-    M, H, film_rows = np.zeros((N, n_films)), np.zeros((N, n_films)), np.zeros((n_films, N))
     B, source_rows = np.zeros((N, len(load.sources))), np.zeros((len(load.sources), N))
     C, G = np.zeros((len(model.sensors), N)), np.zeros((3 * len(model.poses), N))
-    film_area, film_moment = np.zeros(n_films), np.zeros(n_films)
     for b, body in enumerate(bodies):
         rows = slice(offsets[b], offsets[b + 1])
-        for column, k in enumerate(body.theta):
-            if k >= n_films:
-                continue
-            M[rows, k] = body.M[:, column]
-            if body.H is not None:
-                H[rows, k] = body.H[:, column]
-                film_moment[k] += body.energy @ body.H[:, column]
-            film_rows[k, rows] = body.energy @ body.A[column]
-            film_area[k] += body.energy @ body.M[:, column]
         B[rows, list(body.sources)] = body.B
         source_rows[list(body.sources), rows] = body.source_rows
         C[list(body.sensors), rows] = body.C
         G[:, rows] = body.G.reshape(-1, body.n)
+    M, H, film_rows, film_area, film_moment = _film_matrices(bodies, layout)
     films = FilmPlan.of(load, np.zeros(n_films))
     nominal = np.array([0.0] * n_films + [j.conductance for j in load.joints])
     system = System(
@@ -248,3 +227,40 @@ def prepare(model: MachineModel) -> Prepared:
     )
     capacity = float(np.asarray(system.energy) @ np.asarray(system.one))
     return Prepared(layout, jax.device_put(system), back, capacity)
+
+
+def _layout(model: MachineModel, bodies: Sequence[AffineBody], order: Sequence[np.ndarray]) -> Layout:
+    """order: per body the places of its ports, increasing."""
+    load = model.load_model
+    ports = tuple(tuple(int(b.ports[i]) for i in o) for b, o in zip(bodies, order, strict=True))
+    couplings = _couplings(model, ports)
+    return Layout(
+        symmetric=all(b.symmetric for b in bodies),
+        sizes=tuple(b.n for b in bodies),
+        ports=ports,
+        terms=tuple(tuple(int(k) for k in b.theta) for b in bodies),
+        couplings=couplings,
+        elimination=plan(len(bodies), {(c.rail_body, c.pad_body) for c in couplings}),
+        n_films=len(load.films),
+        following_films=tuple(k for k, f in enumerate(load.films) if states_of(f.use)),
+        following_losses=tuple(k for k, s in enumerate(load.sources) if states_of(s.use)),
+    )
+
+
+def _film_matrices(bodies: Sequence[AffineBody], layout: Layout) -> tuple[np.ndarray, ...]:
+    """M, H (N, n_films), film_rows (n_films, N), film_area and film_moment (n_films,) of all bodies."""
+    N, n, offsets = layout.offsets[-1], layout.n_films, layout.offsets
+    M, H, film_rows = np.zeros((N, n)), np.zeros((N, n)), np.zeros((n, N))
+    film_area, film_moment = np.zeros(n), np.zeros(n)
+    for b, body in enumerate(bodies):
+        rows = slice(offsets[b], offsets[b + 1])
+        for column, k in enumerate(body.theta):
+            if k >= n:
+                continue
+            M[rows, k] = body.M[:, column]
+            if body.H is not None:
+                H[rows, k] = body.H[:, column]
+                film_moment[k] += body.energy @ body.H[:, column]
+            film_rows[k, rows] = body.energy @ body.A[column]
+            film_area[k] += body.energy @ body.M[:, column]
+    return M, H, film_rows, film_area, film_moment

@@ -70,15 +70,20 @@ def _tcp(entries: Sequence[Entry]) -> list[str]:
     for method in (MODEL, *NAMES):
         if (axes[0], method) in pooled:
             lines.append(_tcp_line(method, [pooled[a, method] for a in axes], pooled.get((VECTOR, method))))
+    return lines + _segments(entries)
+
+
+def _segments(entries: Sequence[Entry]) -> list[str]:
     segments = [e for e in entries if e.run and e.output == VECTOR and e.method == MODEL]
-    if 1 < len(segments) <= MOST_SEGMENTS:
-        lines.append("    model by segment")
-        for e in segments:
-            own = [f.figures for f in entries if (f.run, f.segment, f.method) == (e.run, e.segment, MODEL)]
-            label = e.run.rstrip("/").split("/")[-1] if e.segment == "all" else e.segment
-            lines.append(_tcp_line(label, own[:-1], own[-1], "      "))
-    elif len(segments) > MOST_SEGMENTS:
-        lines.append(f"    {len(segments)} segments: see -o or --json")
+    if len(segments) < 2:
+        return []
+    if len(segments) > MOST_SEGMENTS:
+        return [f"    {len(segments)} segments: see -o or --json"]
+    lines = ["    model by segment"]
+    for e in segments:
+        own = [f.figures for f in entries if (f.run, f.segment, f.method) == (e.run, e.segment, MODEL)]
+        label = e.run.rstrip("/").split("/")[-1] if e.segment == "all" else e.segment
+        lines.append(_tcp_line(label, own[:-1], own[-1], "      "))
     return lines
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from twin.inject.hidden import Hidden
 from twin.inject.truth.behaviour import Behaviour, Clean
 from twin.logs.run import Run, Table
 from twin.rom.drive import Drive
-from twin.rom.model import MachineModel
 
 
 @dataclass(frozen=True)
@@ -29,55 +29,43 @@ class Part:
 
 def together(parts: Sequence[Part]) -> Part:
     """Several hidden things at once."""
-
-    def acting(r: int, drive: Drive) -> Acting:
-        each = [p.behaviour.acting(r, drive) for p in parts]
-        power: dict[str, np.ndarray] = {}
-        for a in each:
-            for place, watts in a.power.items():
-                power[place] = power.get(place, 0.0) + np.asarray(watts)
-        return Acting(
-            power, {k: v for a in each for k, v in a.film.items()}, {k: v for a in each for k, v in a.medium.items()}
-        )
-
-    def loads(r: int, drive: Drive) -> Drive:
-        for p in parts:
-            drive = p.behaviour.loads(r, drive)
-        return drive
-
-    def shape(model: MachineModel) -> MachineModel:
-        for p in parts:
-            model = p.behaviour.shape(model)
-        return model
-
-    def really(r: int, log: Run) -> Run:
-        for p in parts:
-            log = p.behaviour.really(r, log)
-        return log
-
-    def readings(r: int, run: Run, clean: Clean) -> Run:
-        for p in parts:
-            run = p.readings(r, run, clean)
-        return run
-
-    def logs(r: int, run: Run) -> Run:
-        for p in parts:
-            run = p.logs(r, run)
-        return run
-
     factors: dict[str, float] = {}
     for p in parts:
         for path, factor in p.factors.items():
             factors[path] = factors.get(path, 1.0) * factor
-    behaviour = Behaviour(
-        heats=tuple(dict.fromkeys(h for p in parts for h in p.behaviour.heats)),
-        films=tuple(dict.fromkeys(f for p in parts for f in p.behaviour.films)),
-        acting=acting, loads=loads, shape=shape, really=really, laws=any(p.behaviour.laws for p in parts),
-        warm={k: v for p in parts for k, v in p.behaviour.warm.items()},
-        late={k: v for p in parts for k, v in p.behaviour.late.items()},
-    )  # fmt: skip
-    hidden = tuple(h for p in parts for h in p.hidden)
-    return Part(hidden, behaviour, factors, readings, logs)
+    return Part(
+        tuple(h for p in parts for h in p.hidden),
+        _behaviour([p.behaviour for p in parts]),
+        factors,
+        lambda r, run, clean: reduce(lambda seen, p: p.readings(r, seen, clean), parts, run),
+        lambda r, run: reduce(lambda seen, p: p.logs(r, seen), parts, run),
+    )
+
+
+def _behaviour(several: Sequence[Behaviour]) -> Behaviour:
+    """What several things do, one after the other."""
+    return Behaviour(
+        heats=tuple(dict.fromkeys(h for b in several for h in b.heats)),
+        films=tuple(dict.fromkeys(f for b in several for f in b.films)),
+        acting=lambda r, drive: _acting([b.acting(r, drive) for b in several]),
+        loads=lambda r, drive: reduce(lambda felt, b: b.loads(r, felt), several, drive),
+        shape=lambda model: reduce(lambda shaped, b: b.shape(shaped), several, model),
+        really=lambda r, log: reduce(lambda true, b: b.really(r, true), several, log),
+        laws=any(b.laws for b in several),
+        warm={k: v for b in several for k, v in b.warm.items()},
+        late={k: v for b in several for k, v in b.late.items()},
+    )
+
+
+def _acting(each: Sequence[Acting]) -> Acting:
+    """Powers at one place add up."""
+    power: dict[str, np.ndarray] = {}
+    for a in each:
+        for place, watts in a.power.items():
+            power[place] = power.get(place, 0.0) + np.asarray(watts)
+    return Acting(
+        power, {k: v for a in each for k, v in a.film.items()}, {k: v for a in each for k, v in a.medium.items()}
+    )
 
 
 def heating(hidden: Hidden, watts: Sequence[np.ndarray]) -> Part:

@@ -133,47 +133,68 @@ def _coverage(trials: Sequence[Result], known: Known) -> Share:
 def goals(results: Sequence[Result], limits: Sequence[Limit], known: Known) -> list[list[str]]:
     """Rows: figure, value, 95 % interval, trials, errors, goal."""
     inside = [r for r in results if r["family"] in known.families]
-    nulls = [r for r in results if r["family"] in NULLS]
     outside = [r for r in results if r["family"] == "outside"]
     seen = [r for r in inside if detected(r)]
-    rows: list[list[str]] = []
+    return [
+        *_false_alarms([r for r in results if r["family"] in NULLS]),
+        _row("family right, of detected", share(seen, family_right), ">= 0.95"),
+        _row("family right or in the ambiguous set", share(seen, in_set)),
+        _row("place right, of detected", share(seen, lambda r: place_right(r, known)), ">= 0.90"),
+        _row("part right, of detected", share(seen, lambda r: _part_right(r, known))),
+        *_by_size(inside),
+        _row("detected at twice the stated limit and more", share(_beyond(inside, limits, known), detected), ">= 0.95"),
+        _row("outside the catalogue: flagged unknown", share(outside, _unknown), ">= 0.90"),
+        _row("outside the catalogue: right part", share(outside, _unknown_part), ">= 0.80"),
+        _row("false unknown, cause in the catalogue", share(inside, _unknown), "<= 0.05"),
+        _row("size within its 95 % interval", _coverage(seen, known), ">= 0.90"),
+        _recovery(_recoveries(inside, known)),
+        _seconds([r["seconds"] for r in results if "seconds" in r]),
+    ]
 
-    def row(name: str, s: Share, goal: str = "") -> None:
-        rows.append([name, s.text, s.interval, s.of, str(s.errors), goal])
 
+def _row(name: str, s: Share, goal: str = "") -> list[str]:
+    return [name, s.text, s.interval, s.of, str(s.errors), goal]
+
+
+def _false_alarms(nulls: Sequence[Result]) -> list[list[str]]:
     alarms = share(nulls, detected)
-    row("false alarms", alarms, "<= 0.05")
     bound = f"{upper(alarms.k, alarms.n):.3f}" if alarms.n else "-"
-    rows.append(["false alarms, upper 95 % bound", bound, "", alarms.of, str(alarms.errors), "<= 0.08"])
     kinds = Counter(str(r["verdict"]) for r in nulls if detected(r))
-    for kind, n in sorted(kinds.items()):
-        row(f"false alarms: {kind}", Share(n, alarms.n, alarms.errors))
-    for name in NULLS:
-        row(f"false alarms of {name}", share([r for r in nulls if r["family"] == name], detected))
-    row("family right, of detected", share(seen, family_right), ">= 0.95")
-    row("family right or in the ambiguous set", share(seen, in_set))
-    row("place right, of detected", share(seen, lambda r: place_right(r, known)), ">= 0.90")
-    row("part right, of detected", share(seen, lambda r: _part_right(r, known)))
+    return [
+        _row("false alarms", alarms, "<= 0.05"),
+        ["false alarms, upper 95 % bound", bound, "", alarms.of, str(alarms.errors), "<= 0.08"],
+        *(_row(f"false alarms: {kind}", Share(n, alarms.n, alarms.errors)) for kind, n in sorted(kinds.items())),
+        *(
+            _row(f"false alarms of {name}", share([r for r in nulls if r["family"] == name], detected))
+            for name in NULLS
+        ),
+    ]
+
+
+def _by_size(inside: Sequence[Result]) -> list[list[str]]:
+    rows = []
     for factor, word in SIZES:
-        goal = ">= 0.80" if factor == 1.0 else ""
         own = [r for r in inside if r["factor"] == factor]
-        row(f"detected at {word} size", share(own, detected), goal)
         shown = [r for r in own if r.get("present", np.inf) > SHOWN]
-        row(f"detected at {word} size, of what the data show", share(shown, detected))
-    row("detected at twice the stated limit and more", share(_beyond(inside, limits, known), detected), ">= 0.95")
-    row("outside the catalogue: flagged unknown", share(outside, lambda r: r["verdict"] == "unknown"), ">= 0.90")
-    row("outside the catalogue: right part", share(outside, _unknown_part), ">= 0.80")
-    row("false unknown, cause in the catalogue", share(inside, lambda r: r["verdict"] == "unknown"), "<= 0.05")
-    row("size within its 95 % interval", _coverage(seen, known), ">= 0.90")
-    shares = _recoveries(inside, known)
+        rows.append(_row(f"detected at {word} size", share(own, detected), ">= 0.80" if factor == 1.0 else ""))
+        rows.append(_row(f"detected at {word} size, of what the data show", share(shown, detected)))
+    return rows
+
+
+def _recovery(shares: Sequence[float]) -> list[str]:
     value = f"{np.median(shares):.3f}" if shares else "-"
     quartiles = f"{np.quantile(shares, 0.25):.3f} to {np.quantile(shares, 0.75):.3f} (quartiles)" if shares else "-"
-    rows.append(["reducible held-out variance recovered (median)", value, quartiles, str(len(shares)), "0", ">= 0.80"])
-    seconds = [r["seconds"] for r in results if "seconds" in r]
+    return ["reducible held-out variance recovered (median)", value, quartiles, str(len(shares)), "0", ">= 0.80"]
+
+
+def _seconds(seconds: Sequence[float]) -> list[str]:
     median = f"{np.median(seconds):.1f}" if seconds else "-"
     most = f"largest {max(seconds):.1f}" if seconds else "-"
-    rows.append(["seconds per diagnosis, yardstick ready (median)", median, most, str(len(seconds)), "0", "<= 300"])
-    return rows
+    return ["seconds per diagnosis, thresholds ready (median)", median, most, str(len(seconds)), "0", "<= 300"]
+
+
+def _unknown(r: Result) -> bool:
+    return bool(r["verdict"] == "unknown")
 
 
 def _part_right(r: Result, known: Known) -> bool:

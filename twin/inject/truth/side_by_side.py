@@ -20,6 +20,7 @@ from twin.inject.stored.files import Truth
 from twin.logs.run import Run, Table
 from twin.logs.signals import signal_values
 from twin.rom.drive import Drive, evaluate, measured_air
+from twin.rom.model import MachineModel
 from twin.rom.step_loads import StepLoads
 from twin.rom.tableau import SDIRK2, stages
 
@@ -118,10 +119,7 @@ def truths_of(
     """
     model = models[0].thermal
     stepper, drives = SideBySide(model, KEPT), [r.drive for r in several]
-    x = [
-        xb[:, None] + np.outer(body.one, [d.warm.get(body.name, 0.0) for d in several])
-        for body, xb in zip(model.bodies, stepper.uniform(START), strict=True)
-    ]
+    x = _start(model, several)
     shown = [measured_air(model.load_model, d)[:, [e for _, e in model.ambient_sensors]] for d in drives]
     row_step = [np.searchsorted(r.drive.time, r.when, side="left") - 1 for r in several]
     tcp = [[np.zeros((len(r.when), 3)) for r in several] for _ in models]
@@ -134,16 +132,30 @@ def truths_of(
             own = [xb[:, i] for xb in x]
             T[i].append(np.concatenate([sensor_temperatures(model, own), shown[i][k]]))
             for row in np.flatnonzero(row_step[i] == k):
-                positions = dict(zip(model.pose_axes, one.where[row], strict=True))
-                for m, full in enumerate(models):
-                    tcp[m][i][row] = full.structure.displacement(positions, tuple(own))
-    sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
-    at = [one.drive.time[: len(t)] - one.ahead for one, t in zip(several, T, strict=True)]
+                for full, rows in zip(models, tcp, strict=True):
+                    rows[i][row] = _displacement(full, one.where[row], own)
     return [
         tuple(
-            Truth(one.name, at[i][at[i] >= -1e-6], np.array(T[i])[at[i] >= -1e-6], sensors, one.when - one.ahead,
-                  one.where, own_tcp[i])
-            for i, one in enumerate(several)
+            _truth(model, one, np.array(own_T), own_tcp) for one, own_T, own_tcp in zip(several, T, each, strict=True)
         )
-        for own_tcp in tcp
-    ]  # fmt: skip
+        for each in tcp
+    ]
+
+
+def _start(model: MachineModel, several: Sequence[Driven]) -> list[np.ndarray]:
+    """Per body the states (n_b, drives) K at START, and what is warmer."""
+    start = START - model.reference_temperature
+    return [np.outer(b.one, [start + d.warm.get(b.name, 0.0) for d in several]) for b in model.bodies]
+
+
+def _displacement(full: FullModel, position: np.ndarray, x: list[np.ndarray]) -> np.ndarray:
+    """Of the TCP (3,) m at a position (axes,) m."""
+    return full.structure.displacement(dict(zip(full.thermal.pose_axes, position, strict=True)), tuple(x))
+
+
+def _truth(model: MachineModel, one: Driven, T: np.ndarray, tcp: np.ndarray) -> Truth:
+    """Of one run, from its start on. T: (n, sensors) degC at the drive's times, tcp (m, 3) m."""
+    sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
+    at = one.drive.time[: len(T)] - one.ahead
+    inside = at >= -1e-6  # s: rounding of clock times
+    return Truth(one.name, at[inside], T[inside], sensors, one.when - one.ahead, one.where, tcp)
