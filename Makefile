@@ -48,7 +48,7 @@ test-all: $(READY) ## every test, the slow ones too
 	$(BIN)/python -m pytest -m "slow or not slow" $(PYTEST_ARGS)
 
 .PHONY: hidden
-hidden: $(READY) ## all trials in which a hidden effect must be found, and their yardstick (long)
+hidden: $(READY) ## all trials in which a hidden effect must be found, and their null distribution (long)
 	$(BIN)/python -m pytest -m "slow or not slow" tests/hidden/test_found.py $(PYTEST_ARGS)
 
 .PHONY: bench

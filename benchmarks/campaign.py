@@ -20,6 +20,7 @@ from twin.build.workers import each
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.detector import Detector
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.gain import predicted
 from twin.diagnose.gaps import emptied
@@ -29,7 +30,6 @@ from twin.diagnose.settled import settled
 from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
-from twin.diagnose.yardstick import Yardstick
 from twin.inject.draw.trial import draw
 from twin.inject.hidden import Hidden, Trial
 from twin.inject.judge.items import Item, items
@@ -46,7 +46,7 @@ KNOWN = known_of(EXPERIMENT, CATALOGUE, [f.name for f in FAMILIES if f.group in 
 
 
 @cache
-def yardstick() -> Yardstick:
+def made_detector() -> Detector:
     """The nominal machine's, on the loads of the three runs, as `twin diagnose` makes it."""
     from twin.rom.artefact import Artefact
 
@@ -58,7 +58,7 @@ def yardstick() -> Yardstick:
 @cache
 def limits() -> dict[tuple[str, str, str, bool], float]:
     """What a diagnosis of these runs states as its limits, place by place."""
-    return limits_at(yardstick())
+    return limits_at(made_detector())
 
 
 def limit(hidden: Hidden) -> float | None:
@@ -69,16 +69,16 @@ def limit(hidden: Hidden) -> float | None:
     return next((size for size in at if size is not None), None)
 
 
-def judged(yard: Yardstick, trial: Trial) -> dict[str, Any]:
+def judged(detector: Detector, trial: Trial) -> dict[str, Any]:
     """One trial: what was hidden, what was said, and what it was worth on the sealed run (of a null nothing)."""
     began = time.perf_counter()
-    names = [planned.run.name for planned in yard.study.runs[:2]]
-    usable, stuck = stuck_sensors(trial.runs[:2], yard.study.bench.base.sensors, names)
+    names = [planned.run.name for planned in detector.study.runs[:2]]
+    usable, stuck = stuck_sensors(trial.runs[:2], detector.study.probed.base.sensors, names)
     if stuck:
         trial = replace(trial, runs=(*usable, *trial.runs[2:]))
-    plans = plans_of(yard, trial)
-    own = emptied(yard, plans) if stuck else yard
-    y = measured_of(with_measured(yard.study, plans))
+    plans = plans_of(detector, trial)
+    own = emptied(detector, plans) if stuck else detector
+    y = measured_of(with_measured(detector.study, plans))
     found = search(own, y)
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     unknown = unknown_of(found) if verdict == "unknown" else None
@@ -100,29 +100,29 @@ def judged(yard: Yardstick, trial: Trial) -> dict[str, Any]:
         "evidence": max(found.steps[0].parts.values()),
         "observed": found.steps[0].observed,
         "limits": [limit(h) for h in trial.hidden],
-        "present": _distance(yard, y, without.y) if without else 0.0,
+        "present": _distance(detector, y, without.y) if without else 0.0,
         "variance": [*variance(found, plans[2].temperature, plans[2].tcp), without.variance] if without else None,
         "seconds": seconds,
     }  # fmt: skip
 
 
-def _distance(yard: Yardstick, y: np.ndarray, without: np.ndarray) -> float:
+def _distance(detector: Detector, y: np.ndarray, without: np.ndarray) -> float:
     """Sum of squares of what is hidden, in units of noise; infinite where it changes what was measured at all."""
-    return float(np.nansum((yard.whiten(y) - yard.whiten(without)) ** 2)) if len(y) == len(without) else np.inf
+    return float(np.nansum((detector.whiten(y) - detector.whiten(without)) ** 2)) if len(y) == len(without) else np.inf
 
 
-def plans_of(yard: Yardstick, trial: Trial) -> list[Measured]:
+def plans_of(detector: Detector, trial: Trial) -> list[Measured]:
     """What was measured in the three runs of a trial."""
-    study = yard.study
+    study = detector.study
     return [
-        measured(study.bench.base, run, p.run.drive, p.run.name) for run, p in zip(trial.runs, study.runs, strict=True)
+        measured(study.probed.base, run, p.run.drive, p.run.name) for run, p in zip(trial.runs, study.runs, strict=True)
     ]
 
 
 def variance(found: Search, temperature: np.ndarray, tcp: np.ndarray) -> tuple[float, float]:
     """Mean square of the sealed run's residuals in units of the channels' noise: recalibrated, extended."""
-    models = predicted(found, len(found.yardstick.study.fitted))
-    result = [_variance(found.yardstick, flat, temperature, tcp) for flat in (models.recalibrated, models.extended)]
+    models = predicted(found, len(found.detector.study.fitted))
+    result = [_variance(found.detector, flat, temperature, tcp) for flat in (models.recalibrated, models.extended)]
     return result[0], result[1]
 
 
@@ -136,16 +136,16 @@ class Bare:
 
 @lru_cache(maxsize=1)  # for the three sizes of a trial
 def bare(family: str, seed: int) -> Bare:
-    yard, trial = yardstick(), draw(EXPERIMENT, family, 1.0, seed, hidden=False)
-    study, plans = yard.study, plans_of(yard, trial)
+    detector, trial = made_detector(), draw(EXPERIMENT, family, 1.0, seed, hidden=False)
+    study, plans = detector.study, plans_of(detector, trial)
     y, last = measured_of(with_measured(study, plans)), len(study.fitted)
-    x, _ = settled(yard, y, ())
-    return Bare(y, _variance(yard, study.outputs(last, x), plans[last].temperature, plans[last].tcp))
+    x, _ = settled(detector, y, ())
+    return Bare(y, _variance(detector, study.outputs(last, x), plans[last].temperature, plans[last].tcp))
 
 
-def _variance(yard: Yardstick, flat: np.ndarray, temperature: np.ndarray, tcp: np.ndarray) -> float:
-    sensors, probe = yard.whiten.channels[0]
-    T, w = yard.study.runs[len(yard.study.fitted)].split(flat)
+def _variance(detector: Detector, flat: np.ndarray, temperature: np.ndarray, tcp: np.ndarray) -> float:
+    sensors, probe = detector.whiten.channels[0]
+    T, w = detector.study.runs[len(detector.study.fitted)].split(flat)
     parts = [((temperature - T) / sensors.sigma).ravel(), ((tcp - w) / probe.sigma).ravel()]
     return float(np.nanmean(np.concatenate(parts) ** 2))
 
@@ -156,7 +156,7 @@ def _several(deadline: float, trials: Sequence[Item]) -> None:
         if time.time() > deadline:
             return
         try:
-            result = judged(yardstick(), draw(EXPERIMENT, family, factor, seed))
+            result = judged(made_detector(), draw(EXPERIMENT, family, factor, seed))
         except Exception as e:  # a trial that fails is a result, too
             result = {"family": family, "factor": factor, "seed": seed, "error": f"{type(e).__name__}: {e}"}
         OUT.mkdir(parents=True, exist_ok=True)
@@ -172,14 +172,14 @@ def results(first: int = FIRST) -> list[dict[str, Any]]:
 
 
 def main(minutes: float = float("inf"), first: int = FIRST) -> None:
-    yard = yardstick()
+    detector = made_detector()
     done = {(r["family"], r["factor"], r["seed"]) for r in results(first)}
     todo = [i for i in items(EXPERIMENT, CATALOGUE, first) if i not in done]
     deadline = time.time() + 60.0 * minutes
     pieces = [list(sizes) for _, sizes in groupby(todo, key=lambda item: (item[0], item[2]))]
     with bar("campaign", len(pieces)) as advance:
         each(_several, deadline, pieces, lambda p: advance(f"{p[0][0]} of seed {p[0][2]}"), long=0.0)
-    text = page(results(first), limits_of(yard), KNOWN, EXPERIMENT.folder.name)
+    text = page(results(first), limits_of(detector), KNOWN, EXPERIMENT.folder.name)
     print(text, flush=True)
     with atomic_path(OUT / "tables.md") as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -53,7 +53,7 @@ def main() -> None:
         print(f"   {planted()[k].path}: rms z {np.sqrt(np.mean(z[:, k] ** 2)):.2f}, mean {np.mean(z[:, k]):+.2f}")
     blind = calibrate(model, [truth(0)], planted(), replace(OPTIONS, form_tolerance=0.0)).fit
     share = float(np.mean(np.abs(deviation(blind, draw(0))) < 2.0))
-    print(f"   seed 0 without errors of form: {share:.0%} within 2 sigma")
+    print(f"   seed 0 without model discrepancy: {share:.0%} within 2 sigma")
 
 
 if __name__ == "__main__":

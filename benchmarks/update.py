@@ -25,7 +25,7 @@ from twin.calibrate.update.methods import Method, Options, update_run
 from twin.calibrate.update.plan import Plan
 from twin.calibrate.update.program import Updated
 from twin.calibrate.update.schedule import Schedule
-from twin.calibrate.update.series import live_through, live_through_003
+from twin.calibrate.update.series import replay_online, replay_online_003
 from twin.calibrate.update.tune import tune
 from twin.errors import ArtefactError
 from twin.logs.read import read_run
@@ -144,7 +144,7 @@ def _borer_once(noisy: list[Series]) -> tuple[dict[str, np.ndarray], np.ndarray,
     coverage = []
     for minutes in INTERVALS:
         interval = 60.0 * minutes
-        lived = live_through(GainPrior(), row, base, z, TCP_NOISE, interval, starts)
+        lived = replay_online(GainPrior(), row, base, z, TCP_NOISE, interval, starts)
         held = np.zeros(len(z))
         for a, b in zip(starts, [*starts[1:], len(z)], strict=True):
             last = 0.0  # the residual that was measured last is added to the base model
@@ -154,7 +154,7 @@ def _borer_once(noisy: list[Series]) -> tuple[dict[str, np.ndarray], np.ndarray,
                     last = z[k] - base[k]
         table["none"].append(scores(base))
         table["hold"].append(scores(held))
-        table["paper"].append(scores(live_through_003(row, base, z, interval, starts).predicted))
+        table["paper"].append(scores(replay_online_003(row, base, z, interval, starts).predicted))
         table["gain"].append(scores(lived.predicted))
         out = ~lived.used
         inside = np.abs(z - lived.predicted) <= 1.96 * np.hypot(lived.sigma, TCP_NOISE)

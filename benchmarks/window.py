@@ -14,9 +14,9 @@ from twin.build.place_training import EVERY, Shared, stepped
 from twin.build.places import pruned
 from twin.build.workers import each
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.bench import Bench, fine_drive, make_bench
-from twin.diagnose.march import INNER
-from twin.diagnose.probed import probed
+from twin.diagnose.integration import INNER
+from twin.diagnose.probed_model import ProbedModel, fine_drive, make_probed_model
+from twin.diagnose.rich_probed_model import rich_probed_model
 from twin.diagnose.study import Study, make_study
 from twin.inject.draw.trial import draw
 from twin.machine.parameters import parameters
@@ -44,14 +44,14 @@ def rich(shared: Shared, place: str) -> np.ndarray:
 
 def window(study: Study, place: int) -> np.ndarray:
     """(n_fine + 1, r) states of the window model, likewise; -1: at none."""
-    slots, x = study.slots(RUN), np.zeros(len(study.bench.parameters))
+    slots, x = study.slots(RUN), np.zeros(len(study.probed.parameters))
     n = len(slots.gate)
     if place >= 0:
-        slots.forcing[:, :, 0] = history(n * INNER).reshape(n, INNER, 1) * study.bench.B[place]
+        slots.forcing[:, :, 0] = history(n * INNER).reshape(n, INNER, 1) * study.probed.B[place]
     return study.states(RUN, x, slots, [1.0])
 
 
-def rows(bench: Bench, shared: Shared) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def rows(probed: ProbedModel, shared: Shared) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Sensors and the TCP at every pose [m] over the states of the rich model, then of the window."""
     names, first = list(shared.rich.sensors), 0
     C = np.zeros((len(names), shared.rich.n))
@@ -59,34 +59,34 @@ def rows(bench: Bench, shared: Shared) -> tuple[np.ndarray, np.ndarray, np.ndarr
         C[list(body.sensors), first : first + body.n] = body.C
         first += body.n
     G = np.concatenate([b.G.reshape(-1, b.n) for b in shared.rich.bodies], axis=1)
-    (own,) = bench.base.bodies
-    return C[[names.index(s) for s in bench.base.sensors]], G, np.asarray(own.C), np.asarray(own.G).reshape(-1, own.n)
+    (own,) = probed.base.bodies
+    return C[[names.index(s) for s in probed.base.sensors]], G, np.asarray(own.C), np.asarray(own.G).reshape(-1, own.n)
 
 
 def main() -> None:
     described, runs = machine(), draw(EXPERIMENT, "null", 1.0, 0).runs
-    model = probed(described)
-    bench = make_bench(described, parameters(described), runs)
-    plans = [measured(bench.base, run, b.drive, b.name) for run, b in zip(runs, bench.runs, strict=True)]
-    study = make_study(bench, plans, range(2))
+    model = rich_probed_model(described)
+    probed = make_probed_model(described, parameters(described), runs)
+    plans = [measured(probed.base, run, b.drive, b.name) for run, b in zip(runs, probed.runs, strict=True)]
+    study = make_study(probed, plans, range(2))
     base = pruned(model.rich)
     drives = tuple(fine_drive(base, run, STEP) for run in runs)
-    starts = tuple(b.start for b in bench.runs)
-    shared = Shared(model.rich, base, bench.parameters, bench.places, drives, starts)
-    names = ["", *(p.name for p in bench.places)]
+    starts = tuple(b.start for b in probed.runs)
+    shared = Shared(model.rich, base, probed.parameters, probed.places, drives, starts)
+    names = ["", *(p.name for p in probed.places)]
     with bar("rich model with heat at one place", len(names)) as advance:
         wanted = each(rich, shared, names, lambda name: advance(name or "none"))
-    C, G, C_small, G_small = rows(bench, shared)
+    C, G, C_small, G_small = rows(probed, shared)
     every = round(STEP / 60.0) * EVERY
     still, found = window(study, -1), []
-    for p, place in enumerate(bench.places):
+    for p, place in enumerate(probed.places):
         X, Z = wanted[p + 1] - wanted[0], (window(study, p) - still)[::every].T
         m = min(X.shape[1], Z.shape[1])
         sizes = [_worst(R @ X[:, :m]) for R in (C, G)]
         errors = [_worst(R @ X[:, :m] - S @ Z[:, :m]) for R, S in ((C, C_small), (G, G_small))]
         found.append((errors[0], errors[1], errors[0] / sizes[0], errors[1] / sizes[1], place.name))
     T, w, T_share, w_share = np.array([f[:4] for f in found]).T
-    print(f"   {bench.base.n} states, {len(found)} places, {POWER:g} W at one of them; worst output of each, rms:")
+    print(f"   {probed.base.n} states, {len(found)} places, {POWER:g} W at one of them; worst output of each, rms:")
     for name, values, unit in (
         ("temperature", 1e3 * T, "mK"), ("TCP", 1e6 * w, "um"),
         ("temperature, of its largest", 1e2 * T_share, "%"), ("TCP, of its largest", 1e2 * w_share, "%"),

@@ -10,7 +10,13 @@ import pytest
 ROOT = Path(__file__).parents[1]
 NOMENCLATURE = ROOT / "docs" / "nomenclature.md"
 HEADING = "## Words we do not use"
-ROOTS = ("README.md", "CHANGELOG.md", "docs/**/*.md", "models/*/README.md")
+ROOTS = (
+    "README.md",
+    "CHANGELOG.md",
+    "docs/**/*.md",
+    "models/*/README.md",
+    *(f"{folder}/**/*.py" for folder in ("twin", "tests", "benchmarks", "models", "notebooks")),
+)
 FILES = sorted({path for pattern in ROOTS for path in ROOT.glob(pattern)} - {Path(__file__)})
 
 

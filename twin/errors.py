@@ -35,7 +35,7 @@ class TwinError(Exception):
 
     @classmethod
     def collect(cls, problems: list[Problem]) -> TwinError:
-        """One error out of all problems found, so that a user mends them in one go."""
+        """One error out of all problems found, so that a user fixes them in one go."""
         return cls(f"{len(problems)} problem(s)", problems=tuple(problems))
 
 

@@ -16,7 +16,7 @@ import gmsh
 from csg import Patch, Point, Prism, Region, Solid
 from solids import solids
 
-TOLERANCE = 1e-5  # m; faces are told apart by features of tens of millimetres
+TOLERANCE = 1e-5  # m; faces are distinguished by features of tens of millimetres
 
 
 def _surface(polygon: tuple[Point, ...]) -> int:

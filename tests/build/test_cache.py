@@ -71,7 +71,7 @@ def test_stage_module_code_and_inputs_decide(monkeypatch):
     assert make.times == 5
 
 
-def test_arrays_are_told_apart_by_type_shape_and_place():
+def test_arrays_are_distinguished_by_type_shape_and_place():
     a = np.arange(6.0)
     given = [[a], [a.reshape(2, 3)], [a.astype(np.float32)], [a[:3], a[3:]], [a[3:], a[:3]], []]
     assert len({arrays_hash(arrays) for arrays in given}) == len(given)
@@ -187,7 +187,7 @@ def test_many_small_entries_do_not_push_out_a_large_one_that_is_used(folder, mon
     monkeypatch.setenv("TWIN_CACHE_BYTES", "200000")
     large, small = Maker(12_500), Maker(500)
     for number in range(60):
-        cached("yardstick", MODULE, (), large)
+        cached("detector", MODULE, (), large)
         cached("full", MODULE, (number,), small)
     assert (large.times, small.times) == (1, 60)
     assert 10 < len(list(folder.glob("full-*.npz"))) < 25
@@ -196,7 +196,7 @@ def test_many_small_entries_do_not_push_out_a_large_one_that_is_used(folder, mon
 
 def test_files_that_are_no_entries_stay_and_entries_of_older_versions_go(folder, monkeypatch):
     monkeypatch.setenv("TWIN_CACHE_BYTES", "35000")
-    others = [folder / "recovery-3.npz", folder / "mesh-five_axis-0.03", folder / "yardstick.lock"]
+    others = [folder / "recovery-3.npz", folder / "mesh-five_axis-0.03", folder / "detector.lock"]
     old = folder / f"full-{'0a' * 12}.pickle"
     for path in (*others, old):
         path.write_bytes(bytes(30_000))

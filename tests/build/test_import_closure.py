@@ -72,7 +72,7 @@ def test_a_module_that_is_not_there_is_an_error(tmp_path):
 
 
 def test_everything_that_python_imports_with_a_module_is_in_its_closure():
-    module = "twin.diagnose.yardstick"
+    module = "twin.diagnose.detector"
     show = f"import sys, {module}; print(*(m for m in sys.modules if m.startswith('twin.')))"
     done = subprocess.run([sys.executable, "-c", show], capture_output=True, text=True, check=True, cwd=ROOT)
     loaded = set(done.stdout.split())
@@ -81,11 +81,11 @@ def test_everything_that_python_imports_with_a_module_is_in_its_closure():
 
 
 def test_what_only_uses_thresholds_does_not_decide_about_them():
-    closure = import_closure("twin.diagnose.yardstick").modules
+    closure = import_closure("twin.diagnose.detector").modules
     assert {
         "twin.diagnose.diagnosis",
         "twin.diagnose.batch",
-        "twin.diagnose.bench",
+        "twin.diagnose.probed_model",
         "twin.calibrate.fit.window",
     } <= set(closure)
     users = {"diagnose", "search", "verdict", "settled", "gain", "refit", "report_page", "hide", "damage"}
@@ -94,7 +94,7 @@ def test_what_only_uses_thresholds_does_not_decide_about_them():
 
 
 def test_an_edit_two_imports_away_in_this_package_is_a_miss(tmp_path):
-    """twin.diagnose.yardstick -> twin.diagnose.bench -> twin.calibrate.fit.window."""
+    """twin.diagnose.detector -> twin.diagnose.probed_model -> twin.calibrate.fit.window."""
     hashes = {}
     for name, edited in (("as it is", None), ("in", "calibrate/fit/window.py"), ("out", "diagnose/verdict.py")):
         root = tmp_path / name
@@ -102,6 +102,6 @@ def test_an_edit_two_imports_away_in_this_package_is_a_miss(tmp_path):
         if edited:
             path = root / "twin" / edited
             path.write_text(path.read_text() + "\n")
-        hashes[name] = closure_hash("twin.diagnose.yardstick", root)
+        hashes[name] = closure_hash("twin.diagnose.detector", root)
     assert hashes["as it is"] == hashes["out"] != hashes["in"]
-    assert hashes["as it is"] == closure_hash("twin.diagnose.yardstick")
+    assert hashes["as it is"] == closure_hash("twin.diagnose.detector")

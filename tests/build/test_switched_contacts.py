@@ -15,7 +15,7 @@ from twin.build.rich_basis import RichOptions
 from twin.build.scenario import theta_bounds
 from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.calibrate.fit.effects import effects_of
-from twin.calibrate.fit.march import loads_for, trajectory
+from twin.calibrate.fit.integration import loads_for, trajectory
 from twin.calibrate.fit.window import merged
 from twin.errors import DescriptionError, LogError
 from twin.machine.check import check_machine
@@ -26,7 +26,7 @@ from twin.rom.contact_matrix import ContactPlaces
 from twin.rom.drive import Drive, evaluate
 from twin.rom.load_model import LoadModel
 from twin.rom.model import MachineModel
-from twin.run.replay import march
+from twin.run.replay import integrate
 from twin.run.stepping import inputs_of
 from twin.run.system import prepare
 
@@ -126,7 +126,7 @@ def test_the_runtime_is_the_stepper_and_close_to_the_full_model(models):
     model, full = models["reduced"], models["full"]
     drive = drive_of(model.load_model, np.concatenate([np.zeros(STEPS // 2), np.linspace(1.0, 0.3, STEPS // 2)]))
     prepared = prepare(model)
-    steps = march(prepared, inputs_of(model.load_model, drive, 1, follow=0.0), prepared.uniform(20.0))
+    steps = integrate(prepared, inputs_of(model.load_model, drive, 1, follow=0.0), prepared.uniform(20.0))
     states = prepared.to_artefact(steps.z)
     stepper = CoupledStepper(model, follow=0.0)
     expected = np.array([np.concatenate(x) for _, x, _ in stepper.run(drive, stepper.uniform(20.0))])
@@ -144,7 +144,7 @@ def test_a_factor_kept_while_a_joint_creeps_changes_little(models):
     drive = drive_of(load, np.linspace(0.0, 1.0, STEPS), sweep=0.0)
     prepared = prepare(model)
     inputs = (inputs_of(load, drive, 1, follow=0.0), inputs_of(load, drive, 1))
-    exact, kept = (march(prepared, given, prepared.uniform(20.0)) for given in inputs)
+    exact, kept = (integrate(prepared, given, prepared.uniform(20.0)) for given in inputs)
     apart = np.abs((kept.z - exact.z) @ np.asarray(prepared.system.C).T).max()
     assert 0.0 < apart < 2e-3
     heat = np.diff(drive.time) * (kept.power.sum(axis=1) + kept.film.sum(axis=1))
@@ -169,7 +169,7 @@ def test_the_window_model_takes_switched_contacts(machine, models, value):
     there = with_values(model, chosen, {p.path: value * p.nominal for p in chosen})
     ready = prepare(there)
     inputs = inputs_of(there.load_model, drive_of(there.load_model, clamp), 2, follow=0.0)
-    wanted = ready.to_artefact(march(ready, inputs, ready.from_artefact(start)).z)
+    wanted = ready.to_artefact(integrate(ready, inputs, ready.from_artefact(start)).z)
     got = prepared.to_artefact(np.asarray(states)[1:])
     assert np.abs(got - wanted).max() < 1e-8 * np.abs(wanted).max()
 

@@ -1,4 +1,4 @@
-"""The bounded gain-and-offset filter: planted values, zero crossings, bounds, gates, and honest uncertainty."""
+"""The bounded gain-and-offset filter: planted values, zero crossings, bounds, gates, and calibrated uncertainty."""
 
 import json
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from twin.calibrate.update import gain_filter
 from twin.calibrate.update.gain_filter import GainPrior, GainState
-from twin.calibrate.update.series import live_through, live_through_003
+from twin.calibrate.update.series import replay_online, replay_online_003
 
 HOUR = 3600.0
 PRIOR = GainPrior()
@@ -47,8 +47,8 @@ def test_a_zero_crossing_breaks_the_papers_gain_and_not_the_filter():
     truth = 0.9 * s + 2e-6
     measured = truth + 0.5e-6 * rng.standard_normal(len(s))
     assert np.abs(s).min() < 0.1e-6
-    paper = live_through_003(time, s, measured, 1800.0)
-    ours = live_through(PRIOR, time, s, measured, 0.5e-6, 1800.0)
+    paper = replay_online_003(time, s, measured, 1800.0)
+    ours = replay_online(PRIOR, time, s, measured, 0.5e-6, 1800.0)
     assert np.abs(paper.predicted - truth).max() > 100e-6
     assert np.abs(ours.predicted - truth)[4:].max() < 3e-6
     assert np.abs(ours.predicted - truth).max() < 6e-6
@@ -134,7 +134,7 @@ def test_intervals_cover_95_percent_of_walks_whose_size_is_not_known(scale):
         gain = 1.0 + scale * (0.1 * rng.standard_normal() + 0.02 * walk[:, 0])
         offset = scale * (2e-6 * rng.standard_normal() + 1e-6 * walk[:, 1])
         truth = gain * s + offset
-        lived = live_through(PRIOR, time, s, truth + 1e-6 * rng.standard_normal(96), 1e-6, 1800.0)
+        lived = replay_online(PRIOR, time, s, truth + 1e-6 * rng.standard_normal(96), 1e-6, 1800.0)
         inside.append((np.abs(truth - lived.predicted) <= 1.96 * lived.sigma)[~lived.used])
     assert 0.90 <= np.mean(inside) <= 0.985
 
@@ -151,7 +151,7 @@ def test_a_slow_answer_is_foreseen_once_it_has_begun():
     without = GainPrior(sigma=(0.1, 1e-9, 2e-6), walk=(0.02, 1e-9, 1e-6))
     errors = []
     for prior in (PRIOR, without):
-        lived = live_through(prior, time, s, truth, 0.1e-6, 3600.0)
+        lived = replay_online(prior, time, s, truth, 0.1e-6, 3600.0)
         errors.append(np.sqrt(np.mean((lived.predicted - truth)[24:] ** 2)))
     assert errors[0] < 0.4 * errors[1]
 

@@ -1,4 +1,4 @@
-"""Noise that remembers and errors of form: the whitening is the inverse root of the covariance it stands for."""
+"""Noise that remembers and model discrepancy: the whitening is the inverse root of the covariance it stands for."""
 
 import numpy as np
 import pytest

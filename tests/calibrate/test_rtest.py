@@ -112,7 +112,7 @@ def test_rows_in_any_order_and_incomplete_ones():
     assert found[1].fit.values()["ECZ"] == pytest.approx(growth(1.0)["ECZ"], abs=20e-6)
 
 
-def test_measurements_are_told_apart_by_time():
+def test_measurements_are_distinguished_by_time():
     time = np.array([0.0, 10.0, 20.0, 700.0, 710.0, 5000.0])
     assert [p.tolist() for p in parts(time, 600.0)] == [[0, 1, 2], [3, 4], [5]]
     assert [len(p) for p in parts(time, 1e4)] == [6]

@@ -1,4 +1,4 @@
-"""What data can and cannot tell apart."""
+"""What data can and cannot distinguish."""
 
 import numpy as np
 

@@ -53,19 +53,17 @@ def test_unknown_command_names_the_nearest(capsys):
 def test_twin_errors_are_one_block_without_traceback(failing, capsys):
     failing(
         DescriptionError.collect(
-            [Problem("a is wrong", "m.toml: a", "mend a"), Problem("b is wrong", "m.toml: b", "mend b")]
+            [Problem("a is wrong", "m.toml: a", "fix a"), Problem("b is wrong", "m.toml: b", "fix b")]
         )
     )
     assert main.run(["info"]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert (
-        captured.err == "error: m.toml: a: a is wrong\n    remedy: mend a\nm.toml: b: b is wrong\n    remedy: mend b\n"
-    )
+    assert captured.err == "error: m.toml: a: a is wrong\n    remedy: fix a\nm.toml: b: b is wrong\n    remedy: fix b\n"
 
 
 def test_traceback_on_demand(failing, capsys):
-    failing(DescriptionError("a is wrong", "m.toml", "mend a"))
+    failing(DescriptionError("a is wrong", "m.toml", "fix a"))
     assert main.run(["--traceback", "info"]) == 2
     assert "Traceback" in capsys.readouterr().err
 

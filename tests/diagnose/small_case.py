@@ -13,11 +13,11 @@ import numpy as np
 from tests.calibrate import lumped_case
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.bank import Nominal, nominal_run, respond
-from twin.diagnose.bench import Bench, make_bench
 from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.detector import Detector, instruments_of, make_detector
 from twin.diagnose.elements import Elements, elements_of
+from twin.diagnose.probed_model import ProbedModel, make_probed_model
 from twin.diagnose.study import Study, make_study
-from twin.diagnose.yardstick import Yardstick, instruments_of, make_yardstick
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.machine.description import Machine
@@ -94,13 +94,13 @@ def runs() -> tuple[Run, ...]:
 
 
 @cache
-def bench(linear: bool = False) -> Bench:
-    return make_bench(machine(linear), parameters(machine(linear)), runs())
+def probed(linear: bool = False) -> ProbedModel:
+    return make_probed_model(machine(linear), parameters(machine(linear)), runs())
 
 
 @cache
 def study(linear: bool = False) -> Study:
-    own = bench(linear)
+    own = probed(linear)
     plans = [measured(own.base, run, b.drive, b.name) for run, b in zip(runs(), own.runs, strict=True)]
     return make_study(own, plans, range(2))
 
@@ -122,6 +122,6 @@ def responses(linear: bool = False) -> np.ndarray:
 
 
 @cache
-def yardstick() -> Yardstick:
+def made_detector() -> Detector:
     """From few synthetic measurements: thresholds are rough."""
-    return make_yardstick(study(), FAMILIES, instruments_of(study(), NOISE, TCP_NOISE), counts=(24, 40))
+    return make_detector(study(), FAMILIES, instruments_of(study(), NOISE, TCP_NOISE), counts=(24, 40))

@@ -46,7 +46,7 @@ def test_against_differences(key):
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
     kind, place, _ = key
     unit = Unit(kind, place, elements.index[key], history(key, elements, study))
-    x = np.zeros(len(study.bench.parameters))
+    x = np.zeros(len(study.probed.parameters))
     got = small_case.responses(linear=True)[:, elements.index[key]]
     parts = []
     for k in study.fitted:
@@ -69,7 +69,7 @@ def test_reactions_of_laws_are_small():
     study, elements = small_case.study(), small_case.elements()
     key = ("heat", "housing", "always")
     unit = Unit("heat", "housing", elements.index[key], history(key, elements, study))
-    x = np.zeros(len(study.bench.parameters))
+    x = np.zeros(len(study.probed.parameters))
     slots = slots_with(study, elements, [unit], 0)
     exact = study.outputs(0, x, slots, [0.5]) - study.outputs(0, x, slots, [-0.5])
     error = np.abs(small_case.responses()[: len(exact), elements.index[key]] - exact).max()
@@ -77,7 +77,7 @@ def test_reactions_of_laws_are_small():
 
 
 def test_responses_add_up():
-    """Blocks of an hour make the whole run: marching is linear."""
+    """Blocks of an hour make the whole run: the integration is linear."""
     elements, D = small_case.elements(), small_case.responses()
     for kind, place in (("heat", "slide"), ("film", "bed")):
         whole = D[:, elements.index[kind, place, "always"]]

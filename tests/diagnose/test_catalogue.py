@@ -79,7 +79,7 @@ def test_the_example_finds_its_lamp(lamp):
     """Hidden in first-order responses, looked for among all hypotheses of heat, with free parameters."""
     study, elements, D = small_case.study(), small_case.elements(), small_case.responses()
     context = Context(study, elements, elements.index)
-    sigma, x = [], np.zeros(len(study.bench.parameters))
+    sigma, x = [], np.zeros(len(study.probed.parameters))
     for k in study.fitted:
         (b, s), (rows, _) = study.runs[k].shapes
         sigma += [np.full(b * s, 0.02), np.full(rows * 3, 3e-7)]

@@ -34,7 +34,7 @@ def test_an_artefact_of_too_few_states_is_named():
     assert cause.statistic > cause.threshold
     # all its states in other coordinates: what is left are steps in time, at bearings of some seconds
     study = small_case.study()
-    looked_at = replace(study, bench=replace(study.bench, reduction=(1e-9, 1e-15)))
+    looked_at = replace(study, probed=replace(study.probed, reduction=(1e-9, 1e-15)))
     whole = coarse_model(with_states(lumped_case.artefact().model, 1000), looked_at, *NOISE)
     assert cause.statistic > 10.0 * (0.0 if whole is None else whole.statistic)
 

@@ -105,7 +105,7 @@ def test_a_machine_that_has_moved(artefact, tmp_path, capsys):
 def test_defaults_are_those_of_the_library():
     options = {p.name: p for p in command.params}
     assert options["nulls"].default == Settings().nulls
-    assert f"; {Settings().form} more show errors of form" in options["nulls"].help
+    assert f"; {Settings().form} more show model discrepancy" in options["nulls"].help
 
 
 def test_a_seed_that_is_none(artefact, tmp_path, capsys):
@@ -171,7 +171,7 @@ def found(monkeypatch):
             diagnosis("named" if causes else "nothing"), causes=causes, pulls=(), ranked=(), series=(), gain=(),
             cosine=np.zeros((0, 0)), nulls={}, thresholds={}, observed={}, whiteness=(),
         )  # fmt: skip
-        search = SimpleNamespace(yardstick=SimpleNamespace(study=SimpleNamespace(bench=None)))
+        search = SimpleNamespace(detector=SimpleNamespace(study=SimpleNamespace(probed=None)))
         monkeypatch.setattr("twin.diagnose.diagnose.diagnose", lambda *_: Result(made, search, causes))
 
     monkeypatch.setattr("twin.diagnose.extension.build_artefact", lambda _, to, **more: to.write_bytes(b"built"))

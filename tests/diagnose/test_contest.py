@@ -49,20 +49,20 @@ def test_freedom_has_its_price():
 
 
 def test_fitted_edges_and_further_windows_are_no_proof():
-    yard = small_case.yardstick()
-    name = yard.study.runs[0].run.name
+    detector = small_case.made_detector()
+    name = detector.study.runs[0].run.name
 
     def windows(*hours: float) -> Hypothesis:
         h = hypothesis()
         own = tuple(Window(name, 3600.0 * hour, 3600.0 * hour + 1800.0) for hour in hours)
         return replace(h, when=replace(h.when, windows=own))
 
-    assert proof(yard, hypothesis()) == 100.0
-    one, two = proof(yard, windows(1.0)), proof(yard, windows(1.0, 2.0))
+    assert proof(detector, hypothesis()) == 100.0
+    one, two = proof(detector, windows(1.0)), proof(detector, windows(1.0, 2.0))
     assert 2.0 < 100.0 - one < 36.0  # its two edges: more than chance gives, less than a cause
     assert one - two == pytest.approx(worth(windows(1.0)) - worth(windows(1.0, 2.0)))  # edges of the second included
     reading = replace(windows(1.0), batch=replace(hypothesis().batch, kind="step"))
-    assert proof(yard, reading) == 100.0
+    assert proof(detector, reading) == 100.0
 
 
 @pytest.mark.parametrize("step", [-1e6, -1.0, -0.01, 0.0, 0.01, 1.0, 1e6])
@@ -99,69 +99,69 @@ def test_amplitudes_that_would_be_too_low_are_held_and_the_others_make_the_best_
 
 
 def test_what_a_cause_may_be():
-    yard = small_case.yardstick()
+    detector = small_case.made_detector()
     coolant = hypothesis(q=2)
     coolant = replace(coolant, batch=replace(coolant.batch, kind="coolant", family="coolant", smallest=5.0))
-    np.testing.assert_array_equal(lowest(yard, coolant), [5.0, -np.inf])
+    np.testing.assert_array_equal(lowest(detector, coolant), [5.0, -np.inf])
     mean, inverse = priors(coolant)
     assert 20.0 < mean[0] < 200.0  # W/(m^2 K), of a liquid that runs down a wall
     assert inverse[0] ** -0.5 == pytest.approx(mean[0])
     assert (mean[1], inverse[1]) == (0.0, 0.0)  # its heat is left to the data
     sun = hypothesis(q=2)
-    assert np.all(lowest(yard, replace(sun, batch=replace(sun.batch, family="sun"))) == 0.0)
-    assert np.all(np.isneginf(lowest(yard, sun)))
+    assert np.all(lowest(detector, replace(sun, batch=replace(sun.batch, family="sun"))) == 0.0)
+    assert np.all(np.isneginf(lowest(detector, sun)))
     assert not np.any(priors(sun)[1])
 
 
 def test_a_surface_lacks_no_more_film_than_it_has():
     """The refit stops where nothing is left of the described film, whatever the data ask for."""
-    yard = small_case.yardstick()
-    study = yard.study
-    batch = next(b for b in yard.columns.batches if b.family == "film_gain" and b.kind == "film")
-    films = [f.name for f in study.bench.base.load_model.films]
-    place = next(p for p in study.bench.places if p.name == batch.places[0])
+    detector = small_case.made_detector()
+    study = detector.study
+    batch = next(b for b in detector.columns.batches if b.family == "film_gain" and b.kind == "film")
+    films = [f.name for f in study.probed.base.load_model.films]
+    place = next(p for p in study.probed.places if p.name == batch.places[0])
     h = Hypothesis(batch, 0, batch.histories[0], 100.0, (-1.0,), 1.0)
-    (floor,) = lowest(yard, h)
-    own = [yard.nominal[k].total[:, films.index(place.film)] for k in study.fitted]
+    (floor,) = lowest(detector, h)
+    own = [detector.nominal[k].total[:, films.index(place.film)] for k in study.fitted]
     assert floor == -max(f.max() for f in own) < 0.0
     wanted = replace(h, amplitude=(3.0 * floor,))
-    x = np.zeros(len(study.bench.parameters))
+    x = np.zeros(len(study.probed.parameters))
     units = units_of(study, h)
-    slots = [slots_with(study, yard.elements, units, k) for k in study.fitted]
+    slots = [slots_with(study, detector.elements, units, k) for k in study.fitted]
     y = np.concatenate(
         [study.by_amplitudes(k, x, s, [3.0 * floor])[0] for k, s in zip(study.fitted, slots, strict=True)]
     )
-    assert exact(yard, y, yard.fitter(y), wanted).amplitude[0] >= floor
+    assert exact(detector, y, detector.fitter(y), wanted).amplitude[0] >= floor
 
 
 def a_coolant(place: int, film: float, heat: float) -> Hypothesis:
     """On the small machine, in one window."""
-    batch = next(b for b in small_case.yardstick().columns.batches if b.kind == "coolant")
+    batch = next(b for b in small_case.made_detector().columns.batches if b.kind == "coolant")
     return Hypothesis(batch, place, batch.histories[0], 100.0, (film, heat), 1.0)
 
 
 def test_no_medium_is_frozen():
-    yard = small_case.yardstick()
+    detector = small_case.made_detector()
     h = a_coolant(0, 5.0, -1.0)
-    area = next(p.area for p in yard.study.bench.places if p.name == h.name)
-    above = yard.study.bench.base.reference_temperature  # K above 0 degC, at which water freezes
+    area = next(p.area for p in detector.study.probed.places if p.name == h.name)
+    above = detector.study.probed.base.reference_temperature  # K above 0 degC, at which water freezes
     cold = -10.0 * area * above
-    np.testing.assert_allclose(_liquid(yard.study, h, np.array([5.0, cold])), [10.0, cold])
+    np.testing.assert_allclose(_liquid(detector.study, h, np.array([5.0, cold])), [10.0, cold])
     for kept in ([12.0, cold], [5.0, -cold]):
-        np.testing.assert_array_equal(_liquid(yard.study, h, np.array(kept)), kept)
+        np.testing.assert_array_equal(_liquid(detector.study, h, np.array(kept)), kept)
     plain = hypothesis()
-    np.testing.assert_array_equal(_liquid(yard.study, plain, np.array([-1e9])), [-1e9])
+    np.testing.assert_array_equal(_liquid(detector.study, plain, np.array([-1e9])), [-1e9])
 
 
 def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
-    """A straight line ranks the face behind first; after some passes from its last start the wetted one leads."""
+    """A linear score ranks the face behind first; after some passes from its last start the wetted one leads."""
     contest = sys.modules[worth.__module__]
     behind, wetted = (replace(a_coolant(p, 5.0, -1.0), statistic=s) for p, s in ((0, 1000.0), (1, 900.0)))
     cold = replace(wetted, amplitude=(7.0, -2.0))
     heat = replace(hypothesis(), statistic=850.0)
     passes = []
 
-    def exact(yard, y, fitted, h, most):
+    def exact(detector, y, fitted, h, most):
         passes.append(most)
         return replace(h, statistic=1100.0 if h is cold else 950.0)
 
@@ -190,7 +190,7 @@ def test_a_capacity_further_behind_is_refitted(monkeypatch):
         return replace(bent, batch=replace(bent.batch, kind=name), statistic=statistic)
 
     heat, tank, film = kind("moved", 328.0), kind("capacity", 250.0), kind("film", 250.0)
-    monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=h.statistic + 1.0))
+    monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: replace(h, statistic=h.statistic + 1.0))
     nothing = np.zeros(0)
     proved, others = judged(None, nothing, None, [(heat,), (tank,), (film,)])
     assert [h.batch.kind for h in proved] == ["moved", "capacity"]
@@ -203,10 +203,10 @@ def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
     lead, near, far = (replace(bent, statistic=s) for s in (1000.0, 950.0, 600.0))
     nothing = np.zeros(0)
-    monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=1.2 * h.statistic))
+    monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: replace(h, statistic=1.2 * h.statistic))
     proved, others = judged(None, nothing, None, [(lead,), (near,), (far,)])
     assert ([h.statistic for h in proved], others) == ([1200.0, 1140.0], [far])
-    monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: replace(h, statistic=5.0 * h.statistic))
+    monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: replace(h, statistic=5.0 * h.statistic))
     proved, others = judged(None, nothing, None, [(lead,), (near,), (far,)])
     assert ([h.statistic for h in proved], others) == ([5000.0], [near, far])
 
@@ -216,7 +216,7 @@ def test_candidates_of_one_kind_do_not_keep_others_out(monkeypatch):
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
     many = [replace(bent, statistic=100.0 - 0.1 * k) for k in range(40)]
     film = replace(bent, batch=replace(bent.batch, kind="film"), statistic=93.0)
-    monkeypatch.setattr(contest, "exact", lambda yard, y, fitted, h: h)
+    monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: h)
     proved, others = judged(None, np.zeros(0), None, [(h,) for h in (*many, film)])
     assert 2 <= len(proved) <= 20
     few = len(proved) - 1
@@ -237,12 +237,12 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
     far = replace(hypothesis(), statistic=50.0)
     refitted = []
 
-    def exact(yard, y, fitted, h):
+    def exact(detector, y, fitted, h):
         refitted.append(h)
         return replace(h, statistic=0.95 * h.statistic)
 
     monkeypatch.setattr(contest, "exact", exact)
-    monkeypatch.setattr(contest, "_bent", lambda yard, h: h.batch.kind == "moved")
+    monkeypatch.setattr(contest, "_bent", lambda detector, h: h.batch.kind == "moved")
     nothing = np.zeros(0)
     order = contest._fair(None, nothing, None, [far, bent, straight])
     assert [h.statistic for h in order] == [97.0, 95.0, 50.0]
@@ -251,9 +251,9 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
     assert refitted == [straight]
 
 
-def test_a_coolants_film_has_an_error_of_form_of_its_own():
+def test_a_coolants_film_has_a_discrepancy_of_its_own():
     """As a share of it, but of no less than the film that is presumed."""
-    study = small_case.yardstick().study
+    study = small_case.made_detector().study
 
     def half(film: float) -> float:
         """Of the interval where the data leave nothing open."""

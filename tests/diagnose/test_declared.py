@@ -14,9 +14,9 @@ from twin.calibrate.fit.measured import measured
 from twin.diagnose.accepted import Accepted, jacobian
 from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Hypothesis
-from twin.diagnose.bench import make_bench
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.contest import misfit
+from twin.diagnose.probed_model import make_probed_model
 from twin.diagnose.search import _reads, search
 from twin.diagnose.search_declared import declared_candidates, declared_exactly, misplaced_candidates, with_signal
 from twin.diagnose.study import Study, make_study
@@ -35,9 +35,11 @@ def logged(signal: str, factor: float) -> Study:
         for run in small_case.runs()
     )  # fmt: skip
     machine = small_case.machine()
-    bench = make_bench(machine, parameters(machine), runs)
+    probed = make_probed_model(machine, parameters(machine), runs)
     return make_study(
-        bench, [measured(bench.base, run, b.drive, b.name) for run, b in zip(runs, bench.runs, strict=True)], range(2)
+        probed,
+        [measured(probed.base, run, b.drive, b.name) for run, b in zip(runs, probed.runs, strict=True)],
+        range(2),
     )
 
 
@@ -50,7 +52,7 @@ def of_another(signal: str) -> np.ndarray:
     the log says."""
     study = logged(signal, 2.0)
     rng = np.random.default_rng(4)
-    return with_noise(study, outputs(study, 0.5 * rng.standard_normal(len(study.bench.parameters))), rng)
+    return with_noise(study, outputs(study, 0.5 * rng.standard_normal(len(study.probed.parameters))), rng)
 
 
 def with_noise(study: Study, flat: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -65,25 +67,25 @@ def with_noise(study: Study, flat: np.ndarray, rng: np.random.Generator) -> np.n
 @pytest.mark.parametrize(("signal", "factor"), [("spindle_current", 2.0), ("x_speed", 0.5), ("spindle_speed", 1.0)])
 def test_a_corrected_signal_is_what_a_log_of_it_would_have_given(signal, factor):
     study, described = logged(signal, factor), small_case.study()
-    x = 0.5 * np.random.default_rng(1).standard_normal(len(study.bench.parameters))
+    x = 0.5 * np.random.default_rng(1).standard_normal(len(study.probed.parameters))
     corrected = outputs(with_signal(described, signal, factor), x)
     np.testing.assert_allclose(corrected, outputs(study, x), rtol=1e-9, atol=1e-15)
     assert np.allclose(corrected, outputs(described, x), rtol=1e-9) == (factor == 1.0)
 
 
-def test_the_right_factor_explains_most_where_straight_lines_prefer_another():
-    yard, y = small_case.yardstick(), of_another("spindle_speed")
-    fitted = yard.fitter(y)
-    exact = {h.name: h.statistic for h in declared_exactly(yard, y, fitted)}
-    line = {h.name: h.statistic for h in declared_candidates(yard, y, fitted)}
+def test_the_right_factor_explains_most_where_linear_scores_prefer_another():
+    detector, y = small_case.made_detector(), of_another("spindle_speed")
+    fitted = detector.fitter(y)
+    exact = {h.name: h.statistic for h in declared_exactly(detector, y, fitted)}
+    line = {h.name: h.statistic for h in declared_candidates(detector, y, fitted)}
     right = "signals.spindle_speed*2"
     assert max(exact, key=lambda name: exact[name]) == right != max(line, key=lambda name: line[name])
     numbers = int(np.isfinite(y).sum())
-    assert misfit(yard, fitted) - exact[right] < numbers + 4.0 * np.sqrt(2.0 * numbers)  # noise
+    assert misfit(detector, fitted) - exact[right] < numbers + 4.0 * np.sqrt(2.0 * numbers)  # noise
 
 
 def test_it_is_named_and_its_other_factors_are_no_other_explanation():
-    found = search(small_case.yardstick(), of_another("spindle_speed"))
+    found = search(small_case.made_detector(), of_another("spindle_speed"))
     verdict, (cause,) = verdict_of(found, FAMILIES)
     assert (verdict, cause.family, cause.place, cause.amplitude) == ("signal", "signal", "signals.spindle_speed", 2.0)
     assert {r.place for r in cause.rivals} == {"signals.spindle_speed"}
@@ -91,32 +93,32 @@ def test_it_is_named_and_its_other_factors_are_no_other_explanation():
 
 def test_a_loss_that_does_the_same_has_the_signal_for_a_rival():
     """A current that one winding alone reads: no data tell twice the current from four times the resistance."""
-    verdict, (cause,) = verdict_of(search(small_case.yardstick(), of_another("spindle_current")), FAMILIES)
+    verdict, (cause,) = verdict_of(search(small_case.made_detector(), of_another("spindle_current")), FAMILIES)
     assert (verdict, cause.family, cause.place) == ("ambiguous", "loss_law", "sources.motor")
     assert "signals.spindle_current" in {r.place for r in cause.rivals}
 
 
 def test_the_source_that_reads_a_corrected_signal_has_no_other_loss_beside_it():
-    yard = small_case.yardstick()
+    detector = small_case.made_detector()
     y = of_another("spindle_current")
-    h = declared_exactly(yard, y, yard.fitter(y))[0]
+    h = declared_exactly(detector, y, detector.fitter(y))[0]
     accepted = [Accepted(h, (), np.ones(1), np.eye(1), h.statistic, 36.0, ())]
-    batch = next(b for b in yard.columns.batches if b.kind == "gain")
+    batch = next(b for b in detector.columns.batches if b.kind == "gain")
     losses = [Hypothesis(batch, i, batch.histories[0], 50.0, (0.1,), 1.0) for i in range(len(batch.places))]
-    assert [h.name for h in losses if _reads(yard.study, h, accepted)] == ["sources.motor"]
-    assert not any(_reads(yard.study, h, []) for h in losses)
+    assert [h.name for h in losses if _reads(detector.study, h, accepted)] == ["sources.motor"]
+    assert not any(_reads(detector.study, h, []) for h in losses)
 
 
 def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
-    yard = small_case.yardstick()
-    study = yard.study
+    detector = small_case.made_detector()
+    study = detector.study
     y = of_another("spindle_current")
-    h = declared_exactly(yard, y, yard.fitter(y))[0]
-    x = np.zeros(len(study.bench.parameters))
-    slots = [slots_with(study, yard.elements, units_of(study, h), k) for k in study.fitted]
+    h = declared_exactly(detector, y, detector.fitter(y))[0]
+    x = np.zeros(len(study.probed.parameters))
+    slots = [slots_with(study, detector.elements, units_of(study, h), k) for k in study.fitted]
     anew = np.vstack([study.jacobian(k, x, s, [1.0])[:, : len(x)] for k, s in zip(study.fitted, slots, strict=True)])
-    np.testing.assert_allclose(jacobian(yard, x, [(h, 1.0)]), anew, rtol=1e-9, atol=1e-15)
-    assert not np.allclose(anew, yard.fitter.surrogate.at(x)[1], rtol=0.2)
+    np.testing.assert_allclose(jacobian(detector, x, [(h, 1.0)]), anew, rtol=1e-9, atol=1e-15)
+    assert not np.allclose(anew, detector.fitter.surrogate.at(x)[1], rtol=0.2)
 
 
 def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description():
@@ -124,15 +126,15 @@ def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description
     elsewhere = text.replace('surface = "bearing_front"', 'surface = "housing"')
     assert elsewhere != text
     machine = load_machine(lumped_case.FOLDER / "machine.toml", elsewhere)
-    study, yard = small_case.study(), small_case.yardstick()
-    other = replace(study, bench=make_bench(machine, parameters(machine), small_case.runs()))
-    x = 0.5 * np.random.default_rng(4).standard_normal(len(study.bench.parameters))
+    study, detector = small_case.study(), small_case.made_detector()
+    other = replace(study, probed=make_probed_model(machine, parameters(machine), small_case.runs()))
+    x = 0.5 * np.random.default_rng(4).standard_normal(len(study.probed.parameters))
     y = with_noise(study, outputs(other, x), np.random.default_rng(5))
-    fitted = yard.fitter(y)
-    best = max(misplaced_candidates(yard, y, fitted), key=lambda h: h.statistic)
+    fitted = detector.fitter(y)
+    best = max(misplaced_candidates(detector, y, fitted), key=lambda h: h.statistic)
     assert best.name == "sources.front>housing"
-    assert best.statistic > 0.9 * (misfit(yard, fitted) - np.isfinite(y).sum())
-    verdict, (cause,) = verdict_of(search(yard, y), FAMILIES)
+    assert best.statistic > 0.9 * (misfit(detector, fitted) - np.isfinite(y).sum())
+    verdict, (cause,) = verdict_of(search(detector, y), FAMILIES)
     assert (verdict, cause.family, cause.place, cause.settings["surface"]) == (
         "named", "misplaced_source", "sources.front", "housing"
     )  # fmt: skip

@@ -47,7 +47,7 @@ def test_edges_are_the_ends_within_a_run():
 def test_the_derivative_by_an_edge_is_that_of_outputs(edge):
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
     h = heat(Window(names()[0], HOUR, 2 * HOUR))
-    x, a = np.zeros(len(study.bench.parameters)), np.array([100.0])
+    x, a = np.zeros(len(study.probed.parameters)), np.array([100.0])
 
     def at(shift):
         units = units_of(study, moved(study, elements, h, [(edge, shift)]))
@@ -77,7 +77,7 @@ def test_the_derivative_by_a_bell_is_that_of_outputs(edge):
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
     h = sunny(2.0 * HOUR, 1.5 * HOUR)
     assert edges_of(study, h) == [Edge("centre", 0), Edge("centre", 1), Edge("length")]
-    x, a = np.zeros(len(study.bench.parameters)), np.array([100.0, 60.0])
+    x, a = np.zeros(len(study.probed.parameters)), np.array([100.0, 60.0])
 
     def at(shift):
         units = units_of(study, moved(study, elements, h, [(edge, shift)]))

@@ -17,7 +17,7 @@ from twin.diagnose.readings import readings_of
 def read():
     """Readings of the fitted runs with their index, and the nominal outputs."""
     study = small_case.study()
-    x = np.zeros(len(study.bench.parameters))
+    x = np.zeros(len(study.probed.parameters))
     outputs = [study.outputs(k, x) for k in study.fitted]
     J = [study.jacobian(k, x)[:, : len(x)] for k in study.fitted]
     return *readings_of(study, small_case.nominal()[:2], outputs, J), outputs, J
@@ -75,7 +75,7 @@ def test_sensor_faults_touch_one_sensor(read):
 def test_a_gain_is_a_declared_parameter(read):
     columns, index, _, J = read
     study = small_case.study()
-    for i, p in enumerate(study.bench.parameters):
+    for i, p in enumerate(study.probed.parameters):
         wanted = np.concatenate([jac[:, i] for jac in J]) / study.scale[i]
         np.testing.assert_allclose(columns[:, index["gain", p.path, "always"]], wanted, rtol=1e-5, atol=1e-12)
 

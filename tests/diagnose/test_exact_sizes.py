@@ -32,14 +32,14 @@ def noise(seed):
 def clean(x=None):
     """(m,) of the fitted runs."""
     study = small_case.study()
-    x = np.zeros(len(study.bench.parameters)) if x is None else x
+    x = np.zeros(len(study.probed.parameters)) if x is None else x
     return np.concatenate([study.outputs(k, x) for k in study.fitted])
 
 
 def test_a_late_clock_reads_what_was_there_before():
     study = small_case.study()
     k = study.fitted[0]
-    x = np.zeros(len(study.bench.parameters))
+    x = np.zeros(len(study.probed.parameters))
     whole = late(study, {k: study.states(k, x)}, 600.0) * 600.0
     T = study.runs[k].split(clean()[: study.runs[k].size])[0]
     moved = study.runs[k].split(whole[: study.runs[k].size])[0]
@@ -52,9 +52,9 @@ def test_a_late_clock_reads_what_was_there_before():
 def test_a_clock_is_found_at_its_size(seconds):
     study = small_case.study()
     k = study.fitted[1]
-    x = 0.5 * np.random.default_rng(8).standard_normal(len(study.bench.parameters))
+    x = 0.5 * np.random.default_rng(8).standard_normal(len(study.probed.parameters))
     y = clean(x) + seconds * late(study, {k: study.states(k, x)}, seconds) + noise(8)
-    verdict, causes = verdict_of(search(small_case.yardstick(), y), FAMILIES)
+    verdict, causes = verdict_of(search(small_case.made_detector(), y), FAMILIES)
     assert (verdict, causes[0].history) == ("signal", "clock")
     assert causes[0].place == f"runs.{study.runs[k].run.name}"
     assert causes[0].amplitude == pytest.approx(seconds, rel=0.08)
@@ -78,14 +78,15 @@ def test_a_play_is_found_at_its_width(share):
             held = min(max(held, value - width / 2), value + width / 2)
             own[i, 2] = held
         first += study.runs[k].size
-    yard = small_case.yardstick()
-    fitted = yard.fitter(y)
-    white = yard.whiten(fitted.residual)
+    detector = small_case.made_detector()
+    fitted = detector.fitter(y)
+    white = detector.whiten(fitted.residual)
     best = max(
-        (h for h in sized_candidates(yard, fitted.projector, white) if h.name == "tcp.dz"), key=lambda h: h.statistic
+        (h for h in sized_candidates(detector, fitted.projector, white) if h.name == "tcp.dz"),
+        key=lambda h: h.statistic,
     )
     assert best.statistic > 36.0
-    found = exact(yard, y, fitted, best)
+    found = exact(detector, y, fitted, best)
     assert found.statistic >= 0.99 * best.statistic
     assert found.amplitude[0] == pytest.approx(width, rel=0.25)
 
@@ -93,13 +94,13 @@ def test_a_play_is_found_at_its_width(share):
 def test_a_film_many_times_as_strong_takes_its_parameter_along():
     """Eight times the film of the front: far beyond the bounds of the parameter, and told as one number."""
     study = small_case.study()
-    j = next(i for i, p in enumerate(study.bench.parameters) if p.path.startswith("films.") and p.kind == "film")
-    x = np.zeros(len(study.bench.parameters))
+    j = next(i for i, p in enumerate(study.probed.parameters) if p.path.startswith("films.") and p.kind == "film")
+    x = np.zeros(len(study.probed.parameters))
     x[j] = np.log(8.0) / study.scale[j]
-    found = search(small_case.yardstick(), clean(x) + noise(9))
+    found = search(small_case.made_detector(), clean(x) + noise(9))
     verdict, causes = verdict_of(found, FAMILIES)
     assert verdict == "out_of_tolerance"
-    place = study.bench.parameters[j].path.removesuffix(".gain")
+    place = study.probed.parameters[j].path.removesuffix(".gain")
     assert (causes[0].family, causes[0].place) == ("film_gain", place)
     low, high = causes[0].ci95
     assert low < 8.0 < high
@@ -112,10 +113,10 @@ def test_a_contact_that_never_was_takes_its_parameter_along():
     """A tenth of a joint's conductance: calibration alone bends everything else."""
     study = small_case.study()
     j = parameter_of(study, "contacts.front_outer")
-    x = np.zeros(len(study.bench.parameters))
+    x = np.zeros(len(study.probed.parameters))
     x[j] = np.log(0.1) / study.scale[j]
-    verdict, causes = verdict_of(search(small_case.yardstick(), clean(x) + noise(9)), FAMILIES)
-    place = study.bench.parameters[j].path.removesuffix(".total")
+    verdict, causes = verdict_of(search(small_case.made_detector(), clean(x) + noise(9)), FAMILIES)
+    place = study.probed.parameters[j].path.removesuffix(".total")
     assert (verdict, causes[0].family, causes[0].place) == ("out_of_tolerance", "joint", place)
     low, high = causes[0].ci95
     assert low < 0.1 < high
@@ -132,9 +133,9 @@ def test_a_contact_that_never_was_takes_its_parameter_along():
 def test_a_wrong_factor_of_the_one_signal_that_a_source_reads_is_its_rival(source, factor, verdict, rival):
     study = small_case.study()
     j = parameter_of(study, f"sources.{source}")
-    x = np.zeros(len(study.bench.parameters))
+    x = np.zeros(len(study.probed.parameters))
     x[j] = np.log(factor) / study.scale[j]
-    said, causes = verdict_of(search(small_case.yardstick(), clean(x) + noise(5)), FAMILIES)
+    said, causes = verdict_of(search(small_case.made_detector(), clean(x) + noise(5)), FAMILIES)
     assert (said, causes[0].family, causes[0].place) == (verdict, "loss_law", f"sources.{source}")
     assert causes[0].amplitude == pytest.approx(factor, rel=0.1)
     rivals = {(r.place, r.amplitude): r.remedy for r in causes[0].rivals}
@@ -143,19 +144,19 @@ def test_a_wrong_factor_of_the_one_signal_that_a_source_reads_is_its_rival(sourc
 
 
 @pytest.mark.parametrize("film", [50.0, 200.0])
-def test_a_liquid_is_found_with_its_film_and_its_temperature_while_the_air_wanders(film):
+def test_a_liquid_is_found_with_its_film_and_its_temperature_while_the_air_drifts(film):
     study, degrees = small_case.study(), 12.0
-    bench, k = study.bench, study.fitted[0]
-    p = [q.name for q in bench.places].index("housing")
+    probed, k = study.probed, study.fitted[0]
+    p = [q.name for q in probed.places].index("housing")
     slots = study.slots(k)
     n = len(slots.gate)
-    slots.A[0], slots.M[0] = bench.A[p], bench.M[p]
+    slots.A[0], slots.M[0] = probed.A[p], probed.M[p]
     slots.gate[n // 4 : 3 * n // 4, 0] = 1.0  # for two hours
-    slots.rise[:, :, 0] = degrees - bench.base.reference_temperature
-    x = 0.5 * np.random.default_rng(9).standard_normal(len(study.bench.parameters))
+    slots.rise[:, :, 0] = degrees - probed.base.reference_temperature
+    x = 0.5 * np.random.default_rng(9).standard_normal(len(study.probed.parameters))
     wet = study.outputs(k, x, slots, (film,)) - study.outputs(k, x)
     verdict, causes = verdict_of(
-        search(small_case.yardstick(), clean(x) + np.pad(wet, (0, len(clean()) - len(wet))) + noise(9)), FAMILIES
+        search(small_case.made_detector(), clean(x) + np.pad(wet, (0, len(clean()) - len(wet))) + noise(9)), FAMILIES
     )
     assert (verdict, causes[0].family, causes[0].place) == ("named", "coolant", "housing")
     low, high = causes[0].ci95
@@ -168,8 +169,8 @@ def test_a_liquid_is_found_with_its_film_and_its_temperature_while_the_air_wande
 @pytest.mark.parametrize("seconds", [900.0, 2400.0])
 def test_a_sensor_that_follows_late_is_found_with_its_time_constant(seconds):
     study = small_case.study()
-    (body,) = study.bench.base.bodies
-    x = 0.5 * np.random.default_rng(11).standard_normal(len(study.bench.parameters))
+    (body,) = study.probed.base.bodies
+    x = 0.5 * np.random.default_rng(11).standard_normal(len(study.probed.parameters))
     y, first = clean(x) + noise(11), 0
     for k in study.fitted:
         plan = study.runs[k]
@@ -181,36 +182,38 @@ def test_a_sensor_that_follows_late_is_found_with_its_time_constant(seconds):
             shown[j] = keep * shown[j - 1] + (1.0 - keep) * T[j]
         y[first : first + b * s].reshape(b, s)[:, i] += plan.measured.mean_of @ (shown - T)
         first += plan.size
-    verdict, causes = verdict_of(search(small_case.yardstick(), y), FAMILIES)
+    verdict, causes = verdict_of(search(small_case.made_detector(), y), FAMILIES)
     assert (verdict, causes[0].place, causes[0].history) == ("sensor", "sensors.front", "lag")
     assert causes[0].amplitude == pytest.approx(seconds, rel=0.1)
 
 
 def test_a_joint_that_conducts_nothing_any_more_keeps_its_evidence():
-    """The march holds conductances at two hundredths: beyond, no derivative was left, and the cause was dropped."""
-    study, yard = small_case.study(), small_case.yardstick()
-    batch = next(b for b in yard.columns.batches if b.kind == "joint")
+    """The time integration holds conductances at two hundredths: beyond, no derivative was left, and the cause was
+    dropped.
+    """
+    study, detector = small_case.study(), small_case.made_detector()
+    batch = next(b for b in detector.columns.batches if b.kind == "joint")
     when = next(w for w in batch.histories if w.windows and w.windows[0].run == "run_0" and w.windows[0].start > 3000.0)
     h = Hypothesis(batch, list(batch.places).index("contacts.shrink_fit"), when, 100.0, (-0.95,), 1.0)
-    units, x = units_of(study, h), np.zeros(len(study.bench.parameters))
+    units, x = units_of(study, h), np.zeros(len(study.probed.parameters))
     y = noise(12)
     y += np.concatenate(
-        [study.outputs(k, x, slots_with(study, yard.elements, units, k), [-0.98]) for k in study.fitted]
+        [study.outputs(k, x, slots_with(study, detector.elements, units, k), [-0.98]) for k in study.fitted]
     )
-    _, (found,) = refit(yard, y, x, [Accepted(h, units, np.array([-0.95]), np.eye(1), 100.0, 36.0, ())])
+    _, (found,) = refit(detector, y, x, [Accepted(h, units, np.array([-0.95]), np.eye(1), 100.0, 36.0, ())])
     assert -0.98 < found.amplitude[0] < -0.9  # nearly all of it, and short of where it is held
     assert 0.0 < found.covariance[0, 0] < 0.1
 
 
 def test_sizes_scored_together_are_scored_as_each_alone():
-    yard, study = small_case.yardstick(), small_case.study()
-    k, x = study.fitted[0], np.zeros(len(study.bench.parameters))
-    fitted = yard.fitter(clean() + 90.0 * late(study, {k: study.states(k, x)}, 90.0) + noise(12))
-    white = yard.whiten(fitted.residual)
-    found = sized_candidates(yard, fitted.projector, white)
+    detector, study = small_case.made_detector(), small_case.study()
+    k, x = study.fitted[0], np.zeros(len(study.probed.parameters))
+    fitted = detector.fitter(clean() + 90.0 * late(study, {k: study.states(k, x)}, 90.0) + noise(12))
+    white = detector.whiten(fitted.residual)
+    found = sized_candidates(detector, fitted.projector, white)
     assert found
     for h in found:
-        change = yard.whiten(curved_change(yard, h, h.amplitude[0], None))
+        change = detector.whiten(curved_change(detector, h, h.amplitude[0], None))
         P = fitted.projector(change)
         assert h.statistic == pytest.approx(float(P @ (2.0 * white - change)), rel=1e-6, abs=1e-6)
         assert h.information == pytest.approx(float(P @ change) / h.amplitude[0] ** 2, rel=1e-6)

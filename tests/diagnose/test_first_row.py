@@ -43,14 +43,14 @@ def runs(reference: str = "first", lost: bool = False) -> tuple[Run, ...]:
 
 def planned(of: tuple[Run, ...]) -> Study:
     """The study of these runs, two of them fitted."""
-    bench = small_case.bench()
+    probed = small_case.probed()
     return make_study(
-        bench, [measured(bench.base, r, b.drive, b.name) for r, b in zip(of, bench.runs, strict=True)], (0, 1)
+        probed, [measured(probed.base, r, b.drive, b.name) for r, b in zip(of, probed.runs, strict=True)], (0, 1)
     )
 
 
 def zeros(study: Study) -> np.ndarray:
-    return np.zeros(len(study.bench.parameters))
+    return np.zeros(len(study.probed.parameters))
 
 
 @cache
@@ -159,8 +159,8 @@ def test_a_sealed_run_that_counts_from_its_first_row_does_so_in_what_is_predicte
     added = []
     for reference in ("first", "absolute"):
         study = read(reference)[0]
-        yard = SimpleNamespace(study=study, nominal=small_case.nominal())
-        found = SimpleNamespace(yardstick=yard, accepted=(cause,), x=zeros(study))
+        detector = SimpleNamespace(study=study, nominal=small_case.nominal())
+        found = SimpleNamespace(detector=detector, accepted=(cause,), x=zeros(study))
         added.append(study.runs[2].split(_read(found, 2))[1])
     assert np.abs(added[0]).max() > 0.0
     assert not added[0][0].any()

@@ -1,4 +1,4 @@
-"""A yardstick with gaps is the one that knows nothing of what is missing."""
+"""A detector with gaps is the one that uses nothing of what is missing."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from twin.diagnose.whiten import measured_of, missing
 
 
 def test_what_is_missing_counts_nowhere():
-    yard = small_case.yardstick()
-    plans = [planned.measured for planned in yard.study.runs]
+    detector = small_case.made_detector()
+    plans = [planned.measured for planned in detector.study.runs]
     T = plans[0].temperature.copy()
     T[5:, 1] = np.nan
     gaps = [replace(plans[0], temperature=T), *plans[1:]]
-    after = emptied(yard, gaps)
-    lost = missing(with_measured(yard.study, gaps))
-    assert lost.sum() > missing(yard.study).sum()
+    after = emptied(detector, gaps)
+    lost = missing(with_measured(detector.study, gaps))
+    assert lost.sum() > missing(detector.study).sum()
     assert not np.any(after.columns.raw[lost])
     assert not np.any(after.fitter.others[lost])
-    np.testing.assert_array_equal(after.columns.raw[~lost], yard.columns.raw[~lost])
+    np.testing.assert_array_equal(after.columns.raw[~lost], detector.columns.raw[~lost])
     gram, own = after.columns.grams[0][0], after.columns.raw[:, after.columns.batches[0].columns[0]].astype(float)
     np.testing.assert_allclose(gram, own.T @ own)
     # whatever would have been read there, the fit is the same
-    y = measured_of(yard.study)
+    y = measured_of(detector.study)
     other = np.where(lost, y + 7.0, y)
     np.testing.assert_array_equal(after.fitter(y).x, after.fitter(other).x)

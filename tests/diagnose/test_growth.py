@@ -1,4 +1,4 @@
-"""Further windows are taken where they explain enough, and not where they only mend a strong cause's misfit."""
+"""Further windows are taken where they explain enough, and not where they only reduce a strong cause's misfit."""
 
 from __future__ import annotations
 

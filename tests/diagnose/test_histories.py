@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.bench import _means, fine_drive
 from twin.diagnose.elements import histories_of
+from twin.diagnose.probed_model import _means, fine_drive
 from twin.diagnose.study import Study
 from twin.logs.run import Run
 
@@ -18,7 +18,7 @@ DUTY = ON / CYCLE
 
 
 def logged(step: float) -> Run:
-    """Loads that come and go in every minute, in rows of `step` [s]: on at its start, an axis to and fro.
+    """Loads that switch in every minute, in rows of `step` [s]: on at its start, an axis to and fro.
 
     In the second hour the current is twice as large, and the axis half as fast.
     """
@@ -38,7 +38,7 @@ def logged(step: float) -> Run:
 
 
 def means(run: Run) -> dict[str, np.ndarray]:
-    base = small_case.bench().base
+    base = small_case.probed().base
     return _means(base, run, fine_drive(base, run))
 
 
@@ -66,10 +66,10 @@ def test_gaps_hold_the_last_value():
 def test_its_history_is_searched():
     study = small_case.study()
     runs = tuple(
-        replace(p, run=replace(p.run, signals=means(logged(1.0)), drive=fine_drive(study.bench.base, logged(1.0))))
+        replace(p, run=replace(p.run, signals=means(logged(1.0)), drive=fine_drive(study.probed.base, logged(1.0))))
         for p in study.runs
     )
-    histories = histories_of(Study(study.bench, study.effects, runs, study.fitted))
+    histories = histories_of(Study(study.probed, study.effects, runs, study.fitted))
     assert {"spindle_current^2", "x_speed"} <= set(histories.signals)
     first, last = histories.signals["spindle_current^2"][0][[0, 90]]
     assert (first, last) == pytest.approx((0.25, 1.0))
@@ -82,7 +82,7 @@ def test_of_rows_no_finer_than_a_step_the_one_in_the_middle_is_taken(step):
     columns = {name: 1.0 + rng.random(len(v)) for name, v in run.loads.columns.items()}
     columns["shop_air"][2] = np.nan
     run = replace(run, loads=replace(run.loads, columns=columns))
-    drive = fine_drive(small_case.bench().base, run)
+    drive = fine_drive(small_case.probed().base, run)
     middle = (drive.time[:-1] + drive.time[1:]) / 2
     found = means(run)
     assert set(found) == set(columns)

@@ -1,4 +1,4 @@
-"""Errors of form grow where channels get far hotter than described, and nowhere else."""
+"""Model discrepancy grows where channels get far hotter than described, and nowhere else."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from twin.diagnose.accepted import parameter_of
 from twin.diagnose.hotter import hotter
 
 
-def test_the_described_machine_keeps_its_yardstick():
-    yard = small_case.yardstick()
-    assert hotter(yard, np.zeros(len(yard.study.bench.parameters))) is yard
+def test_the_described_machine_keeps_its_detector():
+    detector = small_case.made_detector()
+    assert hotter(detector, np.zeros(len(detector.study.probed.parameters))) is detector
 
 
 def test_channels_of_a_stronger_source_are_wrong_by_as_much_more_as_they_rise():
-    yard = small_case.yardstick()
-    study = yard.study
-    x = np.zeros(len(study.bench.parameters))
+    detector = small_case.made_detector()
+    study = detector.study
+    x = np.zeros(len(study.probed.parameters))
     j = parameter_of(study, "sources.motor")
     x[j] = np.log(6.0) / study.scale[j]
-    after = hotter(yard, x)
-    size = np.linalg.norm(yard.fitter.others, axis=1)
+    after = hotter(detector, x)
+    size = np.linalg.norm(detector.fitter.others, axis=1)
     times = np.where(size > 0.0, np.linalg.norm(after.fitter.others, axis=1) / np.maximum(size, 1e-30), 1.0)
     (bins, sensors), _ = study.runs[0].shapes
-    f, f0 = (study.runs[0].split(v[: study.runs[0].size])[0] for v in (yard.fitter.surrogate.at(x)[0],
-                                                                      yard.fitter.surrogate.y0))  # fmt: skip
+    f, f0 = (study.runs[0].split(v[: study.runs[0].size])[0] for v in (detector.fitter.surrogate.at(x)[0],
+                                                                      detector.fitter.surrogate.y0))  # fmt: skip
     ratios = []
     for s in range(sensors):
         rise, described = (np.sqrt(np.mean((v[:, s] - v[0, s]) ** 2)) for v in (f, f0))
@@ -43,14 +43,14 @@ def test_channels_of_a_stronger_source_are_wrong_by_as_much_more_as_they_rise():
     # what scores are made with follows
     wanted = after.fitter.others.T @ after.columns.raw.astype(float)
     np.testing.assert_allclose(after.columns.others, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())
-    assert after.thresholds == yard.thresholds
+    assert after.thresholds == detector.thresholds
 
 
 @pytest.mark.parametrize("factor", [0.2, 1.05])
 def test_a_source_within_its_tolerance_or_a_colder_one_changes_nothing(factor):
-    yard = small_case.yardstick()
-    study = yard.study
-    x = np.zeros(len(study.bench.parameters))
+    detector = small_case.made_detector()
+    study = detector.study
+    x = np.zeros(len(study.probed.parameters))
     j = parameter_of(study, "sources.motor")
     x[j] = np.log(factor) / study.scale[j]
-    assert hotter(yard, x) is yard
+    assert hotter(detector, x) is detector

@@ -1,4 +1,4 @@
-"""What a cause leaves is no second one; what comes and goes too often has no name; a number that something else seen
+"""What a cause leaves is no second one; what switches too often has no name; a number that something else seen
 explains better is not out of its tolerance."""
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from twin.diagnose.verdict import verdict_of
 
 
 def in_windows(n: int) -> Accepted:
-    """Heat that comes and goes n times."""
-    yard = small_case.yardstick()
-    batch = next(b for b in yard.columns.batches if b.kind == "heat" and b.family == "heat_source")
+    """Heat that switches n times."""
+    detector = small_case.made_detector()
+    batch = next(b for b in detector.columns.batches if b.kind == "heat" and b.family == "heat_source")
     at = next(k for k, when in enumerate(batch.histories) if when.windows)
     windows = tuple(Window("run_0", 3600.0 * k, 3600.0 * k + 1800.0) for k in range(n))
     h = Hypothesis(batch, 0, replace(batch.histories[at], windows=windows), 100.0, (10.0,), 1.0)
-    return Accepted(h, units_of(yard.study, h), np.array([10.0]), np.eye(1), 100.0, 36.0, ())
+    return Accepted(h, units_of(detector.study, h), np.array([10.0]), np.eye(1), 100.0, 36.0, ())
 
 
 @pytest.mark.parametrize(("windows", "left", "restless"), [(4, 2.0, 1), (4, 0.3, 0), (1, 5.0, 0)])
-def test_what_comes_and_goes_often_must_leave_nothing_anywhere(windows, left, restless):
-    yard = small_case.yardstick()
+def test_what_switches_often_must_leave_nothing_anywhere(windows, left, restless):
+    detector = small_case.made_detector()
     accepted = [in_windows(windows)]
-    assert len(_restless(yard, accepted, {"elsewhere": left * yard.thresholds["unknown"]})) == restless
-    strong = [replace(accepted[0], statistic=1e5 * yard.thresholds["unknown"])]  # whose misfits they may be
-    assert not _restless(yard, strong, {"elsewhere": left * yard.thresholds["unknown"]})
+    assert len(_restless(detector, accepted, {"elsewhere": left * detector.thresholds["unknown"]})) == restless
+    strong = [replace(accepted[0], statistic=1e5 * detector.thresholds["unknown"])]  # whose misfits they may be
+    assert not _restless(detector, strong, {"elsewhere": left * detector.thresholds["unknown"]})
 
 
 def test_one_window_may_leave_no_heat_but_a_strong_ones_misfits():
-    yard = small_case.yardstick()
-    yard = replace(yard, thresholds={**yard.thresholds, "unknown": 36.0})
+    detector = small_case.made_detector()
+    detector = replace(detector, thresholds={**detector.thresholds, "unknown": 36.0})
     amounts = np.geomspace(0.01, 1e6, 400)
 
     def allowed(statistic: float, kind: str = "heat", factor: float = 1.0) -> float:
         """The most heat that one window may leave."""
         one = replace(in_windows(1), statistic=statistic)
         one = replace(one, hypothesis=replace(one.hypothesis, batch=replace(one.hypothesis.batch, kind=kind)))
-        of = replace(yard, thresholds={**yard.thresholds, "unknown": factor * 36.0})
+        of = replace(detector, thresholds={**detector.thresholds, "unknown": factor * 36.0})
         return max(left for left in amounts if not _leaking(of, [one], {"elsewhere": left}))
 
     weak, strong = allowed(100.0), allowed(1e5)
@@ -64,7 +64,7 @@ def test_one_window_may_leave_no_heat_but_a_strong_ones_misfits():
     assert allowed(100.0, "coolant") == weak
     one = in_windows(1)
     always = replace(one, hypothesis=replace(one.hypothesis, when=replace(one.hypothesis.when, windows=())))
-    assert not _leaking(yard, [always], {"elsewhere": amounts[-1]})
+    assert not _leaking(detector, [always], {"elsewhere": amounts[-1]})
 
 
 @pytest.mark.parametrize("leave", [True, False])
@@ -73,7 +73,7 @@ def test_heat_that_goes_down_by_steps_is_no_window(watts, levels, leave, monkeyp
     """It is named as one only where windows may leave what they like."""
     if leave:
         monkeypatch.setattr(sys.modules[search.__module__], "_leaking", lambda *_: [])
-    found = search(small_case.yardstick(), measured("heat", "housing", watts, 3, levels))
+    found = search(small_case.made_detector(), measured("heat", "housing", watts, 3, levels))
     assert bool(found.accepted) == leave
     assert (verdict_of(found, FAMILIES)[0] == "unknown") != leave
 
@@ -85,7 +85,7 @@ def test_a_second_cause_explains_more_than_the_first_ones_misfits(monkeypatch):
         (b, s), _ = study.runs[k].shapes
         y[first : first + b * s].reshape(b, s)[:, 1] += study.runs[k].measured.bin_time * 3.0 / 14400.0
         first += study.runs[k].size
-    heat, sensor = search(small_case.yardstick(), y).accepted
+    heat, sensor = search(small_case.made_detector(), y).accepted
     assert (heat.hypothesis.family, sensor.hypothesis.family) == ("heat_source", "sensor")
 
     def families(times: float) -> list[str]:
@@ -96,44 +96,44 @@ def test_a_second_cause_explains_more_than_the_first_ones_misfits(monkeypatch):
             return fitted, [replace(a, statistic=(times if a.units else 1.0) * a.statistic) for a in accepted]
 
         monkeypatch.setattr(sys.modules[search.__module__], "refit", stronger)
-        return [a.hypothesis.family for a in search(small_case.yardstick(), y).accepted]
+        return [a.hypothesis.family for a in search(small_case.made_detector(), y).accepted]
 
     assert families(10.0) == ["heat_source", "sensor"]
     assert families(1000.0) == ["heat_source"]
 
 
 def test_what_is_named_beside_another_cause_is_well_above_its_threshold():
-    yard = small_case.yardstick()
+    detector = small_case.made_detector()
     h = in_windows(1).hypothesis
 
     def weak(times: float, misfits: float = 0.0) -> bool:
-        return _weak(yard, [replace(h, statistic=times * yard.thresholds[h.family])], misfits)
+        return _weak(detector, [replace(h, statistic=times * detector.thresholds[h.family])], misfits)
 
     assert weak(1.3)
     assert not weak(10.0)
-    assert weak(10.0, misfits=11.0 * yard.thresholds[h.family])  # of the other one
+    assert weak(10.0, misfits=11.0 * detector.thresholds[h.family])  # of the other one
 
 
 @pytest.mark.parametrize("stays", [True, False])
 def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(stays, monkeypatch):
     """Also where that is too weak to be named beside another cause."""
-    yard = small_case.yardstick()
-    study = yard.study
-    x = np.zeros(len(study.bench.parameters))
-    x[next(i for i, p in enumerate(study.bench.parameters) if p.kind == "source")] = 4.5
+    detector = small_case.made_detector()
+    study = detector.study
+    x = np.zeros(len(study.probed.parameters))
+    x[next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
-    fitted = yard.fitter(y)
-    x0, covariance = settled(yard, y, ())
-    declared = declared_candidates(yard, y, fitted)
-    seen, ranked, step = look(yard, fitted, declared)
-    relaxed = strained(yard, y, fitted, x0, covariance, look(yard, fitted))
+    fitted = detector.fitter(y)
+    x0, covariance = settled(detector, y, ())
+    declared = declared_candidates(detector, y, fitted)
+    seen, ranked, step = look(detector, fitted, declared)
+    relaxed = strained(detector, y, fitted, x0, covariance, look(detector, fitted))
     assert relaxed is not None
     module = sys.modules[closed.__module__]
     monkeypatch.setattr(module, "misfit", lambda *_: 0.0)  # the number itself removes nothing of what was left
     monkeypatch.setattr(module, "_stays", lambda *_: stays)
     other = next(h for h in ranked if h.family not in ("loss_law", "signal"))
-    alarm = replace(other, statistic=1.3 * yard.thresholds[other.family])
-    ended = closed(yard, y, fitted, declared, (seen, [alarm], step), relaxed, x0)
+    alarm = replace(other, statistic=1.3 * detector.thresholds[other.family])
+    ended = closed(detector, y, fitted, declared, (seen, [alarm], step), relaxed, x0)
     assert (ended is not None) == stays
-    quiet = replace(other, statistic=0.5 * yard.thresholds[other.family])
-    assert closed(yard, y, fitted, declared, (seen, [quiet], step), relaxed, x0) is not None
+    quiet = replace(other, statistic=0.5 * detector.thresholds[other.family])
+    assert closed(detector, y, fitted, declared, (seen, [quiet], step), relaxed, x0) is not None

@@ -9,7 +9,7 @@ from tests.diagnose import small_case
 from tests.support.descriptions import SLIDE
 from twin.build.acting import Acting, with_acting
 from twin.build.full_model import assemble
-from twin.build.places import GHOST, PREFIX, places_of, pruned, with_ghosts, with_places
+from twin.build.places import DISPLACED, PREFIX, places_of, pruned, with_displaced_sensors, with_places
 from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.logs.read import read_run
 from twin.logs.signals import signal_values
@@ -123,12 +123,12 @@ def test_heat_at_a_place_warms_what_is_there():
     assert abs(by["bed_front"]) < 0.03
 
 
-def test_ghosts_stand_beside_their_sensors():
+def test_displaced_sensors_stand_beside_their_sensors():
     machine = load_machine(SLIDE)
-    ghosts = with_ghosts(machine)
-    own = [s for s in ghosts.sensors if s.endswith(GHOST)]
+    displaced = with_displaced_sensors(machine)
+    own = [s for s in displaced.sensors if s.endswith(DISPLACED)]
     assert len(own) == sum(s.part is not None for s in machine.sensors.values())
     for name in own:
-        a, b = ghosts.sensors[name], machine.sensors[name.removesuffix(GHOST)]
+        a, b = displaced.sensors[name], machine.sensors[name.removesuffix(DISPLACED)]
         assert np.linalg.norm(np.subtract(a.position, b.position)) == pytest.approx(0.008)
-    assert with_ghosts(small_case.machine()) is small_case.machine()
+    assert with_displaced_sensors(small_case.machine()) is small_case.machine()

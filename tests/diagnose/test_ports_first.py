@@ -35,7 +35,7 @@ def test_it_solves_the_whole_system(states, ports, rank):
 
 
 def test_a_turned_machine_has_its_ports_first_and_reads_the_same():
-    system = small_case.bench().system
+    system = small_case.probed().system
     T = basis(system.P[0]).T
     after = turned(system, T)
     ports = system.P[0].shape[1]

@@ -1,4 +1,4 @@
-"""What a cached yardstick is a yardstick of."""
+"""What a cached detector belongs to."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from tests.build.test_cache_codec import equal
 from tests.diagnose import small_case
 from twin.build.cache_file import read_entry, write_entry
 from twin.diagnose import diagnose
-from twin.diagnose.bench import Bench
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.yardstick import instruments_of, make_yardstick, stored
+from twin.diagnose.detector import instruments_of, make_detector, stored
+from twin.diagnose.probed_model import ProbedModel
 
 
 @pytest.fixture
 def keys(monkeypatch):
-    """The keys that yardsticks are looked for by; none is made."""
+    """The keys that detectors are looked for by; none is made."""
     seen = []
 
     def cached(stage, module, inputs, make):
@@ -28,27 +28,27 @@ def keys(monkeypatch):
     return seen
 
 
-def turned(bench: Bench) -> Bench:
+def turned(probed: ProbedModel) -> ProbedModel:
     """The same machine in coordinates of the other sign."""
-    (body,) = bench.base.bodies
-    return replace(bench, B=-bench.B, base=replace(bench.base, bodies=(replace(body, B=-body.B, C=-body.C),)))
+    (body,) = probed.base.bodies
+    return replace(probed, B=-probed.B, base=replace(probed.base, bodies=(replace(body, B=-body.B, C=-body.C),)))
 
 
-def test_a_yardstick_belongs_to_the_coordinates_it_was_made_in(keys, monkeypatch):
+def test_a_detector_belongs_to_the_coordinates_it_was_made_in(keys, monkeypatch):
     """A window that is made anew, on other cores, may have others; at the reference temperature all starts are zero."""
-    runs, make = small_case.runs(), diagnose.make_bench
+    runs, make = small_case.runs(), diagnose.make_probed_model
     for other in (None, None, turned):
         if other is not None:
-            monkeypatch.setattr(diagnose, "make_bench", lambda *given: turned(make(*given)))
+            monkeypatch.setattr(diagnose, "make_probed_model", lambda *given: turned(make(*given)))
         with pytest.raises(InterruptedError):
             diagnose.prepare(None, small_case.machine(), runs[:2], runs[2:], diagnose.Settings())
     first, again, apart = keys
     assert first == again != apart
 
 
-def test_a_yardstick_comes_back_from_its_entry_as_it_was_made(tmp_path):
+def test_a_detector_comes_back_from_its_entry_as_it_was_made(tmp_path):
     study = small_case.study()
-    made = make_yardstick(study, FAMILIES[:4], instruments_of(study, 0.05, 0.3e-6), counts=(2, 4))
+    made = make_detector(study, FAMILIES[:4], instruments_of(study, 0.05, 0.3e-6), counts=(2, 4))
     write_entry(tmp_path / "entry.npz", stored(made), 10**9)
     read = read_entry(tmp_path / "entry.npz").of(study)
     assert equal(stored(read), stored(made))

@@ -341,20 +341,20 @@ def test_what_is_out_of_tolerance_leads_whatever_else_is_pulled():
 def search_of_a_strong_source():
     """The null distribution of the small case, the number of a source among its parameters, and what is found where
     that source lies 4.5 sigma off."""
-    yard = small_case.yardstick()
-    study = yard.study
-    source = next(i for i, p in enumerate(study.bench.parameters) if p.kind == "source")
-    x = np.zeros(len(study.bench.parameters))
+    detector = small_case.made_detector()
+    study = detector.study
+    source = next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")
+    x = np.zeros(len(study.probed.parameters))
     x[source] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
-    found = search(yard, y + 0.1 * yard.whiten.colour(np.random.default_rng(1).standard_normal(len(y))))
-    return yard, source, found
+    found = search(detector, y + 0.1 * detector.whiten.colour(np.random.default_rng(1).standard_normal(len(y))))
+    return detector, source, found
 
 
 def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
     """As `twin diagnose` finds it: in the fit it stands at its declared value, and the size of the cause is told."""
-    yard, source, found = search_of_a_strong_source()
-    study, parameters = yard.study, yard.study.bench.parameters
+    detector, source, found = search_of_a_strong_source()
+    study, parameters = detector.study, detector.study.probed.parameters
     verdict, causes = verdict_of(found, FAMILIES)
     assert verdict == "out_of_tolerance"
     d = replace(diagnosis("out_of_tolerance"), causes=causes, pulls=pulls_of(found))
@@ -373,9 +373,9 @@ def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
 
 
 def test_a_pull_of_a_conductance_is_a_relative_change_and_may_lie_beyond_its_bounds():
-    yard, _, found = search_of_a_strong_source()
-    batch = next(b for b in yard.columns.batches if b.kind == "contact")
-    contact = next(p for p in yard.study.bench.parameters if p.path.startswith(f"{batch.places[0]}."))
+    detector, _, found = search_of_a_strong_source()
+    batch = next(b for b in detector.columns.batches if b.kind == "contact")
+    contact = next(p for p in detector.study.probed.parameters if p.path.startswith(f"{batch.places[0]}."))
     h = Hypothesis(batch, 0, next(w for w in batch.histories if not w.windows), 50.0, (-0.9,), 1.0)
     lost = Accepted(h, (), np.array([-0.9]), np.array([[1e-4]]), 50.0, 36.0, ())
     pull = next(p for p in pulls_of(replace(found, accepted=(lost,))) if p.path == contact.path)
@@ -419,7 +419,7 @@ def test_a_clock_that_is_off_changes_no_description():
     assert "The model of the machine is left as it is." in lines
 
 
-def test_every_sealed_run_is_told_apart():
+def test_every_sealed_run_is_distinguished():
     d = replace(diagnosis("named"), ranked=(), whiteness=(), pulls=(), nulls={})
     assert "sealed run</th>" not in gain_table(d)
     assert all(text.startswith(("4 temp", "2 TCP", "2 temp", "1 TCP")) for text in gain_sentences(d))

@@ -8,11 +8,11 @@ import pytest
 from tests.diagnose import small_case
 from twin.calibrate.fit.noise import Channels
 from twin.diagnose.batch import Batch, History, best, prepared, score
+from twin.diagnose.detector import thresholds_of
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.growth import grown
 from twin.diagnose.unknown import evidence, heat_of, history, with_information
 from twin.diagnose.whiten import Projector, Whitener, measured_of, missing, offsets
-from twin.diagnose.yardstick import thresholds_of
 
 M, L = 60, 4
 
@@ -168,7 +168,7 @@ def test_offsets_are_one_per_sensor_of_all_runs():
 def seen():
     """Unknown heat looked for with white noise of 0.02 K and 0.3 um, parameters free within their tolerances."""
     study, elements, D = small_case.study(), small_case.elements(), small_case.responses()
-    sigma, x = [], np.zeros(len(study.bench.parameters))
+    sigma, x = [], np.zeros(len(study.probed.parameters))
     for k in study.fitted:
         (b, s), (rows, _) = study.runs[k].shapes
         sigma += [np.full(b * s, 0.02), np.full(rows * 3, 3e-7)]

@@ -20,7 +20,7 @@ def measured(kind="", place="", size=0.0, seed=0, levels=(1.0,)):
     """(m,) what the machine shows with noise, and a cause: in every run its size times levels, each as long."""
     study = small_case.study()
     rng = np.random.default_rng(seed)
-    x = 0.5 * rng.standard_normal(len(study.bench.parameters))
+    x = 0.5 * rng.standard_normal(len(study.probed.parameters))
     steps = [p.run.drive.n_steps for p in study.runs]
     shapes = tuple(np.array(levels)[np.arange(n) * len(levels) // n] for n in steps)
     units = [Unit(kind, place, -1, shapes)] if kind else []
@@ -34,7 +34,7 @@ def measured(kind="", place="", size=0.0, seed=0, levels=(1.0,)):
 
 
 def test_nothing_is_found_where_nothing_is():
-    found = search(small_case.yardstick(), measured(seed=1))
+    found = search(small_case.made_detector(), measured(seed=1))
     assert verdict_of(found, FAMILIES) == ("nothing", ())
     assert not found.accepted
     assert all(abs(p.pull) < 5.0 for p in pulls_of(found))
@@ -50,7 +50,7 @@ def test_a_sensor_that_is_off_is_a_sensor_that_is_off():
         drift = study.runs[k].measured.bin_time * 3.0 / 14400.0
         y[first : first + b * s].reshape(b, s)[:, 1] += drift  # 3 K in four hours
         first += study.runs[k].size
-    found = search(small_case.yardstick(), y)
+    found = search(small_case.made_detector(), y)
     verdict, causes = verdict_of(found, FAMILIES)
     assert verdict == "sensor"
     assert (causes[0].family, causes[0].place, causes[0].history) == ("sensor", "sensors.housing", "drift")
@@ -67,13 +67,13 @@ def test_swapped_sensors_are_put_back_and_leave_nothing():
         T = y[first : first + b * s].reshape(b, s)
         T[:, [0, 1]] = T[:, [1, 0]]
         first += study.runs[k].size
-    found = search(small_case.yardstick(), y)
+    found = search(small_case.made_detector(), y)
     verdict, (cause,) = verdict_of(found, FAMILIES)
     assert (verdict, cause.history, set(cause.place.removeprefix("sensors.").split("<>"))) == (
         "sensor", "swapped", set(names)
     )  # fmt: skip
     assert (cause.amplitude, cause.ci95) == (1.0, (1.0, 1.0))
-    clean = search(small_case.yardstick(), measured(seed=4))
+    clean = search(small_case.made_detector(), measured(seed=4))
     np.testing.assert_allclose(found.x, clean.x, atol=0.1)
     np.testing.assert_array_equal(exchanged(study, y, found.accepted), measured(seed=4))
 
@@ -81,7 +81,7 @@ def test_swapped_sensors_are_put_back_and_leave_nothing():
 def test_hidden_heat_is_refitted_with_the_exact_model():
     """300 W at the housing: the extended model follows the machine where the recalibrated one cannot."""
     y = measured("heat", "housing", 300.0, seed=3)
-    found = search(small_case.yardstick(), y)
+    found = search(small_case.made_detector(), y)
     verdict, causes = verdict_of(found, FAMILIES)
     assert verdict in ("named", "ambiguous")
     assert causes[0].statistic > causes[0].threshold
@@ -96,16 +96,16 @@ def test_hidden_heat_is_refitted_with_the_exact_model():
         left.append([float(np.sqrt(np.nanmean(t**2))) for t in T])
     plain, extended = np.mean(left, axis=0)
     assert plain > 3.0
-    assert extended < 0.5 * plain  # the rest counts as errors of form, which are large on so coarse a machine
+    assert extended < 0.5 * plain  # the rest counts as model discrepancy, which is large on so coarse a machine
 
 
 def test_limits_are_sizes_that_would_pass():
-    limits = limits_of(small_case.yardstick())
+    limits = limits_of(small_case.made_detector())
     assert {"heat_source", "film_gain", "sensor"} <= {limit.family for limit in limits}
     for limit in limits:
         assert 0.0 < limit.smallest <= limit.size <= limit.largest, limit
     wide = replace(
-        small_case.yardstick(), thresholds={f: 4.0 * t for f, t in small_case.yardstick().thresholds.items()}
+        small_case.made_detector(), thresholds={f: 4.0 * t for f, t in small_case.made_detector().thresholds.items()}
     )
     by = {(limit.family, limit.unit): limit.size for limit in limits}
     assert all(limit.size >= by[limit.family, limit.unit] for limit in limits_of(wide))

@@ -1,4 +1,4 @@
-"""The calibration that is delivered: it predicts a run that it has not seen, whatever errors of form may explain."""
+"""The calibration that is delivered: it predicts a run that it has not seen, whatever model discrepancy may explain."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ HIDDEN = np.array([1.0, -0.8])  # prior standard deviations of the first two sou
 @cache
 def hidden_parameters() -> np.ndarray:
     study = small_case.study()
-    x = np.zeros(len(study.bench.parameters))
-    x[[i for i, p in enumerate(study.bench.parameters) if p.kind == "source"][:2]] = HIDDEN
+    x = np.zeros(len(study.probed.parameters))
+    x[[i for i, p in enumerate(study.probed.parameters) if p.kind == "source"][:2]] = HIDDEN
     return x
 
 
 def measured() -> np.ndarray:
     """Outputs of both fitted runs with other sources and white noise."""
-    study, yard = small_case.study(), small_case.yardstick()
+    study, detector = small_case.study(), small_case.made_detector()
     y = np.concatenate([study.outputs(k, hidden_parameters()) for k in study.fitted])
-    noise = yard.whiten.colour(np.random.default_rng(0).standard_normal(len(y)))
+    noise = detector.whiten.colour(np.random.default_rng(0).standard_normal(len(y)))
     return np.where(np.isfinite(noise), y + noise, np.nan)
 
 
@@ -39,7 +39,7 @@ def held_out(x: np.ndarray) -> float:
 
 
 def test_parameters_are_found_and_predict():
-    x, covariance = settled(small_case.yardstick(), measured(), ())
+    x, covariance = settled(small_case.made_detector(), measured(), ())
     truth = hidden_parameters()
     sigma = np.sqrt(np.diag(covariance))
     assert np.all(sigma < 1.2)
@@ -47,13 +47,13 @@ def test_parameters_are_found_and_predict():
     assert held_out(x) < 0.35 * held_out(np.zeros(len(x)))
 
 
-def test_errors_of_form_do_not_take_what_parameters_explain():
+def test_model_discrepancy_does_not_take_what_parameters_explain():
     """With form that could explain everything, the fit behind the scores leaves parameters where they were."""
-    yard, y = small_case.yardstick(), measured()
-    study = yard.study
-    _, J = yard.fitter.surrogate.at(np.zeros(len(study.bench.parameters)))
-    free = np.hstack([yard.fitter.others, 5.0 * yard.whiten(J)])
-    greedy = replace(yard, fitter=replace(yard.fitter, others=free))
+    detector, y = small_case.made_detector(), measured()
+    study = detector.study
+    _, J = detector.fitter.surrogate.at(np.zeros(len(study.probed.parameters)))
+    free = np.hstack([detector.fitter.others, 5.0 * detector.whiten(J)])
+    greedy = replace(detector, fitter=replace(detector.fitter, others=free))
     scored, delivered = greedy.fitter(y).x, settled(greedy, y, ())[0]
     assert held_out(scored) > 0.6 * held_out(np.zeros(len(scored)))
     assert held_out(delivered) < 0.8 * held_out(scored)
@@ -61,6 +61,6 @@ def test_errors_of_form_do_not_take_what_parameters_explain():
 
 def test_films_that_hear_no_speed_have_no_wind():
     study = small_case.study()
-    heard = [f for f in study.bench.base.load_model.films if f.use.signals]
+    heard = [f for f in study.probed.base.load_model.films if f.use.signals]
     assert wind_columns(study, Form()).shape == (len(measured()), 3 * len(heard))
     assert wind_columns(study, Form(wind=0.0)).shape[1] == 0

@@ -53,29 +53,31 @@ def test_an_exact_factor_is_told_as_a_factor_without_an_interval():
 
 
 def test_limits_of_factors_are_factors():
-    yard = small_case.yardstick()
-    gain = next(b for b in yard.columns.batches if b.kind == "gain")
-    at = sorted(size for (family, unit, _, _), size in limits_at(yard).items() if (family, unit) == (gain.family, "1"))
-    (limit,) = (x for x in limits_of(yard) if (x.family, x.unit) == (gain.family, "1"))
+    detector = small_case.made_detector()
+    gain = next(b for b in detector.columns.batches if b.kind == "gain")
+    at = sorted(
+        size for (family, unit, _, _), size in limits_at(detector).items() if (family, unit) == (gain.family, "1")
+    )
+    (limit,) = (x for x in limits_of(detector) if (x.family, x.unit) == (gain.family, "1"))
     assert limit.smallest == pytest.approx(told("gain", at[0])) == pytest.approx(np.exp(at[0]))
     assert limit.largest == pytest.approx(np.exp(at[-1]))
 
 
 @pytest.mark.parametrize(("pull", "wanted"), [(0.8, "nothing"), (4.5, "out_of_tolerance")])
 def test_a_source_beyond_its_tolerance_is_out_of_it(pull, wanted):
-    yard = small_case.yardstick()
-    study = yard.study
-    source = next(i for i, p in enumerate(study.bench.parameters) if p.kind == "source")
-    x = np.zeros(len(study.bench.parameters))
+    detector = small_case.made_detector()
+    study = detector.study
+    source = next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")
+    x = np.zeros(len(study.probed.parameters))
     x[source] = pull
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
-    noise = yard.whiten.colour(np.random.default_rng(1).standard_normal(len(y)))
-    verdict, causes = verdict_of(search(yard, np.where(np.isfinite(noise), y + noise, np.nan)), FAMILIES)
+    noise = detector.whiten.colour(np.random.default_rng(1).standard_normal(len(y)))
+    verdict, causes = verdict_of(search(detector, np.where(np.isfinite(noise), y + noise, np.nan)), FAMILIES)
     assert verdict == wanted
     if wanted == "nothing":
         assert causes == ()
         return
-    parameter = study.bench.parameters[source]
+    parameter = study.probed.parameters[source]
     (cause,) = causes
     assert (cause.family, cause.place, cause.history) == ("loss_law", parameter.path.removesuffix(".gain"), "always")
     assert cause.statistic > cause.threshold > 1.0
@@ -84,30 +86,30 @@ def test_a_source_beyond_its_tolerance_is_out_of_it(pull, wanted):
 
 def test_films_without_a_declared_gain_are_not_asked_for_it():
     """`[[parameters]]` may leave films out; their hypotheses are there all the same."""
-    yard = small_case.yardstick()
-    bench = yard.study.bench
-    told = tuple(replace(p, path=f"other.{i}") if p.kind == "film" else p for i, p in enumerate(bench.parameters))
-    other = replace(yard, study=replace(yard.study, bench=replace(bench, parameters=told)))
-    assert {b.kind for b in yard.columns.batches} >= {"gain", "group"}
-    film = next(p.path.removesuffix(".gain") for p in bench.parameters if p.kind == "film")
-    assert parameter_of(yard.study, film) is not None
+    detector = small_case.made_detector()
+    probed = detector.study.probed
+    told = tuple(replace(p, path=f"other.{i}") if p.kind == "film" else p for i, p in enumerate(probed.parameters))
+    other = replace(detector, study=replace(detector.study, probed=replace(probed, parameters=told)))
+    assert {b.kind for b in detector.columns.batches} >= {"gain", "group"}
+    film = next(p.path.removesuffix(".gain") for p in probed.parameters if p.kind == "film")
+    assert parameter_of(detector.study, film) is not None
     assert parameter_of(other.study, film) is None
     n = len(told)
-    y = np.concatenate([yard.study.outputs(k, np.zeros(n)) for k in yard.study.fitted])
-    fitted = yard.fitter(y)
-    assert strained(other, y, fitted, np.zeros(n), 0.5 * np.eye(n), look(yard, fitted)) is None
+    y = np.concatenate([detector.study.outputs(k, np.zeros(n)) for k in detector.study.fitted])
+    fitted = detector.fitter(y)
+    assert strained(other, y, fitted, np.zeros(n), 0.5 * np.eye(n), look(detector, fitted)) is None
 
 
 def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch):
-    yard = small_case.yardstick()
-    study = yard.study
-    j = next(i for i, p in enumerate(study.bench.parameters) if p.kind == "source")
-    x = np.zeros(len(study.bench.parameters))
+    detector = small_case.made_detector()
+    study = detector.study
+    j = next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")
+    x = np.zeros(len(study.probed.parameters))
     x[j] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
-    fitted, half = yard.fitter(y), 0.5 * np.eye(len(x))
-    glance = look(yard, fitted)
-    freed = strained(yard, y, fitted, x, half, glance)
+    fitted, half = detector.fitter(y), 0.5 * np.eye(len(x))
+    glance = look(detector, fitted)
+    freed = strained(detector, y, fitted, x, half, glance)
     assert freed is not None
     module = sys.modules[strained.__module__]
     monkeypatch.setattr(module, "_scored", lambda *_: 0.0)  # by its derivative, as of a film many times as large
@@ -115,21 +117,21 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     def beside(share: float) -> bool:
         """Whether it is told where something else explains this share of what it does."""
         sure = replace(glance[1][0], statistic=share * freed[1].statistic)
-        return strained(yard, y, fitted, x, half, (glance[0], [sure], glance[2])) is not None
+        return strained(detector, y, fitted, x, half, (glance[0], [sure], glance[2])) is not None
 
-    assert beside(0.02)  # its own wrong form may leave that
+    assert beside(0.02)  # its own discrepancy may leave that
     assert not beside(0.5)
     gone = lambda *a: (fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
     monkeypatch.setattr(module, "refit", gone)
-    assert strained(yard, y, fitted, x, half, glance) is None
+    assert strained(detector, y, fitted, x, half, glance) is None
 
 
 def test_contacts_that_calibration_strains_are_told_with_what_they_became():
-    yard = small_case.yardstick()
-    parameters = yard.study.bench.parameters
+    detector = small_case.made_detector()
+    parameters = detector.study.probed.parameters
     contact = next(i for i, p in enumerate(parameters) if p.kind in ("contact", "joint"))
-    y = np.concatenate([yard.study.outputs(k, np.zeros(len(parameters))) for k in yard.study.fitted])
-    found = search(yard, y)
+    y = np.concatenate([detector.study.outputs(k, np.zeros(len(parameters))) for k in detector.study.fitted])
+    found = search(detector, y)
     assert strained_of(found) == ()
     x0 = found.x0.copy()
     x0[contact] = -1.0

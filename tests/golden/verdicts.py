@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from tests.golden.compute import Values, command, flat, numbers
-from tests.hidden.found import QUICK, said, yardstick
+from tests.hidden.found import QUICK, made_detector, said
 from twin.build.workers import each
 
 LUMPED = Path(__file__).parents[1] / "diagnose" / "four_nodes"
@@ -30,7 +30,7 @@ LEVELS = np.array([0.0, 1.0, 0.6, 0.6, 0.0, 1.0, 0.3, 0.8, 0.8])  # of the lumpe
 
 def trial_values() -> Values:
     """Thresholds, and what is said of every trial."""
-    thresholds = yardstick(QUICK).thresholds
+    thresholds = made_detector(QUICK).thresholds
     values: dict[str, Any] = {"thresholds": {family: numbers(value) for family, value in thresholds.items()}}
     answers = each(said, QUICK, TRIALS, lambda name: print(name, file=sys.stderr), long=0.0)
     for name, told in zip(TRIALS, answers, strict=True):

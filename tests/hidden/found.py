@@ -15,20 +15,20 @@ from twin.calibrate.fit.measured import measured
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.coarse import coarse_model
+from twin.diagnose.detector import Detector
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.diagnosis import Cause, Verdict
 from twin.diagnose.search import search
 from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
-from twin.diagnose.yardstick import Yardstick
 from twin.machine.load import load_machine
 from twin.rom.model import MachineModel
 
-SETTINGS = Settings(temperature_sigma=0.08)  # as the campaign: they share a yardstick
+SETTINGS = Settings(temperature_sigma=0.08)  # as the campaign: they share a detector
 QUICK = replace(SETTINGS, form=16, nulls=40)  # thresholds from few synthetic measurements: most are the floor anyway
 
-OWN = ("signal_peak", "clock", "sensor_stuck")  # other logs, other gaps: they need a yardstick of their own
+OWN = ("signal_peak", "clock", "sensor_stuck")  # other logs, other gaps: they need a detector of their own
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class Said:
 
 
 @cache
-def yardstick(settings: Settings = SETTINGS) -> Yardstick:
+def made_detector(settings: Settings = SETTINGS) -> Detector:
     """Of the nominal machine on the loads of the trials; minutes on two cores, then in the cache folder."""
     machine = load_machine(MODEL)
     runs = trial("null_0").runs
     folder().mkdir(parents=True, exist_ok=True)
-    with (folder() / "yardstick.lock").open("w") as lock:  # one process makes it, the others wait
+    with (folder() / "detector.lock").open("w") as lock:  # one process makes it, the others wait
         fcntl.flock(lock, fcntl.LOCK_EX)
         return prepare(None, machine, runs[:2], runs[2:], settings)[2]
 
@@ -55,29 +55,29 @@ def said(settings: Settings, name: str) -> Said:
     """The diagnosis of a trial."""
     runs = trial(name).runs
     if name in OWN:
-        yard = prepare(None, load_machine(MODEL), runs[:2], runs[2:], settings)[2]
+        detector = prepare(None, load_machine(MODEL), runs[:2], runs[2:], settings)[2]
     else:
-        yard = yardstick(settings)
-    study = yard.study
-    usable, stuck = stuck_sensors(runs[:2], study.bench.base.sensors, [p.run.name for p in study.runs[:2]])
+        detector = made_detector(settings)
+    study = detector.study
+    usable, stuck = stuck_sensors(runs[:2], study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
     plans = [
-        measured(study.bench.base, run, p.run.drive, p.run.name)
+        measured(study.probed.base, run, p.run.drive, p.run.name)
         for run, p in zip([*usable, runs[2]], study.runs, strict=True)
     ]
-    found = search(yard, measured_of(with_measured(study, plans)))
+    found = search(detector, measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     if states := STATES.get(name):
-        blamed = coarse_model(_few(yard, states), study, settings.temperature_sigma, settings.tcp_sigma)
+        blamed = coarse_model(_few(detector, states), study, settings.temperature_sigma, settings.tcp_sigma)
         verdict, causes = with_faults(verdict, causes, [] if blamed is None else [blamed], "named")
     unknown = unknown_of(found)
     return Said(verdict, causes, "" if unknown is None else unknown.part)
 
 
-def _few(yard: Yardstick, states: int) -> MachineModel:
+def _few(detector: Detector, states: int) -> MachineModel:
     """A model of few states: the leading directions of what the described machine does in the runs."""
-    study = yard.study
-    (body,) = study.bench.base.bodies
-    shown = np.vstack([study.states(k, np.zeros(len(study.bench.parameters))) for k in study.fitted])
+    study = detector.study
+    (body,) = study.probed.base.bodies
+    shown = np.vstack([study.states(k, np.zeros(len(study.probed.parameters))) for k in study.fitted])
     V = np.linalg.svd(shown, full_matrices=False)[2][: states - 1].T
     small = project(body, orthonormalise(np.column_stack([body.one, V]), body.E))
-    return replace(study.bench.base, bodies=(small,))
+    return replace(study.probed.base, bodies=(small,))

@@ -196,7 +196,7 @@ def test_mistakes_are_listed_with_what_was_said():
     assert rows[1][4:] == ["12 W", "50"]
 
 
-def test_limits_are_those_of_the_place_and_weak_effects_are_told_apart():
+def test_limits_are_those_of_the_place_and_weak_effects_are_distinguished():
     weak = {**trial("heat_source", [HEAT], verdict="nothing"), "limits": [1.0], "present": 3.0}
     strong = {**trial("heat_source", [HEAT], [cause("heat_source", "bed.left", 12.0, "W")]), "limits": [7.0]}
     found = values(goals([weak, strong], LIMITS, KNOWN))

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.hidden.found import OWN, QUICK, SETTINGS, Said, said, yardstick
+from tests.hidden.found import OWN, QUICK, SETTINGS, Said, made_detector, said
 from tests.hidden.trials import DRAWN, EXPERIMENT, TRIALS, expected
 from twin.build.workers import each
 from twin.diagnose.verdict import limits_at, limits_of
@@ -15,7 +15,7 @@ from twin.inject.judge.match import effect, known_of, place_of, same_place
 
 KNOWN = known_of(EXPERIMENT)
 ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few of CI
-LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a yardstick of their own
+LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a null distribution of their own
 AGAIN = (  # of families of which a drawn one is tried anyway: together some minutes
     "joint", "zone", "forced_convection", "loss_law", "expansion", "capacity", "scale_expansion", "slip", "not_thermal",
     "measurement",
@@ -45,7 +45,7 @@ def everything(request, settings) -> dict[str, Said]:
     items = [item for item in request.session.items if "everything" in item.fixturenames and hasattr(item, "callspec")]
     asked = {item.callspec.params["name"] for item in items}
     names = [name for name in TRIALS if name in asked]
-    yardstick(settings)
+    made_detector(settings)
     return dict(zip(names, each(said, settings, names, long=0.0), strict=True))
 
 
@@ -79,12 +79,12 @@ def test_what_was_hidden_is_said(everything, name):
 
 @pytest.mark.parametrize("name", _marked(DRAWN))
 def test_what_was_drawn_is_said_or_below_its_limit(everything, settings, name):
-    """Family and place exactly, or among what cannot be told apart; where nothing is said, the report's limit there is
-    not below what was hidden."""
+    """Family and place exactly, or among what cannot be distinguished; where nothing is said, the report's limit there
+    is not below what was hidden."""
     (hidden,), answer = TRIALS[name].hidden, everything[name]
     truth, named = vars(hidden), [(c.family, c.place) for c in answer.causes]
     if answer.verdict == "nothing":
-        at, unit = limits_at(yardstick(settings)), "K/day" if hidden.unit == "K/s" else hidden.unit
+        at, unit = limits_at(made_detector(settings)), "K/day" if hidden.unit == "K/s" else hidden.unit
         keys = [(hidden.family, unit, place_of(truth), windows) for windows in (bool(hidden.windows), False)]
         assert effect(truth, KNOWN) <= next((at[key] for key in keys if key in at), 0.0)
         return
@@ -104,6 +104,6 @@ def test_most_of_what_was_drawn_is_detected(everything):
 def test_what_is_too_small_is_below_its_limit(settings):
     """0.7 W is not named, and the report says that 0.7 W would not have been."""
     (hidden,) = TRIALS["below_limit"].hidden
-    limits = [limit for limit in limits_of(yardstick(settings)) if limit.family == hidden.family]
+    limits = [limit for limit in limits_of(made_detector(settings)) if limit.family == hidden.family]
     assert limits
     assert all(limit.smallest > hidden.size for limit in limits)

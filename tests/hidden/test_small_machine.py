@@ -9,13 +9,13 @@ import pytest
 from tests.hidden import small
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.detector import Detector
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.diagnosis import Cause, Verdict
 from twin.diagnose.search import search
 from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import verdict_of
 from twin.diagnose.whiten import measured_of
-from twin.diagnose.yardstick import Yardstick
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 
@@ -48,18 +48,18 @@ def healthy(folder: Path) -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def yard(folder: Path, healthy: list[Path]) -> Yardstick:
+def detector(folder: Path, healthy: list[Path]) -> Detector:
     runs = [read_run(path) for path in healthy]
     return prepare(None, load_machine(folder / "described"), runs, (), SETTINGS)[2]
 
 
-def said(yard: Yardstick, runs: list[Path]) -> tuple[Verdict, tuple[Cause, ...]]:
-    study = yard.study
+def said(detector: Detector, runs: list[Path]) -> tuple[Verdict, tuple[Cause, ...]]:
+    study = detector.study
     plans = [
-        measured(study.bench.base, read_run(path), p.run.drive, p.run.name)
+        measured(study.probed.base, read_run(path), p.run.drive, p.run.name)
         for path, p in zip(runs, study.runs, strict=True)
     ]
-    return verdict_of(search(yard, measured_of(with_measured(study, plans))), FAMILIES)
+    return verdict_of(search(detector, measured_of(with_measured(study, plans))), FAMILIES)
 
 
 def in_machine(folder: Path, family: str) -> list[Path]:
@@ -77,46 +77,46 @@ def in_log(folder: Path, healthy: list[Path], name: str) -> list[Path]:
     return made
 
 
-def test_nothing_is_said_of_a_healthy_machine(yard, healthy):
-    assert said(yard, healthy) == ("nothing", ())
+def test_nothing_is_said_of_a_healthy_machine(detector, healthy):
+    assert said(detector, healthy) == ("nothing", ())
 
 
-def test_a_heat_source_is_named_at_its_place_with_its_size(folder, yard):
-    verdict, (cause,) = said(yard, in_machine(folder, "heat_source"))
+def test_a_heat_source_is_named_at_its_place_with_its_size(folder, detector):
+    verdict, (cause,) = said(detector, in_machine(folder, "heat_source"))
     assert (verdict, cause.family, cause.place, cause.history) == ("named", "heat_source", "bed.y_max", "always")
     low, high = cause.ci95
     assert low < 15.0 < high
     assert high - low < 7.5
 
 
-def test_a_joint_that_lost_its_preload_is_said_to_be_out_of_tolerance(folder, yard):
+def test_a_joint_that_lost_its_preload_is_said_to_be_out_of_tolerance(folder, detector):
     """Its conductance is a declared parameter: a twentieth of it is no missing effect, but a number that is wrong."""
-    verdict, (cause,) = said(yard, in_machine(folder, "joint"))
+    verdict, (cause,) = said(detector, in_machine(folder, "joint"))
     assert (verdict, cause.family, cause.place) == ("out_of_tolerance", "joint", "contacts.block")
     assert cause.ci95[0] <= 0.05 <= cause.ci95[1]
 
 
-def test_a_screw_that_expands_too_much_is_named_with_its_factor(folder, yard):
-    verdict, (cause,) = said(yard, in_machine(folder, "expansion"))
+def test_a_screw_that_expands_too_much_is_named_with_its_factor(folder, detector):
+    verdict, (cause,) = said(detector, in_machine(folder, "expansion"))
     assert (verdict, cause.family, cause.place) == ("named", "expansion", "parts.screw")
     assert cause.ci95[0] < 1.6 < cause.ci95[1]
 
 
-def test_a_drifting_sensor_is_blamed_and_the_machine_is_not(folder, yard, healthy):
-    verdict, causes = said(yard, in_log(folder, healthy, "drift"))
+def test_a_drifting_sensor_is_blamed_and_the_machine_is_not(folder, detector, healthy):
+    verdict, causes = said(detector, in_log(folder, healthy, "drift"))
     assert (verdict, [(c.family, c.place, c.history) for c in causes]) == (
         "sensor",
         [("sensor", "sensors.screw", "drift")],
     )
 
 
-def test_swapped_sensors_are_both_named(folder, yard, healthy):
-    verdict, (cause,) = said(yard, in_log(folder, healthy, "swapped"))
+def test_swapped_sensors_are_both_named(folder, detector, healthy):
+    verdict, (cause,) = said(detector, in_log(folder, healthy, "swapped"))
     assert (verdict, cause.family, cause.history) == ("sensor", "sensor", "swapped")
     assert cause.place == "sensors.rail<>slide_end"
 
 
-def test_a_drifting_probe_is_told_from_the_machine(folder, yard, healthy):
-    verdict, (cause,) = said(yard, in_log(folder, healthy, "measurement"))
+def test_a_drifting_probe_is_told_from_the_machine(folder, detector, healthy):
+    verdict, (cause,) = said(detector, in_log(folder, healthy, "measurement"))
     assert (verdict, cause.family, cause.place, cause.history) == ("named", "measurement", "tcp.dz", "drift")
     assert cause.ci95[0] < 6e-6 / (3600.0 * small.HOURS) < cause.ci95[1]

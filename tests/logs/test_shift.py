@@ -95,14 +95,14 @@ def test_current_some_rows_off_its_speed():
     assert any("'y_current' changes 2 row(s) after 'y_speed'" in p.what for p in found)
 
 
-@pytest.mark.parametrize("honest", [0.0, 0.5, 1.0])
-def test_honest_ways_to_log_a_speed(honest):
+@pytest.mark.parametrize("plausible", [0.0, 0.5, 1.0])
+def test_plausible_ways_to_log_a_speed(plausible):
     """The mean of the interval that starts, the speed at the sample, the mean of the interval that ended."""
     time, fine = np.arange(300.0), np.arange(0.0, 301.0, 0.01)
     path = np.interp(fine, fine, 0.1 * np.sin(fine / 6.0) * np.sin(fine / 50.0))
     at = path[:-1:100][:300]
     means = np.diff(path[::100])[:300]
-    speed = {0.0: means, 1.0: np.roll(means, 1), 0.5: np.gradient(path, 0.01)[:-1:100][:300]}[honest]
+    speed = {0.0: means, 1.0: np.roll(means, 1), 0.5: np.gradient(path, 0.01)[:-1:100][:300]}[plausible]
     units = {"x_position": "m", "x_speed": "m/s"}
     assert motion_problems(Table(time, {"x_position": at, "x_speed": speed}, units), "loads.csv") == []
     shifted = motion_problems(Table(time, {"x_position": at, "x_speed": np.roll(speed, 2)}, units), "loads.csv")

@@ -27,7 +27,7 @@ def load_model(folder, *edits) -> LoadModel:
 
 
 def loads(load: LoadModel, **warmer):
-    """Two hours of wandering loads; signals named get warmer by so many K."""
+    """Two hours of drifting loads; signals named get warmer by so many K."""
     rng = np.random.default_rng(4)
     time = np.arange(0.0, 7200.0, 10.0)
     signals = {s.name: s.low + (s.high - s.low) * rng.random(len(time)) for s in load.signals}

@@ -40,7 +40,7 @@ def test_between_rows_it_is_the_ideal_gas_and_its_own_diffusivity():
     ("kelvin", "viscosity", "conductivity", "diffusivity"), [(250, 11.44, 22.3, 15.9), (400, 26.41, 33.8, 38.3)]
 )
 def test_beyond_the_table(kelvin, viscosity, conductivity, diffusivity):
-    """Incropera, Table A.4: straight lines stay within 6 % to -40 and 150 degC."""
+    """Incropera, Table A.4: linear extrapolation stays within 6 % to -40 and 150 degC."""
     gas = air(kelvin - 273.15)
     assert gas.viscosity == pytest.approx(viscosity * 1e-6, rel=0.06)
     assert gas.conductivity == pytest.approx(conductivity * 1e-3, rel=0.06)

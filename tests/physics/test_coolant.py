@@ -65,7 +65,7 @@ def test_turbulent_by_hand():
     assert coolant.tube_turbulent(1e5, 7.0, 0.125) == pytest.approx(1.25 * float(nu), rel=1e-9)
 
 
-def test_transition_is_a_straight_line_between_its_ends():
+def test_transition_is_linear_between_its_ends():
     low, high = float(coolant.tube_laminar(2300.0, PR, 0.005)), float(coolant.tube_turbulent(1e4, PR, 0.005))
     for re, nu in ((2300.0 - 1e-6, low), (2300.0 + 1e-6, low), (1e4 - 1e-6, high), (1e4 + 1e-6, high)):
         assert coolant.tube(re, PR, 0.005) == pytest.approx(nu, rel=1e-7)

@@ -21,7 +21,7 @@ from twin.rom.following_flags import following_flags
 from twin.rom.law_values import law_table
 from twin.rom.load_model import EnvironmentWiring, Film, LawUse, LoadModel, Signal, Source
 from twin.rom.model import AffineBody, MachineModel
-from twin.run.replay import march
+from twin.run.replay import integrate
 from twin.run.stepping import inputs_of
 from twin.run.system import prepare
 
@@ -228,7 +228,7 @@ def test_both_steppers_alike_with_every_law_following(follow, tolerance, project
     assert drive.films.index == (0, 1)
     assert drive.losses.index == (0,)
     prepared = prepare(model)
-    steps = march(prepared, inputs_of(model.load_model, drive, 4, follow=follow), prepared.uniform(19.0))
+    steps = integrate(prepared, inputs_of(model.load_model, drive, 4, follow=follow), prepared.uniform(19.0))
     stepper = CoupledStepper(model, follow=follow)
     x = stepper.uniform(19.0)
     states, films, powers, worst = [], [], [], 0.0
@@ -262,7 +262,7 @@ def test_coefficients_outside_the_certificate_and_the_law_are_flagged():
     model = following_machine(cold=12.0)
     drive = loads(model)
     prepared = prepare(model)
-    steps = march(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(19.0))
+    steps = integrate(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(19.0))
     flags = following_flags(model.load_model, drive, steps.theta, steps.surface, HEIGHT, steps.winding)
     assert flags["films.bed below 12 W/(m^2*K)"].any()
     assert not flags["films.bed above 40 W/(m^2*K)"].any()
@@ -306,7 +306,7 @@ def test_a_measured_temperature_may_stand_in_for_a_state(wired):
     signals = {"air": np.full(len(time), 20.0), "measured": measured, "current": 0 * time, "speed": 0 * time}
     drive = evaluate(model.load_model, time, signals, 60.0)
     prepared = prepare(model)
-    steps = march(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(50.0))
+    steps = integrate(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(50.0))
     surface, ambient = (45.0, 20.0) if wired == "surface" else (50.0, 45.0)
     # the table lies around the environment's air, not around the measured one: coarse where the law has its kink
     assert steps.theta[0, 0] == pytest.approx(free(surface, ambient), rel=0.03)
@@ -319,7 +319,7 @@ def test_a_surface_beyond_the_table_is_flagged(start, flagged):
     time = np.arange(0.0, 600.0, 10.0)
     drive = evaluate(model.load_model, time, {"air": 0 * time + 20.0, "current": 0 * time, "speed": 0 * time}, 60.0)
     prepared = prepare(model)
-    steps = march(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(start))
+    steps = integrate(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(start))
     flags = following_flags(model.load_model, drive, steps.theta, steps.surface, HEIGHT[:1], steps.winding)
     (law,) = (flag for name, flag in flags.items() if "law outside" in name)
     assert law[0] == law.any() == flagged
@@ -332,5 +332,5 @@ def test_a_law_sees_the_air_at_the_height_of_its_surface():
     drive = evaluate(model.load_model, time, {"air": 0 * time + 20.0, "current": 0 * time, "speed": 0 * time}, 60.0)
     stepper, prepared = CoupledStepper(model), prepare(model)
     assert stepper.loads(drive, 0, stepper.uniform(26.5)).theta[0] == pytest.approx(free(26.5, 26.0), rel=0.02)
-    steps = march(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(26.5))
+    steps = integrate(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(26.5))
     assert steps.theta[0, 0] == pytest.approx(free(26.5, 26.0), rel=0.02)

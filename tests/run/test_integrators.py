@@ -22,7 +22,7 @@ from twin.rom.contact_matrix import (
 from twin.rom.drive import evaluate
 from twin.rom.tableau import IMPLICIT_EULER, SDIRK2, stages
 from twin.run.integrator import integrate, solved
-from twin.run.replay import march
+from twin.run.replay import integrate as replayed
 from twin.run.stepping import inputs_of
 from twin.run.system import prepare
 
@@ -42,7 +42,7 @@ def in_jax(model, drive, tableau, start, substeps=1, follow=0.0):
     """The same by the runtime."""
     prepared = prepare(model)
     inputs = inputs_of(model.load_model, drive, substeps, follow=follow, tableau=tableau)
-    steps = march(prepared, inputs, prepared.uniform(start))
+    steps = replayed(prepared, inputs, prepared.uniform(start))
     into = np.diff(drive.time) * (steps.power.sum(axis=1) + steps.film.sum(axis=1))
     through = np.diff(drive.time) * (np.abs(steps.power).sum(axis=1) + np.abs(steps.film).sum(axis=1))
     return prepared.to_artefact(steps.z), (np.abs(steps.stored - into) / through).max()
@@ -98,12 +98,12 @@ def test_host_and_jax_give_the_same_states_and_close_the_heat_balance(tableau, p
 @TABLEAUS
 @pytest.mark.parametrize("integrated", [on_host, in_jax])
 def test_the_heat_balance_is_exact_with_a_factor_that_is_not(integrated, tableau):
-    """Film coefficients that wander by a tenth: the factor is kept, what it leaves out is counted where it was seen."""
+    """Film coefficients that change by a tenth: the factor is kept, what it leaves out is counted where it was seen."""
     drive = evaluate(MODEL.load_model, TIME, SIGNALS, 60.0)
     still = {name: getattr(drive, name)[:1].repeat(drive.n_steps, axis=0)
              for name in ("weight", "square", "neighbour", "conductance")}  # fmt: skip
-    wander = 1.0 + 0.1 * np.sin(np.arange(drive.n_steps))[:, None]
-    drive = replace(drive, theta=drive.theta * wander, **still)
+    drift = 1.0 + 0.1 * np.sin(np.arange(drive.n_steps))[:, None]
+    drive = replace(drive, theta=drive.theta * drift, **still)
     kept, error = integrated(MODEL, drive, tableau, 23.0, follow=0.3)
     exact, _ = integrated(MODEL, drive, tableau, 23.0)
     assert error < 1e-8

@@ -12,7 +12,7 @@ from twin.rom.contact import station_weights
 from twin.rom.drive import evaluate
 from twin.rom.load_model import EnvironmentWiring
 from twin.run.matrix import system_blocks
-from twin.run.replay import march
+from twin.run.replay import integrate
 from twin.run.stepping import advance, inputs_of
 from twin.run.system import prepare
 
@@ -66,7 +66,7 @@ def test_system_matrix_equals_the_dense_one(model):
 def test_steps_equal_plain_numpy(model, substeps):
     prepared, dense = prepare(model), Dense(model, DRIVE)
     start = prepared.uniform(23.0)
-    steps = march(prepared, inputs_of(model.load_model, DRIVE, substeps), start)
+    steps = integrate(prepared, inputs_of(model.load_model, DRIVE, substeps), start)
     expected = dense.euler(dense.uniform(23.0), substeps)
     states = prepared.to_artefact(np.concatenate([start[None], steps.z]))
     for ours, theirs in (
@@ -84,7 +84,7 @@ def test_first_order_against_the_exact_exponential():
     for n in (32, 64):
         drive = evaluate(MODEL.load_model, time, signals, 960.0 / n)
         prepared, dense = prepare(MODEL), Dense(MODEL, drive)
-        steps = march(prepared, inputs_of(MODEL.load_model, drive, 1), prepared.uniform(15.0))
+        steps = integrate(prepared, inputs_of(MODEL.load_model, drive, 1), prepared.uniform(15.0))
         exact = dense.temperature(dense.exact(dense.uniform(15.0)))[1:]
         error = np.abs(dense.temperature(prepared.to_artefact(steps.z)) - exact)
         errors.append(error[n // 32 - 1 :: n // 32].max())
@@ -98,7 +98,7 @@ def test_four_substeps_with_one_factor_are_three_to_four_times_closer():
     exact = dense.temperature(dense.exact(dense.uniform(20.0)))[1:]
 
     def error(substeps):
-        steps = march(prepared, inputs_of(MODEL.load_model, drive, substeps), prepared.uniform(20.0))
+        steps = integrate(prepared, inputs_of(MODEL.load_model, drive, substeps), prepared.uniform(20.0))
         return np.abs(dense.temperature(prepared.to_artefact(steps.z)) - exact).max()
 
     assert 3.0 < error(1) / error(4) < 4.1
@@ -106,7 +106,7 @@ def test_four_substeps_with_one_factor_are_three_to_four_times_closer():
 
 def test_heat_in_is_heat_stored_at_every_position(model):
     prepared = prepare(model)
-    steps = march(prepared, inputs_of(model.load_model, DRIVE, 4, follow=0.0), prepared.uniform(20.0))
+    steps = integrate(prepared, inputs_of(model.load_model, DRIVE, 4, follow=0.0), prepared.uniform(20.0))
     into = 60.0 * (DRIVE.power.sum(axis=1) + steps.film.sum(axis=1))
     throughput = 60.0 * (DRIVE.power.sum(axis=1) + np.abs(steps.film).sum(axis=1))
     assert throughput.min() > 0.0
@@ -126,7 +126,7 @@ def test_a_machine_at_the_temperature_of_its_surroundings_stays_there(model):
     still |= {axis.position: SIGNALS[axis.position] for axis in load.axes}
     drive = evaluate(load, TIME, still, 60.0)
     prepared, dense = prepare(model), Dense(model, drive)
-    steps = march(prepared, inputs_of(load, drive, 4, follow=0.0), prepared.uniform(26.0))
+    steps = integrate(prepared, inputs_of(load, drive, 4, follow=0.0), prepared.uniform(26.0))
     np.testing.assert_allclose(dense.temperature(prepared.to_artefact(steps.z)), 26.0, atol=1e-10)
 
 
@@ -162,14 +162,14 @@ def test_bodies_in_any_order_and_without_contacts():
     temperatures = []
     for model in (MODEL, swapped):
         prepared, dense = prepare(model), Dense(model, DRIVE)
-        steps = march(prepared, inputs_of(model.load_model, DRIVE, 4, follow=0.0), prepared.uniform(20.0))
+        steps = integrate(prepared, inputs_of(model.load_model, DRIVE, 4, follow=0.0), prepared.uniform(20.0))
         temperatures.append(dense.temperature(prepared.to_artefact(steps.z)))
     np.testing.assert_allclose(temperatures[1], temperatures[0], rtol=1e-12)
     alone = synthetic.machine(n_bodies=1)
     time, signals = synthetic.loads(alone.load_model)
     drive = evaluate(alone.load_model, time, signals, 60.0)
     prepared, dense = prepare(alone), Dense(alone, drive)
-    steps = march(prepared, inputs_of(alone.load_model, drive, 4, follow=0.0), prepared.uniform(10.0))
+    steps = integrate(prepared, inputs_of(alone.load_model, drive, 4, follow=0.0), prepared.uniform(10.0))
     expected = dense.euler(dense.uniform(10.0), 4)[1:]
     np.testing.assert_allclose(
         dense.temperature(prepared.to_artefact(steps.z)), dense.temperature(expected), rtol=1e-12

@@ -219,7 +219,7 @@ def test_nothing_is_overwritten(measured, tmp_path, capsys):
         assert "choose another folder" in capsys.readouterr().err
     other = tmp_path / "other"
     other.mkdir()
-    (other / "letter.txt").write_text("dear")
+    (other / "letter.txt").write_text("kept")
     assert run([*call, str(other)]) == 2
     assert "holds other files" in capsys.readouterr().err
-    assert (other / "letter.txt").read_text() == "dear"
+    assert (other / "letter.txt").read_text() == "kept"

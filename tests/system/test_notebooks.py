@@ -1,4 +1,4 @@
-"""Notebooks and their text form tell the same story; `make notebooks` executes them."""
+"""Notebooks and their text form have the same cells; `make notebooks` executes them."""
 
 from pathlib import Path
 

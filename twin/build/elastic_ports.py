@@ -197,7 +197,7 @@ class PortTable:
 def fitted_slope(p: Patch, direction: np.ndarray) -> np.ndarray:
     """Row (m,) [1/m] at `p.nodes`: slope along the unit vector `direction` of the least-squares linear field.
 
-    The direction must lie in the patch; slopes across it are told apart from it.
+    The direction must lie in the patch; slopes across it are distinguished from it.
     """
     towards = np.linalg.pinv(p.second_moment, rcond=1e-9, hermitian=True) @ direction
     return towards @ p.moment

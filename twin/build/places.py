@@ -23,7 +23,7 @@ from twin.rom.load_model import EnvironmentWiring, Film, LawUse, Source
 from twin.rom.model import AffineBody, MachineModel
 
 PREFIX = "place:"  # no name of a description contains a colon
-GHOST = "--aside"  # suffix of sensors moved aside
+DISPLACED = "--aside"  # suffix of sensors moved aside
 ASIDE = 0.008  # m
 WEAK, STRONG = 0.05, 20.0  # W/(m^2 K), of the film of a place: what bases are made for
 
@@ -39,7 +39,7 @@ class Place:
     area: float  # m^2
 
 
-def with_ghosts(machine: Machine, seed: int = 5) -> Machine:
+def with_displaced_sensors(machine: Machine, seed: int = 5) -> Machine:
     """The description with a second sensor some millimetres beside each one on a part: what a wrong place would read.
 
     Lumped machines have no places between nodes and stay as they are.
@@ -52,7 +52,7 @@ def with_ghosts(machine: Machine, seed: int = 5) -> Machine:
         if sensor.part is not None and sensor.position is not None:
             aside = rng.standard_normal(3)
             moved = np.asarray(sensor.position) + ASIDE * aside / np.linalg.norm(aside)
-            sensors[name + GHOST] = Sensor(
+            sensors[name + DISPLACED] = Sensor(
                 part=sensor.part, position=(float(moved[0]), float(moved[1]), float(moved[2]))
             )
     return machine.model_copy(update={"sensors": sensors})

@@ -30,7 +30,7 @@ def volumetric_shares(positions: np.ndarray, error: np.ndarray) -> Shares:
 
     positions (m, d) [m], error (m, 3) [m]. The constant is fitted first, then constant and linear terms together: the
     spaces are nested, so the fitted sums of squares add up (Pythagoras). Poses should cover the volume evenly: with
-    fewer than d + 2 of them in general position nothing is left over for the higher orders.
+    fewer than d + 2 of them in general position nothing remains for the higher orders.
     """
     total = float(np.sum(error**2))
     if total == 0.0:

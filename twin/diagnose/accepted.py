@@ -9,10 +9,10 @@ import numpy as np
 
 from twin.diagnose.acted import CONDUCTS, Unit, slots_with, units_of
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import bounds
 from twin.diagnose.readings import lagged, late, play
 from twin.diagnose.study import Study
-from twin.diagnose.yardstick import Yardstick
 
 CURVED = ("slip", "clock", "lag")  # kinds that act on what is read, and not in proportion to their size
 OWN = ("gain", "conductance", "total")  # how parameters of sources, films, contacts and joints are called there
@@ -37,7 +37,7 @@ def parameter_of(study: Study, name: str) -> int | None:
 
     None where `[[parameters]]` leaves it out.
     """
-    paths = [p.path for p in study.bench.parameters]
+    paths = [p.path for p in study.probed.parameters]
     return next((paths.index(p) for p in (name, *(f"{name}.{own}" for own in OWN)) if p in paths), None)
 
 
@@ -53,7 +53,7 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
 
 
 def jacobian(
-    yard: Yardstick, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]], before: np.ndarray | None = None
+    detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]], before: np.ndarray | None = None
 ) -> np.ndarray:
     """(m, n) derivatives by the parameters at x (n,), with causes of these amplitudes.
 
@@ -62,7 +62,7 @@ def jacobian(
     beside a signal that is corrected, get derivatives made anew, unless there are some from `before`. A number's own
     column is left empty.
     """
-    study = yard.study
+    study = detector.study
     low, high = bounds(study)
     there, held = x.copy(), list[int]()
     corrected = [(h, amplitude) for h, amplitude in causes if h.batch.kind == "signal"]
@@ -74,13 +74,13 @@ def jacobian(
             held.append(j)
             anew |= h.batch.kind != "gain" and not low[j] <= there[j] <= high[j]
     if not anew:
-        J = yard.fitter.surrogate.at(there)[1]
+        J = detector.fitter.surrogate.at(there)[1]
     elif before is not None:
         J = before
     else:
         units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
         J = np.vstack([
-            study.jacobian(k, there, slots_with(study, yard.elements, units, k), sizes)[:, : len(x)]
+            study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(x)]
             for k in study.fitted
         ])  # fmt: skip
     J[:, held] = 0.0
@@ -112,32 +112,32 @@ def with_shifts(study: Study, accepted: Sequence[Accepted], x: np.ndarray) -> np
     return shifted(study, x, gains_of(study, accepted), np.concatenate([a.amplitude for a in accepted]))
 
 
-def readings_columns(yard: Yardstick, h: Hypothesis) -> np.ndarray:
+def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
     """(m, q) white first-order responses of a hypothesis: exact for what acts on what is read, but for `CURVED`."""
     columns, weights = h.combination()
-    return np.asarray(yard.columns.raw[:, columns].astype(float) @ weights.T)
+    return np.asarray(detector.columns.raw[:, columns].astype(float) @ weights.T)
 
 
-def read_change(yard: Yardstick, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
+def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
     """(m,) white change by what acts on what is read, at its amplitude (q,); none of swapped channels.
 
     x (n,): parameters that a clock's run is stepped with.
     """
     if h.batch.kind == "swapped":  # `exchanged` has left nothing of it
-        return np.zeros(yard.columns.raw.shape[0])
+        return np.zeros(detector.columns.raw.shape[0])
     if h.batch.kind in CURVED:
-        return yard.whiten(curved_change(yard, h, float(amplitude[0]), x))
-    return np.asarray(readings_columns(yard, h) @ amplitude)
+        return detector.whiten(curved_change(detector, h, float(amplitude[0]), x))
+    return np.asarray(readings_columns(detector, h) @ amplitude)
 
 
-def curved_change(yard: Yardstick, h: Hypothesis, size: float, x: np.ndarray | None) -> np.ndarray:
+def curved_change(detector: Detector, h: Hypothesis, size: float, x: np.ndarray | None) -> np.ndarray:
     """(m,) likewise of the kinds CURVED, in what is measured; x None: of the nominal machine, which costs no step."""
-    study = yard.study
+    study = detector.study
     if h.batch.kind == "slip":
-        return size * play(study, yard.nominal, h.name.removeprefix("tcp."), abs(size))
+        return size * play(study, detector.nominal, h.name.removeprefix("tcp."), abs(size))
     run = h.name.removeprefix("runs.")
     states = {
-        k: yard.nominal[k].states if x is None else study.states(k, x)
+        k: detector.nominal[k].states if x is None else study.states(k, x)
         for k in study.fitted if study.runs[k].run.name == run or h.batch.kind == "lag"
     }  # fmt: skip
     if h.batch.kind == "lag":
@@ -145,10 +145,10 @@ def curved_change(yard: Yardstick, h: Hypothesis, size: float, x: np.ndarray | N
     return size * late(study, states, size)
 
 
-def curved_slope(yard: Yardstick, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
+def curved_slope(detector: Detector, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
     """(m,) its derivative by the size."""
     by = ASIDE * max(abs(size), h.batch.smallest)
-    more, less = (curved_change(yard, h, size + d, x) for d in (by, -by))
+    more, less = (curved_change(detector, h, size + d, x) for d in (by, -by))
     return np.asarray((more - less) / (2.0 * by))
 
 
@@ -173,11 +173,11 @@ def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.n
     return np.concatenate(parts)
 
 
-def stepped(yard: Yardstick, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
+def stepped(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
     """(size,) outputs of run k with the causes that act in the machine; x (n,) already shifted."""
-    study = yard.study
+    study = detector.study
     units = [u for a in accepted for u in a.units]
     if not units:
         return study.outputs(k, x)
     amplitudes = [v for a in accepted if a.units for v in a.amplitude]
-    return study.outputs(k, x, slots_with(study, yard.elements, units, k), amplitudes)
+    return study.outputs(k, x, slots_with(study, detector.elements, units, k), amplitudes)

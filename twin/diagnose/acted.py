@@ -1,4 +1,6 @@
-"""Hypotheses as slots of the march: the exact model with a cause switched on, for refits and for the sealed run."""
+"""Hypotheses as slots of the time integration: the exact model with a cause switched on, for refits and for the sealed
+run.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from twin.diagnose import bells
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.elements import Elements
-from twin.diagnose.march import INNER
+from twin.diagnose.integration import INNER
 from twin.diagnose.slots import Slots
 from twin.diagnose.study import Study
 
@@ -95,7 +97,7 @@ def _shapes(study: Study, h: Hypothesis, which: int) -> tuple[np.ndarray, ...]:
 
 def environment_at(study: Study, p: int) -> int:
     """Number of the environment that the film of place p is in."""
-    load, film = study.bench.base.load_model, study.bench.places[p].film
+    load, film = study.probed.base.load_model, study.probed.places[p].film
     return next((f.environment for f in load.films if f.name == film), load.surroundings)
 
 
@@ -113,28 +115,28 @@ def _lasts(study: Study, windows: Sequence[Window]) -> bool:
 def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) -> Slots:
     """The slots of run k with these amplitudes, in their order. Raises ValueError for more than there are slots."""
     slots = study.slots(k)
-    bench, load = study.bench, study.bench.base.load_model
+    probed, load = study.probed, study.probed.base.load_model
     run = study.runs[k].run
     n = slots.gate.shape[0]
     if len(units) > slots.gate.shape[1]:
         raise ValueError("more amplitudes than slots")
-    air = run.drive.environment - bench.base.reference_temperature
+    air = run.drive.environment - probed.base.reference_temperature
     films = [f.name for f in load.films]
     for s, unit in enumerate(units):
         shape = unit.shapes[k]
         fine = shape.reshape(n, INNER)
         coarse = fine.mean(axis=1)
         if unit.kind == "film":
-            p = [q.name for q in bench.places].index(unit.place)
-            slots.A[s], slots.M[s], slots.gate[:, s] = bench.A[p], bench.M[p], coarse
+            p = [q.name for q in probed.places].index(unit.place)
+            slots.A[s], slots.M[s], slots.gate[:, s] = probed.A[p], probed.M[p], coarse
             slots.rise[:, :, s] = air[:, environment_at(study, p)].reshape(n, INNER)
-        elif unit.kind == "wetted":  # a liquid keeps its temperature while the air's wanders: heat tells by how much
-            p = [q.name for q in bench.places].index(unit.place)
-            slots.A[s], slots.gate[:, s] = bench.A[p], coarse  # to the reference temperature: no rise
+        elif unit.kind == "wetted":  # a liquid keeps its temperature while the air's drifts: heat tells by how much
+            p = [q.name for q in probed.places].index(unit.place)
+            slots.A[s], slots.gate[:, s] = probed.A[p], coarse  # to the reference temperature: no rise
         elif unit.kind == "group_film":
             f = films.index(unit.place)
-            slots.A[s] = np.asarray(bench.system.A[0])[f]
-            slots.M[s], slots.gate[:, s] = np.asarray(bench.system.M)[:, f], coarse
+            slots.A[s] = np.asarray(probed.system.A[0])[f]
+            slots.M[s], slots.gate[:, s] = np.asarray(probed.system.M)[:, f], coarse
             slots.rise[:, :, s] = air[:, load.films[f].environment].reshape(n, INNER)
         elif unit.kind == "group":
             slots.film[:, s, films.index(unit.place)] = coarse
@@ -143,20 +145,20 @@ def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) 
         elif unit.kind == "joint":
             slots.joint[:, s, [j.name for j in load.joints].index(unit.place)] = coarse
         elif unit.kind == "contact":
-            slots.contact[:, s, bench.base.load_model.contacts.index(unit.place)] = coarse
+            slots.contact[:, s, probed.base.load_model.contacts.index(unit.place)] = coarse
         elif unit.kind == "capacity":
-            p = [q.name for q in bench.places].index(unit.place)
-            slots.E[s] = np.outer(bench.B[p], bench.B[p])
+            p = [q.name for q in probed.places].index(unit.place)
+            slots.E[s] = np.outer(probed.B[p], probed.B[p])
         elif unit.kind == "heat":
-            p = [q.name for q in bench.places].index(unit.place)
-            slots.forcing[:, :, s] = fine[:, :, None] * bench.B[p]
+            p = [q.name for q in probed.places].index(unit.place)
+            slots.forcing[:, :, s] = fine[:, :, None] * probed.B[p]
         elif unit.kind == "moved":  # all that the source emits there, as warm as it is there
             name = unit.place.removeprefix("sources.").split(">")[0]
             vector = elements.vectors[k][elements.columns[unit.column].vector]
             j = [q.name for q in load.sources].index(name)
             slots.B[s][:, j] = vector
-            if j in bench.layout.following_losses:  # mean temperature: what spreads heat over a surface, transposed
-                slots.reads[s, bench.layout.following_losses.index(j)] = vector
+            if j in probed.layout.following_losses:  # mean temperature: what spreads heat over a surface, transposed
+                slots.reads[s, probed.layout.following_losses.index(j)] = vector
         else:  # a forcing that the bank knows: history of its column, or of its blocks, times its vector
             column = elements.columns[unit.column]
             vector, history = elements.vectors[k][column.vector], column.histories[k]

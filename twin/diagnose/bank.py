@@ -2,9 +2,9 @@
 
 About the calibrated trajectory z(t) a cause of small amplitude enters as a forcing f(t) = v(t) s(t): v the place (the
 input vector of a surface, the heat that its film would carry, the flow of a joint), s its history. All are stepped
-together as columns of one linear march with the matrices of the nominal run and the steps of `twin.diagnose.march`, so
-that thousands of hypotheses cost a few matrix products per step. The laws' own reaction is left out here, and is in the
-exact refit of what was chosen.
+together as columns of one linear system with the matrices of the nominal run and the steps of
+`twin.diagnose.integration`, so that thousands of hypotheses cost a few matrix products per step. The laws' own reaction
+is left out here, and is in the exact refit of what was chosen.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import jax
 import numpy as np
 import scipy.linalg
 
-from twin.diagnose.march import gammas
+from twin.diagnose.integration import gammas
 from twin.diagnose.study import Study
 from twin.rom.step_loads import Tabulated, film_loads
 from twin.rom.tableau import SDIRK2, stages
@@ -29,7 +29,7 @@ AT_ONCE = 700  # columns
 
 @dataclass(frozen=True)
 class Nominal:
-    """The nominal run k as the linear march needs it; n coarse steps of m fine ones, in fine steps (n m)."""
+    """The nominal run k as the linear integration needs it; n coarse steps of m fine ones, in fine steps (n m)."""
 
     states: np.ndarray  # (n m + 1, r)
     total: np.ndarray  # (n m, n_films) W/(m^2 K), radiation included
@@ -46,9 +46,9 @@ class Nominal:
 
 def nominal_run(study: Study, k: int) -> Nominal:
     """Trajectory and matrices of run k at nominal parameters."""
-    bench = study.bench
-    states = study.states(k, np.zeros(len(bench.parameters)))
-    system, layout, loads = jax.tree.map(np.asarray, bench.system), bench.layout, study.runs[k].run.loads
+    probed = study.probed
+    states = study.states(k, np.zeros(len(probed.parameters)))
+    system, layout, loads = jax.tree.map(np.asarray, probed.system), probed.layout, study.runs[k].run.loads
     n, m = loads.environment.shape[:2]
     n_films = layout.n_films
     plan, T_ref = system.film_plan, float(system.reference_temperature)
@@ -57,7 +57,7 @@ def nominal_run(study: Study, k: int) -> Nominal:
     rate = float(np.asarray(loads.rate)[0])
     total, convection, outer = (np.zeros((n * m, n_films)) for _ in range(3))
     inverse = np.zeros((n * m, *A0.shape), dtype=np.float32)
-    gamma = gammas(bench.contacts, loads, np.ones(bench.contacts.n_contacts))
+    gamma = gammas(probed.contacts, loads, np.ones(probed.contacts.n_contacts))
     for i in range(n):
         fine = slice(i * m, (i + 1) * m)
         told = Tabulated(theta[i, :n_films], layout.following_films, np.asarray(loads.film_table)[i])
@@ -94,17 +94,17 @@ def respond(
         acting = [c for c, column in enumerate(columns) if column.histories[k] is not None]
         for begin in range(0, len(acting), AT_ONCE):
             chosen = acting[begin : begin + AT_ONCE]
-            made = _march(study, k, own, vectors[k], [columns[c] for c in chosen])
+            made = _integrated(study, k, own, vectors[k], [columns[c] for c in chosen])
             result[first : first + planned.size, chosen] = made
         first += planned.size
     return result
 
 
-def _march(
+def _integrated(
     study: Study, k: int, nominal: Nominal, vectors: Sequence[np.ndarray], columns: Sequence[Column]
 ) -> np.ndarray:
     planned = study.runs[k]
-    (body,) = study.bench.base.bodies
+    (body,) = study.probed.base.bodies
     fine, r = len(nominal.states) - 1, body.n
     C = body.C[planned.measured.column].astype(np.float32)
     used = sorted({c.vector for c in columns})

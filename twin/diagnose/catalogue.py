@@ -187,7 +187,7 @@ def with_own(path: Path) -> tuple[Family, ...]:
         raise TwinError("cannot be read", str(path), "give a Python file that defines FAMILIES") from e
     except Exception as e:
         raise TwinError(
-            f"does not run: {type(e).__name__}: {e}", str(path), "mend the file; see docs/diagnosis.md"
+            f"does not run: {type(e).__name__}: {e}", str(path), "fix the file; see docs/diagnosis.md"
         ) from e
     own = scope.get("FAMILIES")
     if not isinstance(own, tuple) or not all(isinstance(f, Family) for f in own):

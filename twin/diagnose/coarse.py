@@ -13,16 +13,16 @@ COARSE = 1.0  # of a sensor's or the probe's noise: a model may differ by this (
 
 
 def coarse_model(model: MachineModel, study: Study, temperature_sigma: float, tcp_sigma: float) -> Cause | None:
-    """The cause, where a model differs from the bench's by more than COARSE in a fitted run, both as described.
+    """The cause, where a model differs from the probed model's by more than COARSE in a fitted run, both as described.
 
     temperature_sigma [K], tcp_sigma [m]: of one reading.
     """
     worst = 0.0
-    if model.n == study.bench.base.n and study.bench.reduction == (0.0, 0.0):
-        return None  # a lumped machine with all its states: what is left are the bench's own time steps
+    if model.n == study.probed.base.n and study.probed.reduction == (0.0, 0.0):
+        return None  # a lumped machine with all its states: what is left are the probed model's own time steps
     for k in study.fitted:
         planned = study.runs[k]
-        if tuple(model.sensors) != tuple(study.bench.base.sensors):
+        if tuple(model.sensors) != tuple(study.probed.base.sensors):
             return None
         one = np.concatenate([b.one for b in model.bodies])
         start = (planned.run.start - model.reference_temperature) * one
@@ -38,7 +38,7 @@ def coarse_model(model: MachineModel, study: Study, temperature_sigma: float, tc
             w += np.einsum("kp,pcn,kn->kc", m.pose, body.G, at)
             first += body.n
         w = w - w[0] if m.from_first else w
-        here, tcp = planned.split(study.outputs(k, np.zeros(len(study.bench.parameters))))
+        here, tcp = planned.split(study.outputs(k, np.zeros(len(study.probed.parameters))))
         error = np.sqrt(np.mean((m.mean_of @ T[:, m.column] - here) ** 2, axis=0)).max(initial=0.0)
         moved = np.sqrt(np.mean((w - tcp) ** 2, axis=0)).max(initial=0.0) if len(w) else 0.0
         worst = max(worst, float(error) / temperature_sigma, float(moved) / tcp_sigma)

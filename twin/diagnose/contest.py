@@ -2,7 +2,7 @@
 
 A score is exact for what adds heat. What conducts bends: a joint that lost nine tenths of its conductance moves
 temperatures nine times as far as its derivative says, and a cause that is wrong but free enough can then score more
-than the right one. So those whose response is no straight line are refitted, each alone, and judged by the misfit that
+than the right one. So those whose response is not linear are refitted, each alone, and compared by the misfit that
 they really remove. Conductances move in t = a / (1 + a), in which temperatures are nearly linear.
 """
 
@@ -17,35 +17,38 @@ import numpy as np
 from twin.diagnose.accepted import CURVED, curved_change, curved_slope, freed, jacobian
 from twin.diagnose.acted import CONDUCTS, READINGS, units_of
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.detector import Detector
 from twin.diagnose.edges import STEP, Edge, edges_of, moved, with_pulses
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.growth import GROWTH
 from twin.diagnose.study import K, Study
-from twin.diagnose.yardstick import Yardstick
 
 BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant", "moved")
 PASSES, WINDOW_PASSES, READ_PASSES = 3, 8, 6
 ENTRANTS = 5  # candidates of a kind that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
-SATURATES = 0.4  # likewise of capacities and of coolants' films: their straight lines are the worse the larger they are
+SATURATES = 0.4  # likewise of capacities and of coolants' films: the larger they are, the worse is linearity
 EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
-GONE = -0.7  # of a relative change, as a straight line
+GONE = -0.7  # of a relative change, linearly
 WET = 60.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
 ENOUGH = 0.02  # of a size, that a pass moves it by when it has arrived
 LESS, SHARE = 1.0, 1e-3  # likelihood-ratio units and share of a statistic: a pass that changes less is the last
-HARDLY = 35.0  # W/(m^2 K), likewise: less than the error of form in 95 of 100 cases is no film of a warm liquid
+HARDLY = 35.0  # W/(m^2 K), likewise: less than the discrepancy in 95 of 100 cases is no film of a warm liquid
 FROZEN = 0.0  # degC, below which no medium flows over a machine
 HELD = 2  # passes in which its heat and edges are found for that film, before all are free
 TRIAL = 4  # passes by which coolants are compared before the best of them are refitted
 BENDS = 2.5  # prior standard deviations that only something hidden moves a parameter by
 NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
-LOW, HIGH = -0.97, 20.0  # of relative changes: from -0.98 on the march holds a conductance, and no derivative is left
+LOW, HIGH = (
+    -0.97,
+    20.0,
+)  # of relative changes: from -0.98 on the integration holds a conductance, and no derivative is left
 AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
 
 
-def misfit(yard: Yardstick, fitted: Fitted) -> float:
-    """Sum of squares of what a fit leaves, in units of noise and errors of form."""
-    white = yard.whiten(fitted.residual)
+def misfit(detector: Detector, fitted: Fitted) -> float:
+    """Sum of squares of what a fit leaves, in units of noise and model discrepancy."""
+    white = detector.whiten(fitted.residual)
     return float(white @ fitted.projector(white))
 
 
@@ -56,16 +59,16 @@ def worth(h: Hypothesis) -> float:
     return h.statistic - 2.0 * float(np.log(tried)) - AMPLITUDE * (h.batch.q - 1) - GROWTH * more
 
 
-def proof(yard: Yardstick, h: Hypothesis) -> float:
+def proof(detector: Detector, h: Hypothesis) -> float:
     """A refitted statistic as thresholds count it: they know neither edges that are fitted nor further windows."""
     if h.batch.kind in READINGS:
         return h.statistic
     more = max(len(h.when.windows) - 1, 0) if h.when.bell is None and h.family != "joint" else 0
-    return h.statistic - EDGE * len(edges_of(yard.study, h)) - (GROWTH - 2.0 * EDGE) * more
+    return h.statistic - EDGE * len(edges_of(detector.study, h)) - (GROWTH - 2.0 * EDGE) * more
 
 
 def judged(
-    yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
+    detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Candidates, most worthy first: those whose statistics are exact, and the others.
 
@@ -81,49 +84,49 @@ def judged(
     for h in waiting:
         behind = SATURATES if h.batch.kind == "capacity" else BEHIND
         led = worth(h) < (1.0 - behind) * leads_by
-        bent = _bent(yard, h)
+        bent = _bent(detector, h)
         if (led and not _saturated(h)) or (bent and count[h.batch.kind] >= ENTRANTS):
             left.append(h)
             continue
         count[h.batch.kind] += bent
-        now = max((exact(yard, y, fitted, s) for s in starts[id(h)]), key=worth) if bent else h
+        now = max((exact(detector, y, fitted, s) for s in starts[id(h)]), key=worth) if bent else h
         if worth(now) > lead:
             lead = worth(now)
             leads_by = min(lead, max(worth(h), (1.0 - SATURATES) * lead))
         done.append(now)
-    straight = [h for h in left if not _bent(yard, h)]
-    return _fair(yard, y, fitted, [*done, *straight]), [h for h in left if _bent(yard, h)]
+    straight = [h for h in left if not _bent(detector, h)]
+    return _fair(detector, y, fitted, [*done, *straight]), [h for h in left if _bent(detector, h)]
 
 
 def tried(
-    yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
+    detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
 ) -> list[Sequence[Hypothesis]]:
     """Candidates, most worthy first, of `judged`. Where a coolant leads, it and others within SATURATES have been
-    refitted for some passes, from the last of their starts: a straight line through a film that saturates is wrong by
+    refitted for some passes, from the last of their starts: linearity is, for a film that saturates, wrong by
     tens of per cent, more at the wetted face than at those behind it, so that it would be left aside."""
     order = sorted(candidates, key=lambda starts: -worth(starts[0]))
     if not order or order[0][0].batch.kind != "coolant":
         return order
     least = (1.0 - SATURATES) * worth(order[0][0])
     passed = [
-        (exact(yard, y, fitted, starts[-1], TRIAL),)
+        (exact(detector, y, fitted, starts[-1], TRIAL),)
         if starts[0].batch.kind == "coolant" and worth(starts[0]) > least else starts
         for starts in order
     ]  # fmt: skip
     return sorted(passed, key=lambda starts: -worth(starts[0]))
 
 
-def _fair(yard: Yardstick, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Candidates, most worthy first. One that leads by its score while another near it was refitted is refitted, too:
     the exact model takes some hundredths from each, and that alone would decide between the two."""
     order, exactly = sorted(candidates, key=worth, reverse=True), set[int]()
     while True:
         lead = order[0]
         near = [h for h in order[1:] if worth(h) > (1.0 - BEHIND) * worth(lead)]
-        settled = _bent(yard, lead) or id(lead) in exactly or lead.batch.kind in READINGS or lead.batch.fixed
-        if settled or not any(_bent(yard, h) or id(h) in exactly for h in near):
+        settled = _bent(detector, lead) or id(lead) in exactly or lead.batch.kind in READINGS or lead.batch.fixed
+        if settled or not any(_bent(detector, h) or id(h) in exactly for h in near):
             break
-        order[0] = exact(yard, y, fitted, lead)
+        order[0] = exact(detector, y, fitted, lead)
         exactly.add(id(order[0]))
         order.sort(key=worth, reverse=True)
     return order
@@ -134,32 +137,32 @@ def _saturated(h: Hypothesis) -> bool:
     return h.batch.kind in CONDUCTS and h.amplitude[0] < GONE
 
 
-def _bent(yard: Yardstick, h: Hypothesis) -> bool:
-    return h.batch.kind in (*BENT, *CURVED) or (h.batch.kind not in READINGS and bool(edges_of(yard.study, h)))
+def _bent(detector: Detector, h: Hypothesis) -> bool:
+    return h.batch.kind in (*BENT, *CURVED) or (h.batch.kind not in READINGS and bool(edges_of(detector.study, h)))
 
 
-def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes: int = 0) -> Hypothesis:
+def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes: int = 0) -> Hypothesis:
     """A hypothesis with amplitudes, edges in time and statistic of the exact model, the parameters fitted with it.
 
     y (m,): NaN where nothing was measured. What accepted causes do is added to what it does. passes: at most, 0 for as
     many as its kind needs.
     """
     if h.batch.kind in CURVED:
-        return _read_anew(yard, fitted, h)
-    study = yard.study
+        return _read_anew(detector, fitted, h)
+    study = detector.study
     relative, q = h.batch.kind in CONDUCTS, h.batch.q
     a = np.array(h.amplitude)
     if relative:
         a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, LOW, HIGH)  # as if temperatures were linear in t
     if h.when.bell is not None:
-        h = moved(study, yard.elements, h, ())  # hours found by `growth` get their windows
-    before = misfit(yard, fitted)
+        h = moved(study, detector.elements, h, ())  # hours found by `growth` get their windows
+    before = misfit(detector, fitted)
     inner = edges_of(study, h)
     low, high = bounds(study)
-    floor = lowest(yard, h)
+    floor = lowest(detector, h)
     a = np.maximum(a, floor)
     mean, inverse = priors(h)
-    if h.batch.kind == "coolant":  # a strong film saturates: a score that takes it for a straight line says little
+    if h.batch.kind == "coolant":  # a strong film saturates: a score that takes it as linear says little
         a[0] = WET
     x0 = beginning(fitted.x).copy()
     x0[freed(study, h)] = 0.0
@@ -168,10 +171,10 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes:
     held = HELD if h.batch.kind == "coolant" else 0
     for i in range(passes or held + (PASSES if not inner else WINDOW_PASSES)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
-        outputs, derivatives = _outputs(yard, now, edges)
-        J = jacobian(yard, now.x, [(h, float(now.a[0]))])
-        projector = yard.fitter.projector(J, fitted.more)
-        left = yard.whiten(y - fitted.beside - outputs + J @ now.x)
+        outputs, derivatives = _outputs(detector, now, edges)
+        J = jacobian(detector, now.x, [(h, float(now.a[0]))])
+        projector = detector.fitter.projector(J, fitted.more)
+        left = detector.whiten(y - fitted.beside - outputs + J @ now.x)
         removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
         arrived = i > held and abs(removed - statistic) < max(LESS, SHARE * removed)
         if removed <= statistic:  # too far: back, then less; parameters may do without a step
@@ -189,7 +192,7 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes:
                 break
             D = derivatives
             D[:, q:] *= [e.per_second for e in edges]
-            D = yard.whiten(D)
+            D = detector.whiten(D)
             PD = projector(D)
             stiff = 1e9 * inverse if i < held else inverse
             F = D.T @ PD + np.diag([*stiff, *(e.prior**-2.0 for e in edges)])
@@ -202,25 +205,25 @@ def exact(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes:
             drift = np.clip(np.clip(nuisance, low, high) - now.x, -NEAR, NEAR)
             step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, shifts, strict=True)))
         shifted = (
-            moved(study, yard.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
+            moved(study, detector.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
         )
         now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
     if h.batch.kind == "coolant" and best.a[0] <= HARDLY and best.a[1] > 0.0:
         statistic = 0.0  # that is heat
     # what better parameters remove is not the cause's
     plain = np.concatenate([study.outputs(k, best.x) for k in study.fitted])
-    _, J = yard.fitter.surrogate.at(best.x)
-    none = yard.whiten(y - fitted.beside - plain + J @ best.x)
-    statistic += min(float(none @ yard.fitter.projector(J, fitted.more)(none)) - before, 0.0)
+    _, J = detector.fitter.surrogate.at(best.x)
+    none = detector.whiten(y - fitted.beside - plain + J @ best.x)
+    statistic += min(float(none @ detector.fitter.projector(J, fitted.more)(none)) - before, 0.0)
     return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
 
 
-def _read_anew(yard: Yardstick, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+def _read_anew(detector: Detector, fitted: Fitted, h: Hypothesis) -> Hypothesis:
     """A hypothesis about readings that are not in proportion to its size, at the size that removes most misfit."""
-    left = fitted.projector(yard.whiten(fitted.residual))
+    left = fitted.projector(detector.whiten(fitted.residual))
     size, tried, x = h.amplitude[0], list[tuple[float, float]](), beginning(fitted.x)
     for _ in range(READ_PASSES):
-        change, D = (yard.whiten(f(yard, h, size, x)) for f in (curved_change, curved_slope))
+        change, D = (detector.whiten(f(detector, h, size, x)) for f in (curved_change, curved_slope))
         kept = left - fitted.projector(change)
         tried.append((float(change @ (left + kept)), size))
         step = float(D @ kept) / max(float(D @ fitted.projector(D)), 1e-30)
@@ -250,7 +253,7 @@ def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:
         held |= beyond
 
 
-def lowest(yard: Yardstick, h: Hypothesis) -> np.ndarray:
+def lowest(detector: Detector, h: Hypothesis) -> np.ndarray:
     """(q,) below which no amplitude goes: less than the described film cannot lack at a surface."""
     result = np.full(h.batch.q, -np.inf)
     if h.batch.kind == "coolant":
@@ -258,10 +261,10 @@ def lowest(yard: Yardstick, h: Hypothesis) -> np.ndarray:
     elif h.family == "sun":  # on no day does it cool
         result[:] = 0.0
     elif h.batch.kind == "film" and not h.batch.sign:
-        bench = yard.study.bench
-        film = next(p.film for p in bench.places if p.name == h.name)
-        own = [f for f, described in enumerate(bench.base.load_model.films) if described.name == film]  # perhaps none
-        result[0] = -max(float(yard.nominal[k].total[:, own].max(initial=0.0)) for k in yard.study.fitted)
+        probed = detector.study.probed
+        film = next(p.film for p in probed.places if p.name == h.name)
+        own = [f for f, described in enumerate(probed.base.load_model.films) if described.name == film]  # perhaps none
+        result[0] = -max(float(detector.nominal[k].total[:, own].max(initial=0.0)) for k in detector.study.fitted)
     return result
 
 
@@ -270,8 +273,8 @@ def _liquid(study: Study, h: Hypothesis, a: np.ndarray) -> np.ndarray:
     a large face beside it imitates a coolant, from far below that."""
     if h.batch.kind != "coolant":
         return a
-    area = next(p.area for p in study.bench.places if p.name == h.name)
-    above = study.bench.base.reference_temperature - FROZEN
+    area = next(p.area for p in study.probed.places if p.name == h.name)
+    above = study.probed.base.reference_temperature - FROZEN
     return np.array([max(a[0], -a[1] / (area * above)) if above > 0.0 else a[0], a[1]])
 
 
@@ -297,14 +300,14 @@ class _Step:
     edges: tuple[tuple[Edge, float], ...]  # s
 
 
-def _outputs(yard: Yardstick, p: _Point, edges: Sequence[Edge]) -> tuple[np.ndarray, np.ndarray]:
+def _outputs(detector: Detector, p: _Point, edges: Sequence[Edge]) -> tuple[np.ndarray, np.ndarray]:
     """Outputs (m,) of all fitted runs and their derivatives (m, q + edges) by amplitudes and pulses at edges."""
-    study, n = yard.study, len(p.a) + len(edges)
+    study, n = detector.study, len(p.a) + len(edges)
     units = units_of(study, p.h)
     outputs, derivatives = [], []
     for k in study.fitted:
         if any(u.shapes[k].any() for u in units):
-            slots = with_pulses(study, yard.elements, p.h, units, p.a, edges, k)
+            slots = with_pulses(study, detector.elements, p.h, units, p.a, edges, k)
             f, D = study.by_amplitudes(k, p.x, slots, [*p.a, *np.zeros(len(edges))])
             derivatives.append(D[:, :n])
         else:

@@ -12,20 +12,20 @@ from twin import __version__
 from twin.build.cache import arrays_hash, cached, machine_hash
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
-from twin.diagnose.bench import Bench, drive_arrays, make_bench
 from twin.diagnose.catalogue import FAMILIES, VERSION, Family
 from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.coarse import coarse_model
+from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
 from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
+from twin.diagnose.probed_model import ProbedModel, drive_arrays, make_probed_model
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
 from twin.diagnose.settled import settled
 from twin.diagnose.study import Study, make_study
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
-from twin.diagnose.yardstick import FORM, NULLS, Yardstick, instruments_of, make_yardstick, stored
 from twin.errors import ArtefactError, LogError
 from twin.logs.run import Run
 from twin.machine.description import Machine
@@ -45,7 +45,7 @@ class Settings:
     tcp_sigma: float = 1e-6  # m, where tcp.csv has no sigma
     exclude: tuple[str, ...] = ()  # sensors
     families: tuple[Family, ...] = FAMILIES
-    form: int = FORM  # synthetic measurements for errors of form
+    form: int = FORM  # synthetic measurements for model discrepancy
     nulls: int = NULLS  # and for thresholds
     seed: int = 1
 
@@ -80,18 +80,18 @@ def machine_of(artefact: Artefact, path: Path, machine: Path | None = None) -> M
 def prepare(
     artefact: Artefact, machine: Machine, runs: Sequence[Run], sealed: Sequence[Run], settings: Settings,
     progress: Progress = silent,
-) -> tuple[Bench, Study, Yardstick, list[Measured]]:  # fmt: skip
-    """Bench, study and yardstick, the dear parts from the cache; sealed runs enter by their loads only.
+) -> tuple[ProbedModel, Study, Detector, list[Measured]]:  # fmt: skip
+    """Probed model, study and detector, the expensive parts from the cache; sealed runs enter by their loads only.
 
     Raises LogError for runs that hold nothing to compare, or too little.
     """
     known = parameters(machine)
     every = [*runs, *sealed]
-    bench = make_bench(machine, known, every, progress)
-    plans = [measured(bench.base, run, own.drive, own.name, exclude=settings.exclude)
-             for run, own in zip(every, bench.runs, strict=True)]  # fmt: skip
+    probed = make_probed_model(machine, known, every, progress)
+    plans = [measured(probed.base, run, own.drive, own.name, exclude=settings.exclude)
+             for run, own in zip(every, probed.runs, strict=True)]  # fmt: skip
     closed = [*plans[: len(runs)], *(_closed(m) for m in plans[len(runs) :])]
-    study = make_study(bench, closed, range(len(runs)))
+    study = make_study(probed, closed, range(len(runs)))
     if sum(m.n_temperature + len(m.tcp) for m in plans[: len(runs)]) < LEAST:
         raise LogError(
             "too few measurements to diagnose", str(runs[0].folder),
@@ -105,7 +105,7 @@ def prepare(
                   np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
                   *(signals[name] for name in sorted(signals))]  # fmt: skip
     # the window's coordinates: made anew on other cores they may be others, and z0 is zero at the reference temperature
-    parts += [bench.B, *(body.C for body in bench.base.bodies)]
+    parts += [probed.B, *(body.C for body in probed.base.bodies)]
     asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)
     names = tuple((f.name, f.number, f.file) for f in settings.families)
     tolerance = tuple((p.path, p.nominal, p.sigma) for p in known)
@@ -120,11 +120,11 @@ def prepare(
         tolerance,
         counts,
     )
-    yard = cached(
-        "yardstick", make_yardstick.__module__, inputs,
-        lambda: stored(make_yardstick(study, settings.families, instruments, Form(), counts, progress)),
+    detector = cached(
+        "detector", make_detector.__module__, inputs,
+        lambda: stored(make_detector(study, settings.families, instruments, Form(), counts, progress)),
     )  # fmt: skip
-    return bench, study, yard.of(study), plans
+    return probed, study, detector.of(study), plans
 
 
 def _closed(m: Measured) -> Measured:
@@ -147,14 +147,14 @@ def diagnose(
     names = run_names([*runs, *sealed])
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
-    _, study, yard, plans = prepare(artefact, machine, usable, sealed, settings, progress)
-    found = search(yard, measured_of(study))
+    _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
+    found = search(detector, measured_of(study))
     verdict, causes = verdict_of(found, settings.families)
     shown = found
     groups = {f.name: f.group for f in settings.families}
     if verdict == "unknown":  # told and judged is the calibration beside faulty channels then, not what was tried
         kept = tuple(a for a in found.accepted if groups.get(a.hypothesis.family) == "sensor")
-        x, covariance = settled(yard, measured_of(study), kept)
+        x, covariance = settled(detector, measured_of(study), kept)
         shown = replace(found, accepted=kept, x=x, covariance=covariance)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     coarse = coarse_model(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma)
@@ -170,7 +170,7 @@ def diagnose(
     opened = plans[len(runs) :]
     table = tuple(
         g for k, m in enumerate(opened, start=len(runs))
-        for g in gains(shown, k, m, settings.seed, _floors(yard, m))
+        for g in gains(shown, k, m, settings.seed, _floors(detector, m))
     )  # fmt: skip
     worse = sum(g.ci95[1] < 0.0 for g in table)
     if extension and worse > sum(g.ci95[0] > 0.0 for g in table):
@@ -186,13 +186,13 @@ def diagnose(
         summary=_summary(verdict, causes, shown),
         causes=causes,
         pulls=pulls_of(shown),
-        detection_limits=limits_of(yard),
+        detection_limits=limits_of(detector),
         unknown=unknown_of(found) if verdict == "unknown" else None,
         gain=table,
         ranked=tuple(rival_of(h, float(first.cosine[0, i])) for i, h in enumerate(first.ranked)),
         cosine=first.cosine,
-        nulls=yard.nulls,
-        thresholds=yard.thresholds,
+        nulls=detector.nulls,
+        thresholds=detector.thresholds,
         observed=first.observed,
         whiteness=_whiteness(shown, plans),
         series=_series(shown, plans, len(runs)),
@@ -205,18 +205,18 @@ def diagnose(
             "runs": names[: len(runs)],
             "sealed": names[len(runs) :],
             "nulls": settings.nulls,
-            "window_states": study.bench.base.n,
-            "window_error_K": study.bench.reduction[0],
-            "window_error_m": study.bench.reduction[1],
+            "window_states": study.probed.base.n,
+            "window_error_K": study.probed.reduction[0],
+            "window_error_m": study.probed.reduction[1],
         },
     )
     return Result(diagnosis, found, extension)
 
 
-def _floors(yard: Yardstick, m: Measured) -> tuple[np.ndarray, np.ndarray]:
+def _floors(detector: Detector, m: Measured) -> tuple[np.ndarray, np.ndarray]:
     """Noise of a sealed run's sensors (s,) and TCP components (3,): as in the first fitted run."""
-    sensors, tcp = yard.whiten.channels[0]
-    own = yard.study.runs[0].measured.sensors
+    sensors, tcp = detector.whiten.channels[0]
+    own = detector.study.runs[0].measured.sensors
     known = dict(zip(own, sensors.sigma, strict=True))
     return np.array([known.get(s, float(np.median(sensors.sigma)) if len(own) else 0.1) for s in m.sensors]), tcp.sigma
 
@@ -235,7 +235,7 @@ def _summary(verdict: Verdict, causes: Sequence[Cause], found: Search) -> tuple[
 
 def _whiteness(found: Search, plans: Sequence[Measured]) -> tuple[tuple[str, float, float], ...]:
     """Lag-1 correlation of every channel's residual, recalibrated and extended, over all fitted runs."""
-    study = found.yardstick.study
+    study = found.detector.study
     before: dict[str, list[float]] = {}
     after: dict[str, list[float]] = {}
     for k in study.fitted:
@@ -253,7 +253,7 @@ def _whiteness(found: Search, plans: Sequence[Measured]) -> tuple[tuple[str, flo
 
 
 def _series(found: Search, plans: Sequence[Measured], fitted: int) -> tuple[Series, ...]:
-    study = found.yardstick.study
+    study = found.detector.study
     result = []
     for k, (planned, m) in enumerate(zip(study.runs, plans, strict=True)):
         models = [planned.split(v) for v in vars(predicted(found, k)).values()]

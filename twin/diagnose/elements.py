@@ -25,7 +25,7 @@ import numpy as np
 
 from twin.build.places import beside
 from twin.diagnose.bank import Column, Nominal
-from twin.diagnose.march import INNER, gammas
+from twin.diagnose.integration import INNER, gammas
 from twin.diagnose.study import Study
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place
@@ -52,7 +52,7 @@ class Histories:
 
 @dataclass(frozen=True)
 class Elements:
-    """All elementary causes of a study with what the march needs."""
+    """All elementary causes of a study with what the time integration needs."""
 
     histories: Histories
     vectors: tuple[tuple[np.ndarray, ...], ...]  # per run of the study: (r,) or (n_fine, r) each
@@ -77,7 +77,7 @@ def slim(elements: Elements) -> Elements:
 
 def histories_of(study: Study) -> Histories:
     """Histories of the logged signals that tell how hard a drive works, and blocks of an hour."""
-    load = study.bench.base.load_model
+    load = study.probed.base.load_model
     runs = [planned.run for planned in study.runs]
     positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
     units = {s.name: s.unit for s in load.signals}
@@ -128,9 +128,9 @@ def histories_of(study: Study) -> Histories:
 
 def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     """Every elementary cause of a study; nominal: of all its runs."""
-    bench, load = study.bench, study.bench.base.load_model
-    (body,) = bench.base.bodies
-    system = bench.system
+    probed, load = study.probed, study.probed.base.load_model
+    (body,) = probed.base.bodies
+    system = probed.system
     histories = histories_of(study)
     runs = [planned.run for planned in study.runs]
     n = [run.drive.n_steps for run in runs]
@@ -159,22 +159,22 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     always = histories.signals["always"]
     z = [own.middle for own in nominal]
     films = [f.name for f in load.films]
-    air = [run.drive.environment - bench.base.reference_temperature for run in runs]
+    air = [run.drive.environment - probed.base.reference_temperature for run in runs]
     film_env = [f.environment for f in load.films]
     A, M = np.asarray(system.A[0]), np.asarray(system.M)
     # heat and film at places
-    for p, place in enumerate(bench.places):
-        v = vector([bench.B[p]] * len(runs))
+    for p, place in enumerate(probed.places):
+        v = vector([probed.B[p]] * len(runs))
         for name, history in histories.signals.items():
             column(("heat", place.name, name), v, history)
         blocks("heat", place.name, v)
         e = film_env[films.index(place.film)] if place.film else load.surroundings
-        v = vector([-x @ bench.A[p].T + a[:, [e]] * bench.M[p] for x, a in zip(z, air, strict=True)])
+        v = vector([-x @ probed.A[p].T + a[:, [e]] * probed.M[p] for x, a in zip(z, air, strict=True)])
         column(("film", place.name, "always"), v, always)
         for name, history in histories.speeds.items():
             column(("film", place.name, name), v, history)
         blocks("film", place.name, v)
-        b = bench.B[p]
+        b = probed.B[p]
         v = vector([-np.outer(np.diff(own.states @ b, axis=0) * own.rate, b) for own in nominal])
         column(("capacity", place.name, "always"), v, always)
     for f, name in enumerate(films):
@@ -192,8 +192,8 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         own_films = [f for f in range(len(films)) if film_env[f] == e]
         v = vector([own.total[:, own_films] @ M[:, own_films].T for own in nominal])
         blocks("air", environment.name, v)
-        lifted = bench.H[:, own_films] - pivot(study, e) * M[:, own_films]
-        if np.abs(bench.H[:, own_films]).max(initial=0.0) > 0.0:
+        lifted = probed.H[:, own_films] - pivot(study, e) * M[:, own_films]
+        if np.abs(probed.H[:, own_films]).max(initial=0.0) > 0.0:
             v = vector([own.convection[:, own_films] @ lifted.T for own in nominal])
             column(("gradient", environment.name, "always"), v, always)
     for j, joint in enumerate(load.joints):
@@ -201,7 +201,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         conductance = [np.asarray(run.drive.theta)[:, [len(films) + j]] for run in runs]
         v = vector([-k * (x @ term.T) for k, x in zip(conductance, z, strict=True)])
         blocks("joint", joint.name, v)
-    for c, name in enumerate(bench.base.load_model.contacts):
+    for c, name in enumerate(probed.base.load_model.contacts):
         v = vector([_contact_flow(study, k, c, x) for k, x in enumerate(z)])
         blocks("contact", name, v)
     powers = [_powers(study, k, own) for k, own in enumerate(nominal)]
@@ -212,9 +212,9 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         v = vector([B] * len(runs))
         for name, history in _law_histories(study, j, histories).items():
             column(("source", source.name, name), v, history)
-        for p in beside(bench.places, own_place(study, j)):
-            v = vector([bench.B[p] - B] * len(runs))
-            column(("moved", f"{source.name}>{bench.places[p].name}", "always"), v, [q[:, j] for q in powers])
+        for p in beside(probed.places, own_place(study, j)):
+            v = vector([probed.B[p] - B] * len(runs))
+            column(("moved", f"{source.name}>{probed.places[p].name}", "always"), v, [q[:, j] for q in powers])
     for name, factor, of in _signals(study, nominal, powers):
         column(("signal", f"{name}*{factor:.6g}", "always"), vector(of), always)
     for i in range(len(study.fitted)):
@@ -231,43 +231,43 @@ def pivot(study: Study, e: int) -> float:
 
     A gradient about another height is an offset as well, which calibration resists.
     """
-    bench, load = study.bench, study.bench.base.load_model
+    probed, load = study.probed, study.probed.base.load_model
     if load.environments[e].height != 0.0 or load.environments[e].gradient != 0.0:
         return float(load.environments[e].height)
-    (body,) = bench.base.bodies
+    (body,) = probed.base.bodies
     own = [f for f, film in enumerate(load.films) if film.environment == e]
-    area = float((body.one @ np.asarray(bench.system.M)[:, own]).sum())
-    return float((body.one @ bench.H[:, own]).sum() / area) if area > 0.0 else 0.0
+    area = float((body.one @ np.asarray(probed.system.M)[:, own]).sum())
+    return float((body.one @ probed.H[:, own]).sum() / area) if area > 0.0 else 0.0
 
 
 def own_place(study: Study, source: int) -> int:
     """The place that a source of a surface heats."""
-    (body,) = study.bench.base.bodies
+    (body,) = study.probed.base.bodies
     B = body.B[:, body.sources.index(source)]
-    return int(np.argmax([abs(B @ b) / np.linalg.norm(b) for b in study.bench.B]))
+    return int(np.argmax([abs(B @ b) / np.linalg.norm(b) for b in study.probed.B]))
 
 
 def heated_places(study: Study) -> list[int]:
     """The faces that sources enter at, but contacts; none of lumped machines, whose nodes have no faces."""
-    sources, places = study.bench.base.load_model.sources, study.bench.places
+    sources, places = study.probed.base.load_model.sources, study.probed.places
     own = {own_place(study, j) for j, source in enumerate(sources) if not source.contact}
     return sorted(p for p in own if places[p].surfaces)
 
 
 def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:
     """-P Gamma_c P^T z (n_fine, r) of one contact at its nominal conductance."""
-    bench = study.bench
+    probed = study.probed
     loads = study.runs[k].run.loads
-    P = np.asarray(bench.system.P[0])
-    mask = np.zeros(len(bench.base.load_model.contacts))
+    P = np.asarray(probed.system.P[0])
+    mask = np.zeros(len(probed.base.load_model.contacts))
     mask[c] = 1.0
-    gamma = gammas(bench.contacts, loads, mask)
+    gamma = gammas(probed.contacts, loads, mask)
     return np.asarray(-np.einsum("tij,tj->ti", gamma, z @ P) @ P.T)
 
 
 def _powers(study: Study, k: int, nominal: Nominal) -> np.ndarray:
     """(n_fine, n_sources) W of all sources of a run at the nominal windings."""
-    return _power_of(study.bench.system, study.runs[k].run.drive, nominal)
+    return _power_of(study.probed.system, study.runs[k].run.drive, nominal)
 
 
 def _power_of(system: System, drive: Drive, nominal: Nominal) -> np.ndarray:
@@ -280,7 +280,7 @@ def _power_of(system: System, drive: Drive, nominal: Nominal) -> np.ndarray:
 
 def _law_histories(study: Study, j: int, histories: Histories) -> dict[str, tuple[np.ndarray, ...]]:
     """Other shapes of a source that reads a speed: |n| to another exponent."""
-    load = study.bench.base.load_model
+    load = study.probed.base.load_model
     runs = [planned.run for planned in study.runs]
     units = {s.name: s.unit for s in load.signals}
     result: dict[str, tuple[np.ndarray, ...]] = {}
@@ -301,12 +301,12 @@ def _signals(
     study: Study, nominal: Sequence[Nominal], powers: Sequence[np.ndarray]
 ) -> list[tuple[str, float, list[np.ndarray]]]:
     """(signal, factor, per run (n_fine, r)): what all laws that read a signal would add, were it larger by a factor."""
-    bench, load = study.bench, study.bench.base.load_model
-    (body,) = bench.base.bodies
+    probed, load = study.probed, study.probed.base.load_model
+    (body,) = probed.base.bodies
     positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
     uses = [s.use for s in load.sources] + [f.use for f in load.films]
     read = {s for use in uses for s in use.signals.values()}
-    A, M = np.asarray(bench.system.A[0]), np.asarray(bench.system.M)
+    A, M = np.asarray(probed.system.A[0]), np.asarray(probed.system.M)
     result = []
     for signal in load.signals:
         if signal.name in positions or signal.name not in read or signal.unit == "degC":
@@ -319,8 +319,8 @@ def _signals(
                     per_run.append(np.zeros((run.drive.n_steps, body.n)))
                     continue
                 sources, films, drive = _evaluated(study, k, signal.name, factor)
-                small = replace(bench.system, source_rows=np.asarray(bench.system.source_rows)[[
-                    bench.layout.following_losses.index(j) for j in sources if j in bench.layout.following_losses
+                small = replace(probed.system, source_rows=np.asarray(probed.system.source_rows)[[
+                    probed.layout.following_losses.index(j) for j in sources if j in probed.layout.following_losses
                 ]])  # fmt: skip
                 grown_power = np.zeros_like(power)
                 grown_power[:, sources] = _power_of(small, drive, own) - power[:, sources]
@@ -342,7 +342,7 @@ def _signals(
 
 def _evaluated(study: Study, k: int, signal: str, factor: float) -> tuple[list[int], list[int], Drive]:
     """Sources and films that read a signal, and a drive of these alone with the signal multiplied."""
-    run, load = study.runs[k].run, study.bench.base.load_model
+    run, load = study.runs[k].run, study.probed.base.load_model
     sources = [j for j, s in enumerate(load.sources) if signal in s.use.signals.values()]
     films = [f for f, film in enumerate(load.films) if signal in film.use.signals.values()]
     reading = tuple(replace(load.sources[j], contact="") for j in sources)
@@ -355,13 +355,13 @@ def _evaluated(study: Study, k: int, signal: str, factor: float) -> tuple[list[i
 
 def _without_contacts(study: Study, power: np.ndarray) -> np.ndarray:
     result = power.copy()
-    result[:, list(study.bench.base.load_model.contact_sources)] = 0.0
+    result[:, list(study.probed.base.load_model.contact_sources)] = 0.0
     return result
 
 
 def _all_sources(study: Study) -> np.ndarray:
-    (body,) = study.bench.base.bodies
-    B = np.zeros((body.n, len(study.bench.base.load_model.sources)))
+    (body,) = study.probed.base.bodies
+    B = np.zeros((body.n, len(study.probed.base.load_model.sources)))
     B[:, list(body.sources)] = body.B
     return B
 
@@ -376,7 +376,7 @@ def _convection(drive: Drive, f: int, nominal: Nominal) -> np.ndarray:
 
 def _fields(study: Study) -> list[tuple[str, np.ndarray]]:
     """Initial fields: the whole machine, and each member, by 1 K."""
-    (body,) = study.bench.base.bodies
+    (body,) = study.probed.base.bodies
     result = [("machine", np.asarray(body.one))]
     if body.E_members is not None and len(body.members) > 1:
         result += [(m, E @ body.one) for m, E in zip(body.members, body.E_members, strict=True)]

@@ -128,7 +128,7 @@ def _write_description(
     if not result.causes:
         told = [n for n in diagnosis.notes if n.startswith("not written")] or ["no extension is written"]
         return parameters, told
-    study = result.search.yardstick.study
+    study = result.search.detector.study
     said: list[str] = []
     text = artefact.description
     signals: dict[str, Sequence[Window]] = {}
@@ -161,20 +161,20 @@ def _write_description(
 
 def _as_edited(cause: Cause, study: Study) -> Effect:
     """A cause as descriptions take it (`twin.machine.effects.edits`)."""
-    bench = study.bench
+    probed = study.probed
     settings = dict(cause.settings)
     amplitude = cause.amplitude
     if cause.family == "forced_convection":
         amplitude = amplitude / float(settings.pop("reference", 1.0)) ** cause.exponent  # at 1 m/s
     if cause.place.startswith("films.") and cause.family == "forced_convection":
         film = cause.place.removeprefix("films.")
-        places = [p for p in bench.places if p.film == film]
+        places = [p for p in probed.places if p.film == film]
         settings["surfaces"] = ",".join(".".join(s) for p in places for s in p.surfaces or ((p.name,),))
     if cause.family == "coolant":
         settings.pop("temperature_sigma", None)
     if cause.family == "scale_expansion":
         part = str(settings.pop("part"))
-        settings["surface"] = next((p.name for p in bench.places if part in p.members and p.surfaces), part)
+        settings["surface"] = next((p.name for p in probed.places if part in p.members and p.surfaces), part)
     if cause.family == "capacity":
         settings["conductance"] = amplitude / RIGID
     if cause.family == "loss_law" and cause.signal:

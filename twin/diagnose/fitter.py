@@ -34,7 +34,7 @@ class Fitter:
     study: Study
     surrogate: Surrogate
     whiten: Whitener
-    others: np.ndarray  # (m, q) white nuisance columns besides the parameters: offsets, modes of form errors
+    others: np.ndarray  # (m, q) white nuisance columns besides the parameters: offsets, modes of model discrepancy
 
     @cached_property
     def gram(self) -> np.ndarray:
@@ -70,6 +70,6 @@ class Fitter:
 
 def bounds(study: Study) -> tuple[np.ndarray, np.ndarray]:
     """Low and high (n,) of the parameters in prior standard deviations."""
-    ends = [(p.coordinate(p.low), p.coordinate(p.high)) for p in study.bench.parameters]
+    ends = [(p.coordinate(p.low), p.coordinate(p.high)) for p in study.probed.parameters]
     low, high = np.array(ends).reshape(-1, 2).T
     return low, high

@@ -1,6 +1,6 @@
-"""Errors of form that are known by kind: nuisance columns with priors, from the same sizes that synthetic data use.
+"""Model discrepancy that is known by kind: nuisance columns with priors, from the same sizes that synthetic data use.
 
-What the modes of `yardstick` would have to learn from hundreds of synthetic measurements is mostly known beforehand:
+What the modes of `detector` would have to learn from hundreds of synthetic measurements is mostly known beforehand:
 where a source's heat enters, each face's coefficient, each film's reaction to speed, each sensor's place, each zone's
 air, and each channel's own reading of every source. Only the rest is left to be learned.
 """
@@ -28,7 +28,7 @@ def known_forms(
 
     wind (m, w): columns of `windy`.
     """
-    load, bench = study.bench.base.load_model, study.bench
+    load, probed = study.probed.base.load_model, study.probed
     films = [f.name for f in load.films]
     usual = np.mean([typical(study, k) for k in study.fitted], axis=0)
     columns: list[np.ndarray] = []
@@ -37,7 +37,7 @@ def known_forms(
         if key in elements.index and size > 0.0:
             columns.append(size * raw[:, elements.index[key]].astype(float))
 
-    for place in bench.places:
+    for place in probed.places:
         if place.film:
             add(("film", place.name, "always"), form.local_film * float(usual[films.index(place.film)]))
     for f, film in enumerate(load.films):
@@ -45,7 +45,7 @@ def known_forms(
             heard = elements.histories.same.get(signal, signal)
             add(("group_film", film.name, f"{heard}^{EXPONENT:g}"), form.wind * float(usual[f]))
     for p in heated_places(study):
-        add(("capacity", bench.places[p].name, "always"), lump_of(study, p, form))
+        add(("capacity", probed.places[p].name, "always"), lump_of(study, p, form))
     for kind, source, history in list(elements.index):
         if kind == "moved":
             add((kind, source, history), form.beside)
@@ -59,16 +59,16 @@ def known_forms(
     for environment in load.environments:
         for c in elements.block_of.get(("air", environment.name), ()):
             columns.append(form.air * raw[:, c].astype(float))
-    (body,) = bench.base.bodies
+    (body,) = probed.base.bodies
     first = {k: sum(study.runs[i].size for i in study.fitted if i < k) for k in study.fitted}
-    for s in range(len(bench.base.sensors)):
+    for s in range(len(probed.base.sensors)):
         moved = np.zeros(len(J))
         for k in study.fitted:
             planned = study.runs[k]
             m = planned.measured
             if s in m.column:
                 i = int(np.flatnonzero(m.column == s)[0])
-                own = m.mean_of @ (nominal[k].states @ (bench.ghosts[s] - body.C[s]))
+                own = m.mean_of @ (nominal[k].states @ (probed.displaced[s] - body.C[s]))
                 (b, n), _ = planned.shapes
                 moved[first[k] + np.arange(b) * n + i] = form.aside * own
         if np.any(moved):
@@ -106,7 +106,7 @@ def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.nda
 
 def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
     """Per channel the leading directions of what sources and contacts do to it, in all runs."""
-    own = [i for i, p in enumerate(study.bench.parameters) if p.kind in READ]
+    own = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
     white = whiten(form.reading * J[:, own] / study.scale[own])
     label = np.concatenate([_labels(study, k) for k in study.fitted])
     result = []

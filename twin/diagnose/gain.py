@@ -30,25 +30,25 @@ class Predicted:
 
 def predicted(found: Search, k: int) -> Predicted:
     """What the three models say of run k of the study."""
-    yard, study = found.yardstick, found.yardstick.study
+    detector, study = found.detector, found.detector.study
     delivered = study.outputs(k, np.zeros(len(found.x)))
     recalibrated = study.outputs(k, found.x0)
     if not found.accepted:
         return Predicted(delivered, recalibrated, recalibrated)
-    extended = stepped(yard, found.accepted, k, with_shifts(study, found.accepted, found.x))
+    extended = stepped(detector, found.accepted, k, with_shifts(study, found.accepted, found.x))
     return Predicted(delivered, recalibrated, extended + _read(found, k))
 
 
 def _read(found: Search, k: int) -> np.ndarray:
     """(size,) what causes that act on the reading of the TCP add in run k."""
-    study = found.yardstick.study
+    study = found.detector.study
     kinds = MACHINE_READINGS + MEASURING
     wanted = [a for a in found.accepted if a.hypothesis.batch.kind in kinds]
     result = np.zeros(study.runs[k].size)
     if not wanted:
         return result
     one = replace(study, runs=(study.runs[k],), fitted=(0,))
-    nominal = found.yardstick.nominal[k]
+    nominal = found.detector.nominal[k]
     y = study.outputs(k, np.zeros(len(found.x)))
     columns, index = readings_of(one, [nominal], [y], [np.zeros((len(y), len(found.x)))])
     for a in wanted:
@@ -66,7 +66,7 @@ def gains(
     found: Search, k: int, sealed: Measured, seed: int, floors: tuple[np.ndarray, np.ndarray]
 ) -> tuple[Gain, ...]:
     """Per channel of the sealed run k; its measurements are opened here. floors: noise of sensors (s,) and TCP (3,)."""
-    study: Study = found.yardstick.study
+    study: Study = found.detector.study
     planned = study.runs[k]
     models = [planned.split(v) for v in vars(predicted(found, k)).values()]
     rng = np.random.default_rng(seed)

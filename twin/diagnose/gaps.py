@@ -1,4 +1,4 @@
-"""A yardstick for measurements with gaps that its own do not have: what is missing counts nowhere."""
+"""A detector for measurements with gaps that its own do not have: what is missing counts nowhere."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from dataclasses import replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
+from twin.diagnose.detector import Detector
 from twin.diagnose.sight import Columns
 from twin.diagnose.study import with_measured
 from twin.diagnose.whiten import missing
-from twin.diagnose.yardstick import Yardstick
 
 
-def emptied(yard: Yardstick, plans: list[Measured]) -> Yardstick:
-    """The yardstick where these measurements have gaps that its own do not have; thresholds stay as they are.
+def emptied(detector: Detector, plans: list[Measured]) -> Detector:
+    """The detector where these measurements have gaps that its own do not have; thresholds stay as they are.
 
     `twin diagnose` makes a new one, thresholds and all, which takes minutes: too expensive for every such trial of a
     campaign.
     """
-    study = with_measured(yard.study, plans)
+    study = with_measured(detector.study, plans)
     kept = ~missing(study)
-    others = np.where(kept[:, None], yard.fitter.others, 0.0)
-    raw = np.where(kept[:, None], yard.columns.raw, np.float32(0.0))
-    fitter = replace(yard.fitter, study=study, whiten=replace(yard.whiten, study=study), others=others)
-    columns = Columns.of(raw, yard.columns.batches, yard.columns.heat, others)
-    lost = replace(yard.lost, responses=np.where(kept[:, None], yard.lost.responses, 0.0))
-    return replace(yard, study=study, fitter=fitter, columns=columns, lost=lost)
+    others = np.where(kept[:, None], detector.fitter.others, 0.0)
+    raw = np.where(kept[:, None], detector.columns.raw, np.float32(0.0))
+    fitter = replace(detector.fitter, study=study, whiten=replace(detector.whiten, study=study), others=others)
+    columns = Columns.of(raw, detector.columns.batches, detector.columns.heat, others)
+    lost = replace(detector.lost, responses=np.where(kept[:, None], detector.lost.responses, 0.0))
+    return replace(detector, study=study, fitter=fitter, columns=columns, lost=lost)

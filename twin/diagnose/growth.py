@@ -1,4 +1,4 @@
-"""Further windows for a cause that comes and goes, where the data ask for them, one after the other; other hours of a
+"""Further windows for a cause that switches, where the data ask for them, one after the other; other hours of a
 bell in every run."""
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
 def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis | None:
     """A coolant in the windows that plain cold likes best; None where it has those, or heat explains more than cold.
 
-    A score takes a film for a straight line, in which cold and film cancel over hours that have neither: a window that
+    A score takes a film as linear, in which cold and film cancel over hours that have neither: a window that
     is far too long can then lead. What a coolant takes away is cold, whatever its film.
     """
     if h.batch.kind != "coolant" or len(h.when.windows) == 0:

@@ -1,6 +1,6 @@
-"""Errors of form of channels that get far hotter than the description says: they grow with what they are errors of.
+"""Model discrepancy of channels that get far hotter than described: it grows with the response.
 
-A yardstick knows what a wrong form does to the described machine. A motor that gives off twice its heat is wrong by
+A detector knows the model discrepancy of the described machine. A motor that gives off twice its heat is wrong by
 twice as much wherever that heat goes, and would be called by the name of whatever looks most like the rest.
 """
 
@@ -10,22 +10,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from twin.diagnose.detector import Detector
 from twin.diagnose.study import Study
-from twin.diagnose.yardstick import Yardstick
 
 MUCH = 1.4  # times the described rise of a channel: parameters within their tolerances stay below
 LEAST = 1.0, 5e-6  # K, m: rms of a described rise that a ratio is taken to
 
 
-def hotter(yard: Yardstick, x: np.ndarray) -> Yardstick:
-    """The yardstick at parameters x (n,) in prior standard deviations; itself where no channel is MUCH hotter."""
-    surrogate = yard.fitter.surrogate
-    times = _rise(yard.study, surrogate.at(x)[0]) / _rise(yard.study, surrogate.y0)
+def hotter(detector: Detector, x: np.ndarray) -> Detector:
+    """The detector at parameters x (n,) in prior standard deviations; itself where no channel is MUCH hotter."""
+    surrogate = detector.fitter.surrogate
+    times = _rise(detector.study, surrogate.at(x)[0]) / _rise(detector.study, surrogate.y0)
     times = np.where(times > MUCH, times, 1.0)
     if np.all(times == 1.0):
-        return yard
-    others = times[:, None] * yard.fitter.others
-    return replace(yard, fitter=replace(yard.fitter, others=others), columns=yard.columns.beside(others))
+        return detector
+    others = times[:, None] * detector.fitter.others
+    return replace(detector, fitter=replace(detector.fitter, others=others), columns=detector.columns.beside(others))
 
 
 def _rise(study: Study, flat: np.ndarray) -> np.ndarray:

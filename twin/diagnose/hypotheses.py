@@ -33,7 +33,7 @@ class Context:
     @property
     def outer(self) -> list[Place]:
         """Places with a film."""
-        return [p for p in self.study.bench.places if p.film]
+        return [p for p in self.study.probed.places if p.film]
 
 
 def _single(context: Context, family: str, kind: str, unit: str, sign: int = 0, smallest: float = 0.0) -> list[Batch]:
@@ -153,7 +153,7 @@ def heat_source(context: Context) -> list[Batch]:
     ]
     rows = [
         (p.name, [*(context.index["heat", p.name, s] for s in signals), *blocks["heat", p.name]])
-        for p in context.study.bench.places
+        for p in context.study.probed.places
     ]
     return [_batch("heat_source", "heat", "W", rows, histories, 1, 1.0)]
 
@@ -263,7 +263,7 @@ def expansion(context: Context) -> list[Batch]:
     """Every part, every material."""
     one = (History("always", np.ones((1, 1))),)
     gains = [(p, [c]) for p, _, c in context.named("gain") if p.endswith(".expansion")]
-    whole = "parts." if any(p.surfaces for p in context.study.bench.places) else "tcp.expansion."  # of lumped machines
+    whole = "parts." if any(p.surfaces for p in context.study.probed.places) else "tcp.expansion."  # of lumped machines
     parts = [(whole + p, [c]) for p, _, c in context.named("expansion")]
     result = [_batch("expansion", "expansion", "1", parts, one, 0, 0.05)] if parts else []
     return result + ([_batch("expansion", "gain", "1", gains, one, 0, 0.05)] if gains else [])

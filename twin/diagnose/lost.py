@@ -38,14 +38,14 @@ def lost_conductances(study: Study, elements: Elements, whiten: Whitener, progre
         return Lost((), np.zeros((sum(study.runs[k].size for k in study.fitted), 0)))
     with progress("contacts that are nearly gone", len(names)) as advance:
         outputs = each(_without, (study, elements), names, lambda _: advance(""))
-    nominal = np.concatenate([study.outputs(k, np.zeros(len(study.bench.parameters))) for k in study.fitted])
+    nominal = np.concatenate([study.outputs(k, np.zeros(len(study.probed.parameters))) for k in study.fitted])
     return Lost(names, whiten(np.stack(outputs, axis=1) - nominal[:, None]))
 
 
 def _without(shared: tuple[Study, Elements], name: tuple[str, str]) -> np.ndarray:
     study, elements = shared
     always = tuple(np.ones(p.run.drive.n_steps) for p in study.runs)
-    unit, x = Unit(*name, -1, always), np.zeros(len(study.bench.parameters))
+    unit, x = Unit(*name, -1, always), np.zeros(len(study.probed.parameters))
     parts = [study.outputs(k, x, slots_with(study, elements, [unit], k), (LEFT - 1.0,)) for k in study.fitted]
     return np.concatenate(parts)
 

@@ -3,8 +3,8 @@
 On the user's own loads: parameters drawn from their tolerances, and besides them everything that no parameter stands
 for: coefficients that differ from face to face and with load, heat that enters partly beside where it is described,
 sensors some millimetres off and with their own reading of every source, air that fluctuates locally, parts that do not
-start equally warm, white noise. What the twin's calibration leaves of these measurements is the yardstick of every
-statistic: form errors are learned from some of them, thresholds from the others.
+start equally warm, white noise. What the twin's calibration leaves of these measurements is the null distribution of
+every statistic: model discrepancy is learned from some of them, thresholds from the others.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from twin.build.places import beside
 from twin.diagnose.elements import heated_places, own_place
-from twin.diagnose.march import INNER
+from twin.diagnose.integration import INNER
 from twin.diagnose.slots import Slots
 from twin.diagnose.study import Study
 from twin.run.system import Array
@@ -60,38 +60,38 @@ def null(
     spread: of the parameters, in prior standard deviations.
     """
     rng = np.random.default_rng([seed, 17])
-    bench = study.bench
-    x = spread * np.clip(rng.standard_normal(len(bench.parameters)), -2.5, 2.5)
-    (body,) = bench.base.bodies
-    load = bench.base.load_model
-    local = np.clip(form.local_film * rng.standard_normal(len(bench.places)), -0.8, 0.8)
+    probed = study.probed
+    x = spread * np.clip(rng.standard_normal(len(probed.parameters)), -2.5, 2.5)
+    (body,) = probed.base.bodies
+    load = probed.base.load_model
+    local = np.clip(form.local_film * rng.standard_normal(len(probed.places)), -0.8, 0.8)
     contact = np.expm1(form.contact * np.clip(rng.standard_normal(study.slots(0).contact.shape[2]), -2.0, 2.0))
     joint = np.expm1(form.contact * np.clip(rng.standard_normal(len(load.joints)), -2.0, 2.0))
     split = [_beside(study, j, rng, form) for j in range(len(load.sources))]
     E = np.zeros_like(body.A0)
     for place in heated_places(study):
         lump = lump_of(study, place, form) * float(np.clip(rng.standard_normal(), -1.8, 1.8))
-        E += lump * np.outer(bench.B[place], bench.B[place])
+        E += lump * np.outer(probed.B[place], probed.B[place])
     wind = form.wind * rng.standard_normal(len(load.films))
     exponent = rng.uniform(*EXPONENTS, len(load.films))
     readings = _readings(study, J, rng, form)
-    aside = form.aside * rng.standard_normal(len(bench.base.sensors))
-    offset = form.offset * rng.standard_normal(len(bench.base.sensors))
+    aside = form.aside * rng.standard_normal(len(probed.base.sensors))
+    offset = form.offset * rng.standard_normal(len(probed.base.sensors))
     parts = []
     for i, k in enumerate(study.fitted):
         planned = study.runs[k]
         slots = study.slots(k)
         n = slots.gate.shape[0]
         run = planned.run
-        films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in bench.places])
+        films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in probed.places])
         air = run.drive.environment.reshape(n, INNER, -1)
         usual = typical(study, k)
         A, M, rise = np.zeros_like(body.A0), np.zeros(body.n), np.zeros((n, INNER))
         for p in np.flatnonzero(films >= 0):
             strength = local[p] * usual[films[p]]
-            A += strength * bench.A[p]
-            M += strength * bench.M[p]
-        surround = air[:, :, load.surroundings] - bench.base.reference_temperature
+            A += strength * probed.A[p]
+            M += strength * probed.M[p]
+        surround = air[:, :, load.surroundings] - probed.base.reference_temperature
         rise[:] = surround
         slow = _smooth(rng, n, len(load.films), form.shape_time / (INNER * (run.drive.time[1] - run.drive.time[0])))
         wobble = form.shape * slow + wind * winds(study, k, exponent)
@@ -115,7 +115,7 @@ def null(
         T, w = study.read(k, states, x)
         own_T, own_w = planned.split(readings[i])
         T, w = T + own_T, w + own_w
-        moved = m.mean_of @ (states @ (bench.ghosts - body.C).T)[:, m.column]
+        moved = m.mean_of @ (states @ (probed.displaced - body.C).T)[:, m.column]
         count = np.where(m.count > 0, m.count, 1.0)
         T = T + aside[m.column] * moved + offset[m.column]
         T = T + instruments.temperature / np.sqrt(count) * rng.standard_normal(T.shape)
@@ -165,7 +165,7 @@ def _smooth(rng: np.random.Generator, n: int, columns: int, memory: float) -> np
 def winds(study: Study, k: int, exponent: np.ndarray) -> np.ndarray:
     """(n, n_films) 0 .. 1: how fast the air of each film moves, as its law hears, to the exponent (n_films,); 0 for
     films that hear no speed."""
-    load, run = study.bench.base.load_model, study.runs[k].run
+    load, run = study.probed.base.load_model, study.runs[k].run
     units = {s.name: s.unit for s in load.signals}
     n = run.drive.n_steps // INNER
     result = np.zeros((n, len(load.films)))
@@ -181,7 +181,7 @@ def winds(study: Study, k: int, exponent: np.ndarray) -> np.ndarray:
 def typical(study: Study, k: int) -> np.ndarray:
     """(n_films,) W/(m^2 K): the mean convection of each film in a run, at a rise of a few kelvin."""
     drive = study.runs[k].run.drive
-    load = study.bench.base.load_model
+    load = study.probed.base.load_model
     result = drive.theta[:, : len(load.films)].mean(axis=0)
     middle = drive.films.value.shape[2] // 2 + 15
     result[list(drive.films.index)] = drive.films.value[:, :, middle].mean(axis=0)
@@ -202,30 +202,30 @@ def _power(study: Study, k: int, source: int) -> np.ndarray:
 
 def lump_of(study: Study, place: int, form: Form) -> float:
     """J/K by which the patch of a source may differ: half of what follows it at once, where that is less."""
-    (body,) = study.bench.base.bodies
-    b = study.bench.B[place]
+    (body,) = study.probed.base.bodies
+    b = study.probed.B[place]
     return float(min(form.lump, 0.5 / (b @ np.linalg.solve(body.E, b))))
 
 
 def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> np.ndarray | None:
     """What of 1 W of a source enters elsewhere: (r,); None for contacts and machines without places beside it."""
-    bench = study.bench
-    (body,) = bench.base.bodies
-    if bench.base.load_model.sources[source].contact:
+    probed = study.probed
+    (body,) = probed.base.bodies
+    if probed.base.load_model.sources[source].contact:
         return None
     B, own = body.B[:, body.sources.index(source)], own_place(study, source)
-    near = [p for p in beside(bench.places, own) if not bench.places[p].name.startswith("contacts.")]
+    near = [p for p in beside(probed.places, own) if not probed.places[p].name.startswith("contacts.")]
     share = abs(form.beside * rng.standard_normal())
     if not near:
         return None
-    closeness = np.array([max(float(bench.B[p] @ B), 0.0) for p in near]) + 1e-12
+    closeness = np.array([max(float(probed.B[p] @ B), 0.0) for p in near]) + 1e-12
     chosen = int(rng.choice(len(near), p=closeness / closeness.sum()))
-    return np.asarray(share * (bench.B[near[chosen]] - B))
+    return np.asarray(share * (probed.B[near[chosen]] - B))
 
 
 def _body_starts(study: Study, rng: np.random.Generator) -> np.ndarray:
     """(r,) the members by a random kelvin each."""
-    (body,) = study.bench.base.bodies
+    (body,) = study.probed.base.bodies
     if body.E_members is None:
         return np.zeros(body.n)
     weights = rng.standard_normal(len(body.members))
@@ -234,9 +234,9 @@ def _body_starts(study: Study, rng: np.random.Generator) -> np.ndarray:
 
 def _readings(study: Study, J: list[np.ndarray], rng: np.random.Generator, form: Form) -> list[np.ndarray]:
     """Per fitted run (size,): each channel's own error of what every source and contact does to it."""
-    sources = [i for i, p in enumerate(study.bench.parameters) if p.kind in ("source", "contact", "joint")]
+    sources = [i for i, p in enumerate(study.probed.parameters) if p.kind in ("source", "contact", "joint")]
     sigma = study.scale[sources]
-    names = study.bench.base.sensors
+    names = study.probed.base.sensors
     of_sensor = form.reading * rng.standard_normal((len(names), len(sources)))
     of_tcp = form.reading * rng.standard_normal((3, len(sources)))
     result = []

@@ -65,7 +65,9 @@ def within(T: jax.Array, many: Array) -> jax.Array:
 
 
 def turned(system: System, T: jax.Array) -> System:
-    """A machine of one body in coordinates y, z = T y, as far as `twin.diagnose.march` reads it; its E is T^T T."""
+    """A machine of one body in coordinates y, z = T y, as far as `twin.diagnose.integration` reads it; its E is T^T
+    T.
+    """
     r, ports = system.P[0].shape
     P = (T.T @ jnp.asarray(system.P[0])).at[min(r, ports) :].set(0.0)
     return replace(

@@ -48,7 +48,7 @@ def readings_of(
 
     plans = [study.runs[k] for k in study.fitted]
     scale = study.scale
-    for i, p in enumerate(study.bench.parameters):
+    for i, p in enumerate(study.probed.parameters):
         add(("gain", p.path, "always"), [jac[:, i] / scale[i] for jac in J])
     _sensors(study, plans, outputs, add)
     if any(len(plan.measured.tcp) for plan in plans):
@@ -79,7 +79,7 @@ def _shown(plan: Planned, w: np.ndarray) -> np.ndarray:
 
 def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarray], add: Add) -> None:
     names = tuple(dict.fromkeys(s for plan in plans for s in plan.measured.sensors))
-    surround = study.bench.base.load_model.surroundings
+    surround = study.probed.base.load_model.surroundings
 
     def column(of: Sequence[tuple[str, Sequence[np.ndarray]]]) -> list[np.ndarray]:
         parts = []
@@ -116,8 +116,8 @@ def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarra
 
 
 def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add: Add) -> None:
-    (body,) = study.bench.base.bodies
-    bench = study.bench
+    (body,) = study.probed.base.bodies
+    probed = study.probed
     times = [plan.measured.tcp_time - plan.run.drive.time[0] for plan in plans]
 
     def column(of: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -137,7 +137,7 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
     z = [_state(own.states, np.asarray(p.rows.step) + np.asarray(p.rows.share))
          for p, own in zip(plans, nominal, strict=True)]  # fmt: skip
     positions = [_positions(plan, t) for plan, t in zip(plans, times, strict=True)]
-    axes = bench.base.load_model.axes
+    axes = probed.base.load_model.axes
     for m, member in enumerate(body.members):
         row = member_mean(body, m)
         warm = [x @ row for x in z]
@@ -148,7 +148,7 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
             along = np.asarray(axis.direction)
             made = [-(t * (p[:, i] - middle))[:, None] * along for t, p in zip(warm, positions, strict=True)]
             add(("scale", f"axes.{axis.name}<{member}", "always"), column(made))
-        if {f"tcp.expansion.{member}.{c}" for c in "xyz"} <= {p.path for p in bench.parameters}:
+        if {f"tcp.expansion.{member}.{c}" for c in "xyz"} <= {p.path for p in probed.parameters}:
             continue  # of a lumped machine: each of these numbers is calibrated by itself
         if body.G_members is not None and np.any(body.G_members[m]):
             G = body.G_members[m]
@@ -167,7 +167,7 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
         for i, axis in enumerate(axes):
             if any(np.ptp(p[:, i]) > 1e-6 for p in positions if len(p)):
                 add(("frame", f"{name}:{axis.name}", "always"), component(c, [p[:, i] for p in positions]))
-        for signal in bench.base.load_model.signals:
+        for signal in probed.base.load_model.signals:
             if signal.unit not in ("A", "W", "N", "1"):
                 continue
             values = [_at(plan, signal.name, t) for plan, t in zip(plans, times, strict=True)]
@@ -191,7 +191,7 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
 
     states: (n_fine + 1, r) of the runs, by their number, that this clock has stamped.
     """
-    (body,) = study.bench.base.bodies
+    (body,) = study.probed.base.bodies
     by = seconds if abs(seconds) > 1.0 else 1.0
     parts = []
     for k in study.fitted:
@@ -212,7 +212,7 @@ def lagged(study: Study, states: Mapping[int, np.ndarray], sensor: str, seconds:
 
     states: (n_fine + 1, r) of the runs, by their number. A run begins with the sensor as warm as what it sits on.
     """
-    (body,) = study.bench.base.bodies
+    (body,) = study.probed.base.bodies
     parts = []
     for k in study.fitted:
         plan = study.runs[k]

@@ -22,11 +22,11 @@ from twin.diagnose.accepted import (
 from twin.diagnose.acted import RELATIVE, slots_with
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import LOW, lowest, priors, solved
+from twin.diagnose.detector import Detector
 from twin.diagnose.edges import shape_errors
 from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.formal import of_channels
 from twin.diagnose.study import K, Study
-from twin.diagnose.yardstick import Yardstick
 
 WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
 REFITS = 10  # passes
@@ -39,14 +39,16 @@ ANEW = 5  # passes in which derivatives beyond all bounds are made anew
 RISES = 2  # passes in a row that make it worse, after which it runs away
 
 
-def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]) -> tuple[Fitted, list[Accepted]]:
+def refit(
+    detector: Detector, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]
+) -> tuple[Fitted, list[Accepted]]:
     """Parameters and all amplitudes with the exact model. The residual has the accepted causes in its projector."""
-    study, fitter = yard.study, yard.fitter
+    study, fitter = detector.study, detector.fitter
     low, high = bounds(study)
     units = [u for a in accepted for u in a.units]
     open_shapes = [u for a in accepted if a.units for u in shape_errors(study, a.hypothesis, a.units, a.amplitude)]
     open_shapes = open_shapes[: K - len(units)]
-    slots = [slots_with(study, yard.elements, [*units, *open_shapes], k) for k in study.fitted] if units else []
+    slots = [slots_with(study, detector.elements, [*units, *open_shapes], k) for k in study.fitted] if units else []
     # amplitudes in the order of the accepted: those of slots are stepped, those of readings are linear
     stepped = np.concatenate([np.full(len(a.amplitude), bool(a.units)) for a in accepted])
     amplitude = np.concatenate([a.amplitude for a in accepted])
@@ -55,7 +57,7 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
     swapped = np.concatenate([np.full(len(a.amplitude), a.hypothesis.batch.kind == "swapped") for a in accepted])
     gains = gains_of(study, accepted)
     mean, inverse_prior = (np.concatenate(p) for p in zip(*(priors(a.hypothesis) for a in accepted), strict=True))
-    floor = np.concatenate([lowest(yard, a.hypothesis) for a in accepted])
+    floor = np.concatenate([lowest(detector, a.hypothesis) for a in accepted])
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
     x = x.copy()
     x[held] = 0.0
@@ -63,37 +65,37 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
     J = np.zeros((len(y), len(x)))
     for i in range(REFITS):
         there = shifted(study, x, gains, amplitude)
-        J = jacobian(yard, x, _sizes(accepted, amplitude), None if i < ANEW else J)
+        J = jacobian(detector, x, _sizes(accepted, amplitude), None if i < ANEW else J)
         first, bent = 0, np.zeros(len(y))
         for a in accepted:
             own = slice(first, first + len(a.amplitude))
             first = own.stop
             if a.hypothesis.batch.kind in CURVED:
                 size = float(amplitude[own][0])
-                slope = curved_slope(yard, a.hypothesis, size, there)
-                D[:, own] = yard.whiten(slope)[:, None]
-                bent += size * slope - curved_change(yard, a.hypothesis, size, there)
+                slope = curved_slope(detector, a.hypothesis, size, there)
+                D[:, own] = detector.whiten(slope)[:, None]
+                bent += size * slope - curved_change(detector, a.hypothesis, size, there)
             elif a.hypothesis.batch.kind == "swapped":  # `exchanged` has left nothing of it
                 D[:, own] = 0.0
             elif not a.units:
-                D[:, own] = readings_columns(yard, a.hypothesis)
+                D[:, own] = readings_columns(detector, a.hypothesis)
         for q, j in gains:  # a parameter beyond its prior: its own column, per unit of the amplitude
-            D[:, q] = yard.whiten(fitter.surrogate.at(there)[1][:, [j]])[:, 0] / study.scale[j]
+            D[:, q] = detector.whiten(fitter.surrogate.at(there)[1][:, [j]])[:, 0] / study.scale[j]
         if units:
             now = [*amplitude[stepped], *np.zeros(len(open_shapes))]
             parts = [study.by_amplitudes(k, there, slot, now) for k, slot in zip(study.fitted, slots, strict=True)]
             f = np.concatenate([p for p, _ in parts])
             every = np.vstack([d for _, d in parts])
             exact, shapes = every[:, : len(units)], every[:, len(units) : len(units) + len(open_shapes)]
-            D[:, stepped] = yard.whiten(exact)
+            D[:, stepped] = detector.whiten(exact)
         else:
             f = np.concatenate([study.outputs(k, there) for k in study.fitted])
             exact = shapes = np.zeros((len(y), 0))
         residual = y - f + J @ x + exact @ amplitude[stepped] + bent
-        white = yard.whiten(residual)
+        white = detector.whiten(residual)
         for q, _ in gains:
             white = white + D[:, q] * amplitude[q]
-        errors = np.hstack([_own_errors(study, D, accepted, amplitude), yard.whiten(shapes)])
+        errors = np.hstack([_own_errors(study, D, accepted, amplitude), detector.whiten(shapes)])
         projector = fitter.projector(J, errors)
         PD = projector(D)
         F = D.T @ PD + np.diag(inverse_prior)
@@ -103,7 +105,7 @@ def refit(yard: Yardstick, y: np.ndarray, x: np.ndarray, accepted: Sequence[Acce
         left = white - D @ amplitude
         before, misfit = misfit, float(left @ projector(left))
         x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
-        # parameters that the data hardly tell wander on for long, and nothing gets better
+        # parameters that the data hardly determine drift on for long, and nothing gets better
         rises = rises + 1 if misfit > before + LESS else 0
         if (step < STILL and misfit > before - LESS) or rises == RISES:
             break

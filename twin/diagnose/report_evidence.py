@@ -1,4 +1,4 @@
-"""Pictures of the evidence: statistics against data without an effect, candidates, their likeness, pulls."""
+"""Pictures of the evidence: statistics against data without an effect, candidates, their similarity, pulls."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def labelled(k: int, rival: Rival | Cause) -> str:
 
 
 def cosine_picture(d: Diagnosis) -> Picture | None:
-    """Likeness of the ranked candidates; None of fewer than two."""
+    """Similarity of the ranked candidates; None of fewer than two."""
     cosine = np.asarray(d.cosine, dtype=float)
     n = min(len(d.ranked), CANDIDATES, *cosine.shape) if cosine.ndim == 2 else 0
     if n < 2:
@@ -128,7 +128,7 @@ def cosine_picture(d: Diagnosis) -> Picture | None:
     return Picture(
         "How alike the candidates are",
         "Two candidates with a cosine near 1 or -1 leave the same trace in these data once everything that can be "
-        "calibrated is taken out, and cannot be told apart; near 0 they can.",
+        "calibrated is taken out, and cannot be distinguished; near 0 they can.",
         fig,
     )
 

@@ -241,7 +241,7 @@ def _pulls(d: Diagnosis, show: Any) -> str:
 
 def _unknown(d: Diagnosis, show: Any) -> str:
     if d.unknown is None:
-        return "<p>No heat was left over that the catalogue does not explain.</p>"
+        return "<p>No heat remained that the catalogue does not explain.</p>"
     rows = [[name, f"{correlation:+.2f}"] for name, correlation in d.unknown.correlated_signals]
     follows = table(["logged signal", "correlation with this heat"], rows, (1,)) if rows else ""
     return show(unknown_picture(d)) + follows

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from twin.pictures.style import INK, MUTED, RC
 
-# The stages of a diagnosis, told apart by every eye (Okabe-Ito), and by lightness in print.
+# The stages of a diagnosis, distinguished by every eye (Okabe-Ito), and by lightness in print.
 DELIVERED, RECALIBRATED, EXTENDED = "#8a9099", "#0072b2", "#d55e00"
 STAGES = (("as delivered", DELIVERED), ("recalibrated", RECALIBRATED), ("extended", EXTENDED))
 RESIDUAL_MAP = LinearSegmentedColormap.from_list(

@@ -104,7 +104,7 @@ def residual_map(series: Series) -> Picture | None:
     left_out = len(series.sensors) - len(chosen)
     return Picture(
         f"Residuals of {series.run}" + (" (sealed: no value was fitted to it)" if series.sealed else ""),
-        "Orange: the machine is warmer than the simulation, blue: colder, grey: no data; what comes and goes with a "
+        "Orange: the machine is warmer than the simulation, blue: colder, grey: no data; what switches with a "
         "row of the strip below (dark: large) follows that load, and a good model leaves a pale map"
         + (f" ({left_out} sensors with smaller residuals are left out)." if left_out else "."),
         fig,

@@ -14,6 +14,7 @@ from twin.diagnose.accepted import Accepted, exchanged
 from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import beginning, judged, proof, tried
+from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import Fitted
 from twin.diagnose.growth import chilled, grown
 from twin.diagnose.hotter import hotter
@@ -24,11 +25,10 @@ from twin.diagnose.search_strained import COVERS, LATER, NEAR, PULLED, closed, s
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight
 from twin.diagnose.study import K, Study
-from twin.diagnose.yardstick import Yardstick
 
 MOST = 3  # causes
 TRIES = 3  # rounds of candidates that the exact model refuses
-WINDOWS = 4  # in which a cause comes and goes at one place; what does so more often has a history that no name tells
+WINDOWS = 4  # in which a cause switches at one place; what does so more often has a history that no name tells
 FEW = 2  # windows likewise that a cause may have and still leave heat where it is
 LEFT = 0.5  # of the threshold of heat of any history: what windows may leave of it
 LEAVES, DRIES = 0.005, 0.01  # of their statistic likewise; of a coolant, whose film saturates as the model has it
@@ -39,56 +39,61 @@ MISFIT = 0.003  # of what a cause in the machine explains: a response that is wr
 STANDS = 0.5  # share of its threshold that a cause must explain beside the others
 
 
-def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
+def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
-    fitted = yard.fitter(y)
-    described = yard
-    if (yard := hotter(described, fitted.x)) is not described:
-        fitted = yard.fitter(y)
-    x0, covariance = settled(yard, y, ())
-    declared = declared_candidates(yard, y, fitted)
-    known = scored(yard, fitted)
-    glance = look(yard, fitted, declared, known)
-    relaxed = strained(yard, y, fitted, x0, covariance, glance)
-    alarm = any(h.statistic > yard.thresholds[h.family] for h in glance[1])
+    fitted = detector.fitter(y)
+    described = detector
+    if (detector := hotter(described, fitted.x)) is not described:
+        fitted = detector.fitter(y)
+    x0, covariance = settled(detector, y, ())
+    declared = declared_candidates(detector, y, fitted)
+    known = scored(detector, fitted)
+    glance = look(detector, fitted, declared, known)
+    relaxed = strained(detector, y, fitted, x0, covariance, glance)
+    alarm = any(h.statistic > detector.thresholds[h.family] for h in glance[1])
     if alarm or relaxed or np.abs(x0).max(initial=0.0) > PULLED:  # without, no cause is named
-        exact = {h.name: h for h in [*declared_exactly(yard, y, fitted), *misplaced_candidates(yard, y, fitted)]}
+        exact = {
+            h.name: h for h in [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
+        }
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
-        glance = look(yard, fitted, declared, known)
-    if relaxed and (ended := closed(yard, y, fitted, declared, glance, relaxed, x0)):
+        glance = look(detector, fitted, declared, known)
+    if relaxed and (ended := closed(detector, y, fitted, declared, glance, relaxed, x0)):
         return ended
     accepted, steps = list[Accepted](), list[Step]()
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
-        seen, ranked, step = look(yard, fitted) if accepted or refused else glance
-        if restless := _restless(yard, accepted, step.parts):
+        seen, ranked, step = look(detector, fitted) if accepted or refused else glance
+        if restless := _restless(detector, accepted, step.parts):
             imitated = True
-            fitted, accepted = _without(yard, y, fitted, accepted, restless)
-            seen, ranked, step = look(yard, fitted)
+            fitted, accepted = _without(detector, y, fitted, accepted, restless)
+            seen, ranked, step = look(detector, fitted)
         steps.append(step)
         parts = step.parts
         used = sum((len(a.units) for a in accepted), 0)
         misfits = MISFIT * max((a.statistic for a in accepted if a.units), default=0.0)
-        limits = {name: max((LATER if accepted else 1.0) * value, misfits) for name, value in yard.thresholds.items()}
+        limits = {
+            name: max((LATER if accepted else 1.0) * value, misfits) for name, value in detector.thresholds.items()
+        }
         alarm = any(h.statistic > limits[h.family] and (h.family, h.name) not in refused for h in ranked)
         passing = [
             h for h in ranked
             if alarm and h.statistic > NAMED * limits[h.family] and used + h.batch.q <= K
-            and (h.family, h.name) not in refused and not _again(h, accepted) and not _reads(yard.study, h, accepted)
+            and (h.family, h.name) not in refused and not _again(h, accepted)
+            and not _reads(detector.study, h, accepted)
         ]  # fmt: skip
         if not passing or len(accepted) >= most or fruitless >= TRIES or imitated:
             break
         ahead = [_starts(seen, h) for h in passing[:AHEAD]]
-        rest = exchanged(yard.study, y, accepted)
-        proved, others = judged(yard, rest, fitted, tried(yard, rest, fitted, ahead))
-        standing = [h for h in proved if proof(yard, h) > NAMED * limits[h.family]]
-        if not any(proof(yard, h) > limits[h.family] for h in standing):
+        rest = exchanged(detector.study, y, accepted)
+        proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead))
+        standing = [h for h in proved if proof(detector, h) > NAMED * limits[h.family]]
+        if not any(proof(detector, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
             continue
         # heat of any history pays for its freedom: a name that explains less than that has imitated it
         free = max(parts.values(), default=0.0)
-        if free > yard.thresholds["unknown"]:
+        if free > detector.thresholds["unknown"]:
             standing = [
                 h for h in standing
                 if (h.statistic > COVERS * free or h.family in SEVERAL)
@@ -97,36 +102,38 @@ def search(yard: Yardstick, y: np.ndarray, most: int = MOST) -> Search:
             if not standing:
                 break
         chosen = standing[0]
-        rivals = _rivals(yard, fitted, chosen, [*standing, *others, *ranked])
+        rivals = _rivals(detector, fitted, chosen, [*standing, *others, *ranked])
         start = np.array(chosen.amplitude)
-        units = units_of(yard.study, chosen)
+        units = units_of(detector.study, chosen)
         accepted.append(
-            Accepted(chosen, units, start, np.eye(len(start)), chosen.statistic, yard.thresholds[chosen.family], rivals)
+            Accepted(
+                chosen, units, start, np.eye(len(start)), chosen.statistic, detector.thresholds[chosen.family], rivals
+            )
         )
-        fitted, accepted = refit(yard, y, beginning(fitted.x), accepted)
+        fitted, accepted = refit(detector, y, beginning(fitted.x), accepted)
         while weak := [a for a in accepted if not _stands(a)]:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
-            fitted, accepted = _without(yard, y, fitted, accepted, weak)
-        if in_turn := _in_turn(yard.study, accepted):
+            fitted, accepted = _without(detector, y, fitted, accepted, weak)
+        if in_turn := _in_turn(detector.study, accepted):
             imitated = True
-            fitted, accepted = _without(yard, y, fitted, accepted, in_turn)
-    if not imitated and (leaking := _leaking(yard, accepted, steps[-1].parts)):
-        fitted, accepted = _without(yard, y, fitted, accepted, leaking)
-        seen, _, step = look(yard, fitted)
+            fitted, accepted = _without(detector, y, fitted, accepted, in_turn)
+    if not imitated and (leaking := _leaking(detector, accepted, steps[-1].parts)):
+        fitted, accepted = _without(detector, y, fitted, accepted, leaking)
+        seen, _, step = look(detector, fitted)
         steps.append(step)
     if accepted:  # which may have been all that made it seem hotter
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     else:
         x = x0
-    return Search(yard, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance)
+    return Search(detector, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance)
 
 
 def _without(
-    yard: Yardstick, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], dropped: Sequence[Accepted]
+    detector: Detector, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], dropped: Sequence[Accepted]
 ) -> tuple[Fitted, list[Accepted]]:
     """The fit with the accepted causes that are not dropped."""
     left = [a for a in accepted if a not in dropped]
-    return refit(yard, y, fitted.x, left) if left else (yard.fitter(y), left)
+    return refit(detector, y, fitted.x, left) if left else (detector.fitter(y), left)
 
 
 def _starts(seen: Sight, h: Hypothesis) -> list[Hypothesis]:
@@ -147,12 +154,12 @@ def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
     a source that emits many times as much, and no cause beside it."""
     names = [a.hypothesis.name for a in accepted if a.hypothesis.batch.kind == "signal"]
     wrong = {name.removeprefix("signals.").split("*")[0] for name in names}
-    sources = study.bench.base.load_model.sources
+    sources = study.probed.base.load_model.sources
     return any(h.name == f"sources.{s.name}" and wrong & set(s.use.signals.values()) for s in sources)
 
 
 def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:
-    """Causes that come and go at one part, of several families or twice at one place: together they imitate a history
+    """Causes that switch at one part, of several families or twice at one place: together they imitate a history
     that none has."""
     passing = [(a, _parts(study, a.hypothesis.name)) for a in accepted if a.hypothesis.when.windows and a.units]
     return [
@@ -165,24 +172,24 @@ def _differ(a: Hypothesis, b: Hypothesis) -> bool:
     return a.family != b.family or a.name == b.name
 
 
-def _restless(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
-    """Causes that come and go more than FEW times and leave heat anywhere: a history that no name tells."""
+def _restless(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
+    """Causes that switch more than FEW times and leave heat anywhere: a history that no name tells."""
     left = max(parts.values(), default=0.0)
     return [
         a for a in accepted
         if len(a.hypothesis.when.windows) > FEW and a.hypothesis.when.bell is None and a.units
-        and left > max(yard.thresholds["unknown"], _misfit(a))
+        and left > max(detector.thresholds["unknown"], _misfit(a))
     ]  # fmt: skip
 
 
-def _leaking(yard: Yardstick, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
+def _leaking(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
     """Causes in windows that leave heat when nothing more can be named. Windows whose edges are fitted are so free
     that one of them tells most of nearly any history: what else it leaves tells that it was another one."""
     left = max(parts.values(), default=0.0)
     return [
         a for a in accepted
         if a.hypothesis.when.windows and a.hypothesis.when.bell is None and a.units and a.hypothesis.family != "joint"
-        and left > max(LEFT * yard.thresholds["unknown"], _misfit(a))
+        and left > max(LEFT * detector.thresholds["unknown"], _misfit(a))
     ]  # fmt: skip
 
 
@@ -195,7 +202,7 @@ def _parts(study: Study, name: str) -> set[str]:
     """The parts that a surface or a film belongs to."""
     head, _, rest = name.partition(".")
     if head == "films":
-        return {p.name.partition(".")[0] for p in study.bench.places if p.film == rest}
+        return {p.name.partition(".")[0] for p in study.probed.places if p.film == rest}
     return {head}
 
 
@@ -213,16 +220,16 @@ def _stands(a: Accepted) -> bool:
 
 
 def _rivals(
-    yard: Yardstick, fitted: Fitted, chosen: Hypothesis, ranked: Sequence[Hypothesis]
+    detector: Detector, fitted: Fitted, chosen: Hypothesis, ranked: Sequence[Hypothesis]
 ) -> tuple[tuple[Hypothesis, float], ...]:
     """Other explanations nearly as likely, with their cosines."""
     others, seen = [], {(chosen.family, chosen.name, chosen.batch.kind)}
     near = max(NEAR, MISFIT * chosen.statistic)
     for h in sorted(ranked, key=lambda h: -h.statistic):
         key = (h.family, h.name, h.batch.kind)
-        if key not in seen and h.statistic > max(chosen.statistic - near, 0.5 * yard.thresholds[h.family]):
+        if key not in seen and h.statistic > max(chosen.statistic - near, 0.5 * detector.thresholds[h.family]):
             seen.add(key)
             others.append(h)
     others = others[:8]
-    cosine = cosines(yard, fitted, [chosen, *others])
+    cosine = cosines(detector, fitted, [chosen, *others])
     return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(others))

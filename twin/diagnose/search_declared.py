@@ -21,10 +21,10 @@ from twin.diagnose.accepted import parameter_of
 from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.contest import misfit
+from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import Fitted, bounds
-from twin.diagnose.march import loads_for
+from twin.diagnose.integration import loads_for
 from twin.diagnose.study import Planned, Study
-from twin.diagnose.yardstick import Yardstick
 from twin.rom.drive import Drive, evaluate
 
 CLOSELY = 3  # factors that are looked at again where their parameters are; likewise of a signal, fitted exactly
@@ -33,41 +33,41 @@ PASSES = 4
 EXACT = 3  # passes likewise of the model with a corrected signal
 
 
-def declared_candidates(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
+def declared_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Exact factors of signals that leave less misfit than the fit without a cause does, to first order."""
-    before, found = misfit(yard, fitted), []
-    for h, D in _promising(yard, y, "signal")[:CLOSELY]:
-        statistic = before - _fitted_with(yard, y, D)
+    before, found = misfit(detector, fitted), []
+    for h, D in _promising(detector, y, "signal")[:CLOSELY]:
+        statistic = before - _fitted_with(detector, y, D)
         if statistic > 0.0:
             found.append(replace(h, statistic=statistic))
     return found
 
 
-def misplaced_candidates(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
+def misplaced_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Likewise of sources all of whose heat is elsewhere, with what they do there beside the described machine."""
-    study, before, found = yard.study, misfit(yard, fitted), []
-    for h, _ in _promising(yard, y, "moved")[:CLOSELY]:
+    study, before, found = detector.study, misfit(detector, fitted), []
+    for h, _ in _promising(detector, y, "moved")[:CLOSELY]:
         units, x = units_of(study, h), np.zeros(len(fitted.x))
-        there = [study.outputs(k, x, slots_with(study, yard.elements, units, k), h.amplitude) for k in study.fitted]
-        change = yard.whiten(np.concatenate(there) - yard.fitter.surrogate.y0)
-        statistic = before - _fitted_with(yard, y, change)
+        there = [study.outputs(k, x, slots_with(study, detector.elements, units, k), h.amplitude) for k in study.fitted]
+        change = detector.whiten(np.concatenate(there) - detector.fitter.surrogate.y0)
+        statistic = before - _fitted_with(detector, y, change)
         if statistic > 0.0:
             found.append(replace(h, statistic=statistic))
     return found
 
 
-def declared_exactly(yard: Yardstick, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
+def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Likewise with the model that has the corrected signal, and also those that explain nothing: the best factor of
     each of the SIGNALS most promising; where that explains half of what a signal must, CLOSELY of them."""
-    before, found = misfit(yard, fitted), list[Hypothesis]()
+    before, found = misfit(detector, fitted), list[Hypothesis]()
     factors = dict[str, list[Hypothesis]]()
-    for h, _ in _promising(yard, y, "signal"):
+    for h, _ in _promising(detector, y, "signal"):
         factors.setdefault(h.name.split("*")[0], []).append(h)
     for name, own in list(factors.items())[:SIGNALS]:
         for h in own[:CLOSELY]:
-            corrected = with_signal(yard.study, name.removeprefix("signals."), float(h.name.split("*")[1]))
-            least = 0.5 * yard.thresholds[h.family]
-            statistic = before - _fitted_by(yard, y, corrected, before - least)
+            corrected = with_signal(detector.study, name.removeprefix("signals."), float(h.name.split("*")[1]))
+            least = 0.5 * detector.thresholds[h.family]
+            statistic = before - _fitted_by(detector, y, corrected, before - least)
             found.append(replace(h, statistic=max(statistic, 0.0)))
             if statistic < least:
                 break
@@ -81,7 +81,7 @@ def with_signal(study: Study, signal: str, factor: float) -> Study:
 
 
 def _corrected(study: Study, planned: Planned, signal: str, factor: float) -> Planned:
-    base, run = study.bench.base, planned.run
+    base, run = study.probed.base, planned.run
     if signal not in run.signals:
         return planned
     signals = {n: values * (factor if n == signal else 1.0) for n, values in run.signals.items()}
@@ -93,7 +93,7 @@ def _corrected(study: Study, planned: Planned, signal: str, factor: float) -> Pl
 def _evaluated(study: Study, drive: Drive, signals: dict[str, np.ndarray]) -> Drive:
     """From means over the steps of a drive, which know nothing of what happens within them."""
     dt = float(drive.time[1] - drive.time[0])
-    return evaluate(study.bench.base.load_model, drive.time[:-1], signals, dt, drive.n_steps)
+    return evaluate(study.probed.base.load_model, drive.time[:-1], signals, dt, drive.n_steps)
 
 
 def _sum(drive: Drive, more: Drive, less: Drive, moving: list[int]) -> Drive:
@@ -113,17 +113,17 @@ def _sum(drive: Drive, more: Drive, less: Drive, moving: list[int]) -> Drive:
     )
 
 
-def _promising(yard: Yardstick, y: np.ndarray, kind: str) -> list[tuple[Hypothesis, np.ndarray]]:
+def _promising(detector: Detector, y: np.ndarray, kind: str) -> list[tuple[Hypothesis, np.ndarray]]:
     """Those of a kind and their white responses (m,), first those that leave least beside the description, to first
     order."""
     found = []
-    for batch in yard.columns.batches:
+    for batch in detector.columns.batches:
         if batch.kind != kind:
             continue
-        D = yard.columns.raw[:, batch.columns[:, 0]].astype(float)
-        f, J = yard.fitter.surrogate.at(np.zeros(len(yard.study.bench.parameters)))
-        left = yard.whiten(y - f)[:, None] - D
-        remains = (left * yard.fitter.projector(J)(left)).sum(axis=0)
+        D = detector.columns.raw[:, batch.columns[:, 0]].astype(float)
+        f, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
+        left = detector.whiten(y - f)[:, None] - D
+        remains = (left * detector.fitter.projector(J)(left)).sum(axis=0)
         found += [
             (float(remains[i]), Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), D[:, i])
             for i in range(len(batch.places))
@@ -131,32 +131,32 @@ def _promising(yard: Yardstick, y: np.ndarray, kind: str) -> list[tuple[Hypothes
     return [(h, D) for _, h, D in sorted(found, key=lambda made: made[0])]
 
 
-def _fitted_with(yard: Yardstick, y: np.ndarray, change: np.ndarray) -> float:
+def _fitted_with(detector: Detector, y: np.ndarray, change: np.ndarray) -> float:
     """The misfit beside a white change (m,) of the outputs, parameters fitted."""
-    low, high = bounds(yard.study)
+    low, high = bounds(detector.study)
     x, left = np.zeros_like(low), np.inf
     for _ in range(PASSES):
-        f, J = yard.fitter.surrogate.at(x)
-        projector = yard.fitter.projector(J)
-        white = yard.whiten(y - f + J @ x) - change
+        f, J = detector.fitter.surrogate.at(x)
+        projector = detector.fitter.projector(J)
+        white = detector.whiten(y - f + J @ x) - change
         left = float(white @ projector(white))
         x = np.clip(projector.most_likely(white)[: len(x)], low, high)
     return left
 
 
-def _fitted_by(yard: Yardstick, y: np.ndarray, study: Study, enough: float) -> float:
+def _fitted_by(detector: Detector, y: np.ndarray, study: Study, enough: float) -> float:
     """The misfit of a study with other loads, parameters fitted. Where it is below `enough`, with exact derivatives."""
     low, high = bounds(study)
-    x, hotter, left = np.zeros(len(low)), _gains(yard.study, study), np.inf
+    x, hotter, left = np.zeros(len(low)), _gains(detector.study, study), np.inf
     for i in range(EXACT + 1):
         if i < EXACT:
-            J = yard.fitter.surrogate.at(x + hotter)[1]
+            J = detector.fitter.surrogate.at(x + hotter)[1]
         elif left < enough:
             J = np.vstack([study.jacobian(k, x)[:, : len(x)] for k in study.fitted])
         else:
             break
-        projector = yard.fitter.projector(J)
-        white = yard.whiten(y - np.concatenate([study.outputs(k, x) for k in study.fitted]) + J @ x)
+        projector = detector.fitter.projector(J)
+        white = detector.whiten(y - np.concatenate([study.outputs(k, x) for k in study.fitted]) + J @ x)
         left = float(white @ projector(white))
         x = np.clip(projector.most_likely(white)[: len(x)], low, high)
     return left
@@ -166,8 +166,8 @@ def _gains(described: Study, corrected: Study) -> np.ndarray:
     """(n,) prior standard deviations by which sources of the description would be moved to emit what they do with
     corrected loads: parameters do there nearly what they do here."""
     before, after = _emitted(described), _emitted(corrected)
-    result = np.zeros(len(described.bench.parameters))
-    for source, was, now in zip(described.bench.base.load_model.sources, before, after, strict=True):
+    result = np.zeros(len(described.probed.parameters))
+    for source, was, now in zip(described.probed.base.load_model.sources, before, after, strict=True):
         j = parameter_of(described, f"sources.{source.name}")
         if j is not None and was > 0.0 and now > 0.0:
             result[j] = np.log(now / was) / described.scale[j]
@@ -176,7 +176,7 @@ def _gains(described: Study, corrected: Study) -> np.ndarray:
 
 def _emitted(study: Study) -> np.ndarray:
     """(n_sources,) J of the fitted runs, at the temperatures in the middle of the tables of losses that follow one."""
-    total = np.zeros(len(study.bench.base.load_model.sources))
+    total = np.zeros(len(study.probed.base.load_model.sources))
     for k in study.fitted:
         drive = study.runs[k].run.drive
         step = float(drive.time[1] - drive.time[0])

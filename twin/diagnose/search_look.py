@@ -9,12 +9,12 @@ import numpy as np
 
 from twin.diagnose.accepted import Accepted, readings_columns
 from twin.diagnose.batch import Hypothesis, best
+from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import Fitted
 from twin.diagnose.lost import lost_candidates
 from twin.diagnose.sight import Sight, sight
 from twin.diagnose.sizes import sized_candidates
 from twin.diagnose.unknown import Heat, evidence
-from twin.diagnose.yardstick import Yardstick
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Step:
 class Search:
     """The whole search."""
 
-    yardstick: Yardstick
+    detector: Detector
     x0: np.ndarray  # (n,) settled without a cause
     x: np.ndarray  # (n,) and with the accepted ones
     accepted: tuple[Accepted, ...]
@@ -44,30 +44,30 @@ class Search:
 
 @dataclass(frozen=True)
 class Scored:
-    """All hypotheses that a yardstick has, at one fit."""
+    """All hypotheses that a detector has, at one fit."""
 
     seen: Sight
     hypotheses: tuple[Hypothesis, ...]
 
 
-def scored(yard: Yardstick, fitted: Fitted) -> Scored:
+def scored(detector: Detector, fitted: Fitted) -> Scored:
     """Their scores: what costs most of a look."""
-    white = yard.whiten(fitted.residual)
-    seen = sight(yard.columns, fitted.projector, white)
-    lost = lost_candidates(yard.lost, yard.columns.batches, fitted.projector, white)
-    sized = sized_candidates(yard, fitted.projector, white)
+    white = detector.whiten(fitted.residual)
+    seen = sight(detector.columns, fitted.projector, white)
+    lost = lost_candidates(detector.lost, detector.columns.batches, fitted.projector, white)
+    sized = sized_candidates(detector, fitted.projector, white)
     return Scored(seen, (*best(seen.ready, seen.g), *lost, *sized))
 
 
 def look(
-    yard: Yardstick, fitted: Fitted, more: Sequence[Hypothesis] = (), known: Scored | None = None
+    detector: Detector, fitted: Fitted, more: Sequence[Hypothesis] = (), known: Scored | None = None
 ) -> tuple[Sight, list[Hypothesis], Step]:
     """All hypotheses there and some more, the best of every family and place first. known: the scores at this fit."""
-    known = scored(yard, fitted) if known is None else known
+    known = scored(detector, fitted) if known is None else known
     seen = known.seen
     ranked = _distinct(sorted([*known.hypotheses, *more], key=lambda h: -h.statistic))
     top = ranked[:10]
-    return seen, ranked, Step(tuple(top), cosines(yard, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
+    return seen, ranked, Step(tuple(top), cosines(detector, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
 
 
 def _distinct(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -82,15 +82,15 @@ def _distinct(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
     return result
 
 
-def _direction(yard: Yardstick, h: Hypothesis) -> np.ndarray:
+def _direction(detector: Detector, h: Hypothesis) -> np.ndarray:
     """(m,) white response at the fitted amplitudes."""
-    return np.asarray(readings_columns(yard, h) @ np.array(h.amplitude))
+    return np.asarray(readings_columns(detector, h) @ np.array(h.amplitude))
 
 
-def cosines(yard: Yardstick, fitted: Fitted, hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+def cosines(detector: Detector, fitted: Fitted, hypotheses: Sequence[Hypothesis]) -> np.ndarray:
     if not hypotheses:
         return np.zeros((0, 0))
-    D = np.stack([_direction(yard, h) for h in hypotheses], axis=1)
+    D = np.stack([_direction(detector, h) for h in hypotheses], axis=1)
     gram = D.T @ fitted.projector(D)
     size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
     return np.asarray(np.clip(gram / np.outer(size, size), -1.0, 1.0))

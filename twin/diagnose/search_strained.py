@@ -1,6 +1,6 @@
 """One declared number out of its tolerance: a source, film, joint or contact that calibration moves too far.
 
-It is the verdict where freeing it leaves nothing, or so little that a wrong form of its own explains that.
+It is the verdict where freeing it leaves nothing, or so little that a discrepancy of its own explains that.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from twin.diagnose.accepted import Accepted, freed, parameter_of, readings_colum
 from twin.diagnose.acted import CONDUCTS, units_of
 from twin.diagnose.batch import Hypothesis, score
 from twin.diagnose.contest import beginning, misfit
+from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import Fitted
 from twin.diagnose.refit import WIDE, refit
 from twin.diagnose.search_look import Search, Step, look
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight
-from twin.diagnose.yardstick import Yardstick
 
 PULLED = 2.5  # standard deviations, of what tolerances allow a settled parameter, beyond which it is out of tolerance
-BEYOND = 3.0  # prior standard deviations likewise of one that was fitted with errors of form
+BEYOND = 3.0  # prior standard deviations likewise of one that was fitted with model discrepancy
 TOLD = 0.94  # variance of a settled parameter that says something of its own
 LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
@@ -31,52 +31,54 @@ NEAR = 10.0  # likelihood-ratio units within which another explanation is a riva
 ALIKE = 0.9  # cosine of what a signal's factor and a declared number do, from which the one may be the other
 SAME = 0.998  # cosine likewise of what is read nowhere else
 DISTANT = 1.0  # logarithm of a source's factor, beyond which derivatives of the described machine say little
-FORM = 0.1  # of the logarithm of a source's factor, that a wrong form of the model takes
+FORM = 0.1  # of the logarithm of a source's factor, that model discrepancy takes
 FAINT = 0.2  # of what explains most: a declared number that scores less leaves that, whatever it is freed to
-ROUGHLY = 2.0  # times what a straight line says that data tell: a number that may come out so sure is freed
+ROUGHLY = 2.0  # times the linear estimate of what the data determine: a number that may come out so sure is freed
 FAR = 2  # numbers that are freed, each alone: the farthest may be another one's doing
 OTHERS = 12  # other explanations that are looked at
 
 
 def closed(
-    yard: Yardstick, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis],
+    detector: Detector, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis],
     glance: tuple[Sight, list[Hypothesis], Step], relaxed: tuple[Fitted, Accepted], x0: np.ndarray,
 ) -> Search | None:  # fmt: skip
     """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
     something else that was seen before (glance) explains more. Signals that explain as much are its rivals."""
     fitted, one = relaxed
     _, ranked, first = glance
-    seen, left, last = look(yard, fitted)
+    seen, left, last = look(detector, fitted)
     misfits = (1.0 - COVERS) * one.statistic  # that it may leave
-    room = max(yard.thresholds["unknown"], misfits)
-    if not _weak(yard, left, misfits) or max(last.parts.values(), default=0.0) > room:
+    room = max(detector.thresholds["unknown"], misfits)
+    if not _weak(detector, left, misfits) or max(last.parts.values(), default=0.0) > room:
         return None
-    removed = misfit(yard, before) - misfit(yard, fitted)
+    removed = misfit(detector, before) - misfit(detector, fitted)
     more = [h for h in ranked if h.statistic - NEAR * any(h is d for d in declared) > removed]
-    if any(h.statistic > yard.thresholds[h.family] for h in more) and not _stays(yard, before, one, more[:OTHERS]):
+    if any(h.statistic > detector.thresholds[h.family] for h in more) and not _stays(
+        detector, before, one, more[:OTHERS]
+    ):
         return None
     # both begin at the declared number: what either explains is the same but for what is left
     fits = {h.name for h in declared if h.statistic > removed - NEAR}
     rivals = tuple(
         (Hypothesis(batch, i, batch.histories[0], one.statistic, (1.0,), 0.0), 1.0)
-        for batch in yard.columns.batches if batch.kind == "signal"
+        for batch in detector.columns.batches if batch.kind == "signal"
         for i, name in enumerate(batch.places)
-        if _does_the_same(yard, yard.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
+        if _does_the_same(detector, detector.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
     )  # fmt: skip
     one = replace(one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals)
-    x, covariance = settled(yard, y, (one,))
-    return Search(yard, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance)
+    x, covariance = settled(detector, y, (one,))
+    return Search(detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance)
 
 
-def _does_the_same(yard: Yardstick, signal: np.ndarray, one: Accepted, fits: bool) -> bool:
+def _does_the_same(detector: Detector, signal: np.ndarray, one: Accepted, fits: bool) -> bool:
     """Whether a factor of a signal does what a declared number does: it is read there, and nearly nowhere else.
 
     signal (m,): its white response. Where it does not fit as it stands (fits), it may do so far from the description:
     derivatives made there say little. It must then do just what a source does, and be of the fitted size.
     """
-    (j,) = freed(yard.study, one.hypothesis)
-    n = len(yard.study.bench.parameters)
-    own = yard.whiten(yard.fitter.surrogate.at(np.zeros(n))[1][:, j]) / yard.study.scale[j]
+    (j,) = freed(detector.study, one.hypothesis)
+    n = len(detector.study.probed.parameters)
+    own = detector.whiten(detector.fitter.surrogate.at(np.zeros(n))[1][:, j]) / detector.study.scale[j]
     along, size = float(signal @ own), float(own @ own)
     if abs(along) < (ALIKE if fits else SAME) * np.sqrt(size * float(signal @ signal)):
         return False
@@ -89,12 +91,13 @@ def _does_the_same(yard: Yardstick, signal: np.ndarray, one: Accepted, fits: boo
     return far and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
 
 
-def _stays(yard: Yardstick, fitted: Fitted, one: Accepted, others: Sequence[Hypothesis]) -> bool:
+def _stays(detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[Hypothesis]) -> bool:
     """Whether a declared number is as far out of its tolerance beside any of the others, to first order."""
-    (j,) = freed(yard.study, one.hypothesis)
-    white = yard.whiten(fitted.residual)
+    (j,) = freed(detector.study, one.hypothesis)
+    white = detector.whiten(fitted.residual)
     return all(
-        abs(yard.fitter.projector(fitted.J, WIDE * _unit(readings_columns(yard, h))).most_likely(white)[j]) > BEYOND
+        abs(detector.fitter.projector(fitted.J, WIDE * _unit(readings_columns(detector, h))).most_likely(white)[j])
+        > BEYOND
         for h in others
     )
 
@@ -104,13 +107,13 @@ def _unit(columns: np.ndarray) -> np.ndarray:
     return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30))
 
 
-def _weak(yard: Yardstick, ranked: Sequence[Hypothesis], misfits: float) -> bool:
+def _weak(detector: Detector, ranked: Sequence[Hypothesis], misfits: float) -> bool:
     """Whether nothing is strong enough to be named beside another cause."""
-    return all(h.statistic < max(LATER * yard.thresholds[h.family], misfits) for h in ranked)
+    return all(h.statistic < max(LATER * detector.thresholds[h.family], misfits) for h in ranked)
 
 
 def strained(
-    yard: Yardstick, y: np.ndarray, fitted: Fitted, x0: np.ndarray, covariance: np.ndarray,
+    detector: Detector, y: np.ndarray, fitted: Fitted, x0: np.ndarray, covariance: np.ndarray,
     glance: tuple[Sight, list[Hypothesis], Step],
 ) -> tuple[Fitted, Accepted] | None:  # fmt: skip
     """Of the declared numbers that calibration moves farthest the one that leaves least, freed of its tolerance.
@@ -122,60 +125,60 @@ def strained(
     pulls = np.where(variance < TOLD, x0 / np.sqrt(np.maximum(1.0 - variance, 1.0 - TOLD)), 0.0)
     strain = np.maximum(np.abs(pulls) / PULLED, np.abs(fitted.x) / BEYOND)
     found = []
-    for batch in yard.columns.batches:
+    for batch in detector.columns.batches:
         for i, name in enumerate(batch.places if batch.kind in ("gain", *CONDUCTS) else ()):
-            if (j := parameter_of(yard.study, name)) is None:
+            if (j := parameter_of(detector.study, name)) is None:
                 continue
             always = next(h for h in batch.histories if not h.windows)
-            size = float(fitted.x[j] * yard.study.scale[j])
+            size = float(fitted.x[j] * detector.study.scale[j])
             if batch.kind in CONDUCTS:
                 size = float(np.expm1(size))
             likelihood = float((PULLED * strain[j]) ** 2)
-            found.append(Hypothesis(batch, i, always, likelihood, (size,), float(yard.study.scale[j] ** -2.0)))
+            found.append(Hypothesis(batch, i, always, likelihood, (size,), float(detector.study.scale[j] ** -2.0)))
     far = sorted((h for h in found if h.statistic >= PULLED**2), key=lambda h: -h.statistic)
     seen, ranked, _ = glance
     most = ranked[0].statistic if ranked else 0.0
-    freed_ones, before = [], misfit(yard, fitted)
+    freed_ones, before = [], misfit(detector, fitted)
     for h in far[:FAR]:
         # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
-        # leave as much as its own wrong form makes
-        likely = h.batch.kind == "group" or _scored(yard, fitted, seen, h) > FAINT * most
-        if not likely and ROUGHLY * (1.0 - COVERS) * _told_alone(yard, fitted, h) < most:
+        # leave as much as its own discrepancy makes
+        likely = h.batch.kind == "group" or _scored(detector, fitted, seen, h) > FAINT * most
+        if not likely and ROUGHLY * (1.0 - COVERS) * _told_alone(detector, fitted, h) < most:
             continue
-        made = _freed(yard, y, fitted, h)
-        if made and (likely or ((1.0 - COVERS) * made[1].statistic > most and misfit(yard, made[0]) < before)):
+        made = _freed(detector, y, fitted, h)
+        if made and (likely or ((1.0 - COVERS) * made[1].statistic > most and misfit(detector, made[0]) < before)):
             freed_ones.append(made)
-    return min(freed_ones, key=lambda made: misfit(yard, made[0]), default=None)
+    return min(freed_ones, key=lambda made: misfit(detector, made[0]), default=None)
 
 
-def _scored(yard: Yardstick, fitted: Fitted, seen: Sight, h: Hypothesis) -> float:
+def _scored(detector: Detector, fitted: Fitted, seen: Sight, h: Hypothesis) -> float:
     """What a declared number scores by its derivative, and a contact by its response when it is nearly gone."""
     own = next(own for own in seen.ready if own.batch is h.batch)
     best = float(score(own, seen.g).statistic[h.place].max())
     name = (h.batch.kind, h.name.removeprefix("contacts."))
-    if name in yard.lost.names:
-        D = yard.lost.responses[:, yard.lost.names.index(name)]
+    if name in detector.lost.names:
+        D = detector.lost.responses[:, detector.lost.names.index(name)]
         P = fitted.projector(D)
-        best = max(best, float(P @ yard.whiten(fitted.residual)) ** 2 / max(float(D @ P), 1e-30))
+        best = max(best, float(P @ detector.whiten(fitted.residual)) ** 2 / max(float(D @ P), 1e-30))
     return best
 
 
-def _told_alone(yard: Yardstick, fitted: Fitted, h: Hypothesis) -> float:
+def _told_alone(detector: Detector, fitted: Fitted, h: Hypothesis) -> float:
     """Likelihood-ratio units by which data without its tolerance tell a fitted number from the declared one."""
-    (j,) = freed(yard.study, h)
+    (j,) = freed(detector.study, h)
     unit = np.zeros(fitted.projector.N.shape[1])
     unit[j] = 1.0
     variance = float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j])
     return float(fitted.x[j]) ** 2 * (1.0 / variance - 1.0)
 
 
-def _freed(yard: Yardstick, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
+def _freed(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
     """The fit with a declared number at any value.
 
     None where it has run to where it changes nothing, or where the data alone leave it within its tolerance.
     """
-    one = Accepted(h, units_of(yard.study, h), np.array(h.amplitude), np.eye(1), h.statistic, PULLED**2, ())
-    fitted, (one,) = refit(yard, y, beginning(fitted.x), [one])
+    one = Accepted(h, units_of(detector.study, h), np.array(h.amplitude), np.eye(1), h.statistic, PULLED**2, ())
+    fitted, (one,) = refit(detector, y, beginning(fitted.x), [one])
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
     if not sigma > 0.0:
         return None

@@ -1,7 +1,7 @@
 """The calibration that is delivered: parameters that predict, with and without the causes that were named.
 
-What finds causes weighs residuals by all that a wrong form can do, and leaves to form what form can explain: right for
-tests, but a model that keeps its parameters and forgets those errors of form predicts badly. Here errors of form are
+What finds causes weighs residuals by all that model discrepancy can do, and leaves to it what it can explain: right for
+tests, but a model that keeps its parameters and forgets that discrepancy predicts badly. Here model discrepancy is
 noise that lasts as long as a run: a channel of a run counts about once, however often it was read, and the rest is
 left to the tolerances. The fit begins at the description, so that of two calibrations alike the nearer one is taken.
 """
@@ -13,23 +13,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from twin.diagnose.accepted import Accepted, exchanged, freed, read_change, stepped, with_shifts
+from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import CLOSE, bounds
 from twin.diagnose.study import Study
-from twin.diagnose.yardstick import Yardstick
 
 PASSES, INNER = 3, 6
 LONGEST = 1.0  # prior standard deviations, of a step
 
 
-def settled(yard: Yardstick, y: np.ndarray, accepted: Sequence[Accepted]) -> tuple[np.ndarray, np.ndarray]:
+def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> tuple[np.ndarray, np.ndarray]:
     """Parameters (n,) in prior standard deviations of measurements y (m,), and their covariance (n, n).
 
-    Amplitudes of the accepted causes stay as they are. The covariance counts errors of form as what they are:
+    Amplitudes of the accepted causes stay as they are. The covariance counts model discrepancy as what it is:
     A (1 + J^T W (1 + N N^T) W J) A with A = (1 + J^T W J)^-1 (White, Econometrica 48, 1980, on such sandwiches).
     """
-    study, surrogate, whiten = yard.study, yard.fitter.surrogate, yard.whiten
+    study, surrogate, whiten = detector.study, detector.fitter.surrogate, detector.whiten
     low, high = bounds(study)
-    N = yard.fitter.others
+    N = detector.fitter.others
     W = 1.0 / (1.0 + _rows(study) * (N**2).sum(axis=1))
     y = exchanged(study, y, accepted)
     reading = [a for a in accepted if not a.units and a.hypothesis.batch.kind != "gain"]
@@ -40,8 +40,8 @@ def settled(yard: Yardstick, y: np.ndarray, accepted: Sequence[Accepted]) -> tup
         there = with_shifts(study, accepted, x)
         read = np.zeros(len(y))
         for a in reading:
-            read += read_change(yard, a.hypothesis, a.amplitude, there)
-        beside = np.concatenate([stepped(yard, accepted, k, there) for k in study.fitted]) - surrogate.at(there)[0]
+            read += read_change(detector, a.hypothesis, a.amplitude, there)
+        beside = np.concatenate([stepped(detector, accepted, k, there) for k in study.fitted]) - surrogate.at(there)[0]
         for _ in range(INNER):
             f, J = surrogate.at(with_shifts(study, accepted, x))
             J[:, held] = 0.0

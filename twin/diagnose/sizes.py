@@ -14,8 +14,8 @@ import scipy.linalg
 
 from twin.diagnose.accepted import curved_change
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.detector import Detector
 from twin.diagnose.whiten import Projector
-from twin.diagnose.yardstick import Yardstick
 
 SIZES = {
     "slip": (1e-6, 2e-6, 6e-6, 9e-6, 13e-6, 20e-6),  # m
@@ -24,17 +24,17 @@ SIZES = {
 }
 
 
-def sized_candidates(yard: Yardstick, projector: Projector, white: np.ndarray) -> list[Hypothesis]:
+def sized_candidates(detector: Detector, projector: Projector, white: np.ndarray) -> list[Hypothesis]:
     """Plays of TCP components, clocks of runs and lags of sensors that would explain white residuals (m,), at SIZES."""
     tried = [
         Hypothesis(batch, i, batch.histories[0], 0.0, (size,), 0.0)
-        for batch in yard.columns.batches
+        for batch in detector.columns.batches
         for i in range(len(batch.places) if batch.kind in SIZES else 0)
         for size in SIZES[batch.kind]
     ]
     if not tried:
         return []
-    D = yard.whiten(np.column_stack([curved_change(yard, h, h.amplitude[0], None) for h in tried]))
+    D = detector.whiten(np.column_stack([curved_change(detector, h, h.amplitude[0], None) for h in tried]))
     # all at once: N is large, and would be read twice for each of them
     B = projector.N.T @ np.column_stack([D, white])
     half = scipy.linalg.solve_triangular(projector.factor[0], B, lower=True)

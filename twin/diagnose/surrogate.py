@@ -52,13 +52,13 @@ class Surrogate:
 
 
 def _jacobian(study: Study, x: np.ndarray) -> np.ndarray:
-    n = len(study.bench.parameters)
+    n = len(study.probed.parameters)
     return np.vstack([study.jacobian(k, x)[:, :n] for k in study.fitted])
 
 
 def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
     """From exact Jacobians: the nominal one, and one per parameter that moves outputs far."""
-    parameters = study.bench.parameters
+    parameters = study.probed.parameters
     n = len(parameters)
     form = np.array([0 if p.scale == "linear" else -1 if p.kind in CONDUCTS else 1 for p in parameters])
     y0 = np.concatenate([study.outputs(k, np.zeros(n)) for k in study.fitted])

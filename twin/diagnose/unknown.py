@@ -38,7 +38,7 @@ class Heat:
 
 def heat_of(study: Study, elements: Elements) -> Heat:
     """The unknown channel of a study, without matrices yet (`with_information`)."""
-    parts = list(dict.fromkeys(m for p in study.bench.places for m in p.members))
+    parts = list(dict.fromkeys(m for p in study.probed.places for m in p.members))
     blocks = elements.histories.blocks
     run = np.array([i for i, _, _ in blocks])
     when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)
@@ -47,7 +47,7 @@ def heat_of(study: Study, elements: Elements) -> Heat:
     correlation = correlation + 1e-6 * np.eye(len(blocks))
     surfaces, columns = [], []
     for part in parts:
-        own = [p.name for p in study.bench.places if part in p.members and not p.name.startswith("contacts.")]
+        own = [p.name for p in study.probed.places if part in p.members and not p.name.startswith("contacts.")]
         c = np.concatenate([elements.block_of["heat", name] for name in own]) if own else np.zeros(0, int)
         surfaces.append(tuple(own))
         columns.append(c)

@@ -13,6 +13,7 @@ from twin.diagnose.acted import CONDUCTS, RELATIVE
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import Family
 from twin.diagnose.contest import AMPLITUDE, WET
+from twin.diagnose.detector import Detector
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.elements import pivot
 from twin.diagnose.fitter import bounds
@@ -22,9 +23,8 @@ from twin.diagnose.search_strained import COVERS
 from twin.diagnose.sight import sight
 from twin.diagnose.study import Study
 from twin.diagnose.unknown import history
-from twin.diagnose.yardstick import Yardstick
 
-APART = 10.0  # likelihood-ratio units that LR (1 - cos^2) must exceed for two causes to be told apart
+APART = 10.0  # likelihood-ratio units that LR (1 - cos^2) must exceed for two causes to be distinguished
 CLOSE = 6.0  # within which a rival of another family, or another part, makes a verdict ambiguous
 POWER = 1.645  # one-sided 95 %
 REMAINDER = 0.35  # of the evidence for unknown heat before all names: the share that may be left beside them
@@ -84,7 +84,7 @@ def cause_of(a: Accepted, study: Study) -> Cause:
         place, part = place.split("<")
         settings["part"] = part
     elif kind == "gradient":
-        names = [e.name for e in study.bench.base.load_model.environments]
+        names = [e.name for e in study.probed.base.load_model.environments]
         settings["height"] = pivot(study, names.index(place.removeprefix("environment.")))
     elif h.family == "coolant" and len(a.amplitude) > 1 and value > 0:
         settings |= _medium(study, a, MEDIUM * value)
@@ -112,14 +112,17 @@ def cause_of(a: Accepted, study: Study) -> Cause:
 def _medium(study: Study, a: Accepted, own: float) -> dict[str, float | str]:
     """Temperature [degC] of what wets a surface, and its standard deviation [K].
 
-    T_ref + Q / (h A) of the film h (its own error of form: own) and the heat Q at the reference temperature.
+    T_ref + Q / (h A) of the film h (its own discrepancy: own) and the heat Q at the reference temperature.
     """
     h, Q = map(float, a.amplitude)
-    area = next(p.area for p in study.bench.places if p.name == a.hypothesis.name)
+    area = next(p.area for p in study.probed.places if p.name == a.hypothesis.name)
     slope = np.array([-Q / (h**2 * area), 1.0 / (h * area)])
     variance = float(slope @ a.covariance @ slope) + (slope[0] * own) ** 2
     rise = Q / (h * area)
-    return {"temperature": study.bench.base.reference_temperature + rise, "temperature_sigma": float(np.sqrt(variance))}
+    return {
+        "temperature": study.probed.base.reference_temperature + rise,
+        "temperature_sigma": float(np.sqrt(variance)),
+    }
 
 
 def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
@@ -166,12 +169,12 @@ def _part(name: str) -> str:
 def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tuple[Cause, ...]]:
     """The verdict, and the causes it rests on."""
     groups = {f.name: f.group for f in families}
-    thresholds = found.yardstick.thresholds
+    thresholds = found.detector.thresholds
     left = max(found.steps[-1].parts.values(), default=0.0)
     # a declared number out of its tolerance had been fitted before, as far as its tolerance went
-    relaxed = [a.statistic for a in found.accepted if freed(found.yardstick.study, a.hypothesis)]
+    relaxed = [a.statistic for a in found.accepted if freed(found.detector.study, a.hypothesis)]
     before = max([*found.steps[0].parts.values(), *relaxed], default=0.0)
-    causes = tuple(cause_of(a, found.yardstick.study) for a in found.accepted)
+    causes = tuple(cause_of(a, found.detector.study) for a in found.accepted)
     if left > thresholds["unknown"] and (not causes or left > REMAINDER * before) and not _more_alike(found, left):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
@@ -213,10 +216,10 @@ def _more_alike(found: Search, left: float) -> bool:
 
 def strained_of(found: Search) -> tuple[Cause, ...]:
     """Declared parameters that calibration alone moved beyond STRAINED prior standard deviations."""
-    study = found.yardstick.study
+    study = found.detector.study
     sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     result = []
-    for p, pull, spread in zip(study.bench.parameters, found.x0, sigma, strict=True):
+    for p, pull, spread in zip(study.probed.parameters, found.x0, sigma, strict=True):
         family = STRAIN.get(p.kind)
         if family is None or abs(pull) < STRAINED or p.scale == "linear":
             continue
@@ -231,15 +234,15 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
 
 def unknown_of(found: Search) -> Unknown | None:
     """The unknown heat, where its evidence passes."""
-    yard = found.yardstick
+    detector = found.detector
     parts = found.steps[-1].parts
-    if not parts or max(parts.values()) <= yard.thresholds["unknown"]:
+    if not parts or max(parts.values()) <= detector.thresholds["unknown"]:
         return None
     part = max(parts, key=lambda p: parts[p])
     surface, heat, sigma = history(found.heat, found.g, part)
-    study = yard.study
+    study = detector.study
     histories = {}
-    blocks = yard.elements.histories.blocks
+    blocks = detector.elements.histories.blocks
     for k in study.fitted:
         run = study.runs[k].run
         dt = float(run.drive.time[1] - run.drive.time[0])
@@ -255,24 +258,24 @@ def unknown_of(found: Search) -> Unknown | None:
         if np.ptp(means) > 0 and np.ptp(heat) > 0:
             correlated.append((signal, float(np.corrcoef(means, heat)[0, 1])))
     correlated.sort(key=lambda s: -abs(s[1]))
-    return Unknown(part, surface, parts[part], yard.thresholds["unknown"], histories, tuple(correlated[:5]))
+    return Unknown(part, surface, parts[part], detector.thresholds["unknown"], histories, tuple(correlated[:5]))
 
 
 def pulls_of(found: Search) -> tuple[Pull, ...]:
     """How far the last fit moved every declared parameter, and the causes those whose place they take."""
-    study = found.yardstick.study
+    study = found.detector.study
     low, high = bounds(study)
     sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     pulls = [
         Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit)
-        for p, c, s in zip(study.bench.parameters, np.clip(found.x, low, high), sigma, strict=True)
+        for p, c, s in zip(study.probed.parameters, np.clip(found.x, low, high), sigma, strict=True)
     ]
     for a in found.accepted:
         change, spread = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
         if a.hypothesis.batch.kind in CONDUCTS:
             change, spread = float(np.log1p(change)), spread / (1.0 + change)
         for j in freed(study, a.hypothesis):  # held at its declared value in x
-            p, pull = study.bench.parameters[j], change / float(study.scale[j])
+            p, pull = study.probed.parameters[j], change / float(study.scale[j])
             pulls[j] = Pull(p.path, p.nominal, p.value(pull), spread / float(study.scale[j]), pull, p.unit, freed=True)
     return tuple(pulls)
 
@@ -287,18 +290,18 @@ def with_faults(
     return alone if faults and verdict == "nothing" else verdict, (*faults, *causes)
 
 
-def limits_at(yard: Yardstick) -> dict[tuple[str, str, str, bool], float]:
-    """(family, unit, place, whether it comes and goes) -> the size that would have been named in 95 of 100 cases.
+def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
+    """(family, unit, place, whether it switches) -> the size that would have been named in 95 of 100 cases.
 
     The median over histories, as amplitudes are: relative changes, logarithms of factors.
     """
     result: dict[tuple[str, str, str, bool], float] = {}
-    _, J = yard.fitter.surrogate.at(np.zeros(len(yard.study.bench.parameters)))
-    for own in sight(yard.columns, yard.fitter.projector(J), np.zeros(len(J))).ready:
+    _, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
+    for own in sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J))).ready:
         batch = own.batch
         if batch.fixed:
             continue
-        sizes = (np.sqrt(yard.thresholds[batch.family]) + POWER) / np.sqrt(np.maximum(own.information, 1e-30))
+        sizes = (np.sqrt(detector.thresholds[batch.family]) + POWER) / np.sqrt(np.maximum(own.information, 1e-30))
         sizes = np.maximum(sizes, batch.smallest)
         for windowed in (False, True):
             chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
@@ -308,10 +311,10 @@ def limits_at(yard: Yardstick) -> dict[tuple[str, str, str, bool], float]:
     return result
 
 
-def limits_of(yard: Yardstick) -> tuple[Limit, ...]:
+def limits_of(detector: Detector) -> tuple[Limit, ...]:
     """Per family and unit `limits_at` its places, for what always acts where there is such; factors as factors."""
-    kinds = {(batch.family, batch.unit): batch.kind for batch in yard.columns.batches}
-    at = limits_at(yard)
+    kinds = {(batch.family, batch.unit): batch.kind for batch in detector.columns.batches}
+    at = limits_at(detector)
     found: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for (family, unit, place, windowed), size in at.items():
         if not windowed or (family, unit, place, False) not in at:

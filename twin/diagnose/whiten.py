@@ -1,7 +1,7 @@
-"""Residuals in units of what cannot be explained: noise with memory, errors of form, and everything calibratable.
+"""Residuals in units of what cannot be explained: noise with memory, model discrepancy, and everything calibratable.
 
-With white residual r, nuisance columns N (parameters and sensor offsets in prior standard deviations, modes of form
-errors in theirs) the marginal covariance of r is 1 + N N^T, and
+With white residual r, nuisance columns N (parameters and sensor offsets in prior standard deviations, modes
+of model discrepancy in theirs) the marginal covariance of r is 1 + N N^T, and
 
     (1 + N N^T)^-1 = 1 - N (1 + N^T N)^-1 N^T =: Pi
 

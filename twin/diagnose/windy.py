@@ -1,4 +1,4 @@
-"""Films that react to a speed otherwise than their law says: responses with the exact model, as errors of form.
+"""Films that react to a speed otherwise than their law says: responses with the exact model, as model discrepancy.
 
 The films of motors and screws stand 15 K above the air, and half as much again of their coefficient is no small change:
 their reaction to a speed needs its own exponents and its second order.
@@ -22,7 +22,7 @@ def wind_columns(study: Study, form: Form, progress: Progress = silent) -> np.nd
 
     Per film: its reaction with the mean of two exponents, the difference of exponents, the second order.
     """
-    n = len(study.bench.base.load_model.films)
+    n = len(study.probed.base.load_model.films)
     heard = [f for f in range(n) if any(winds(study, k, np.ones(n))[:, f].any() for k in study.fitted)]
     if not heard or form.wind == 0.0:
         return np.zeros((sum(study.runs[k].size for k in study.fitted), 0))
@@ -33,8 +33,8 @@ def wind_columns(study: Study, form: Form, progress: Progress = silent) -> np.nd
 
 def _of_film(shared: tuple[Study, Form], f: int) -> np.ndarray:
     study, form = shared
-    x = np.zeros(len(study.bench.parameters))
-    n_films = len(study.bench.base.load_model.films)
+    x = np.zeros(len(study.probed.parameters))
+    n_films = len(study.probed.base.load_model.films)
     parts = []
     for k in study.fitted:
         slots = study.slots(k)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RTestOptions:
-    """How measurements are told apart and fitted."""
+    """How measurements are distinguished and fitted."""
 
     balls: Literal["known", "unknown"] = "known"  # unknown: an offset of each placing is fitted too
     gap: Quantity = "10 min"  # longer breaks divide measurements

@@ -28,7 +28,7 @@ def clock_problems(run: Run, name: str, table: Table, where: str) -> list[Proble
         return problems
     if name == "loads" and run.sampling and not (0.9 < usual / run.sampling < 1.1 or rate_problems(run)):
         what = f"rows are {usual:g} s apart, run.toml says {run.sampling:g} s"
-        problems.append(warning(what, where, "mend sampling in run.toml, or the unit of 'time'"))
+        problems.append(warning(what, where, "fix sampling in run.toml, or the unit of 'time'"))
     if name == "tcp":
         return problems  # measurements come when they come
     if changes_only(table):
@@ -70,13 +70,11 @@ def _begin(run: Run, name: str, table: Table, where: str) -> list[Problem]:
     if name == "loads" and run.start is not None and first < -2.0 * usual_step(table):
         what = f"times begin {-first:g} s before the start in run.toml"
         hour = " (a whole hour: is a zone wrong?)" if abs(first / 3600.0 - round(first / 3600.0)) < 1e-3 else ""
-        return [
-            warning(what + hour, f"{where} (line 2)", "mend start or zone in run.toml: all tables count from there")
-        ]
+        return [warning(what + hour, f"{where} (line 2)", "fix start or zone in run.toml: all tables count from there")]
     if name == "loads" and run.start is not None and first > max(60.0, 5.0 * usual_step(table)):
         what = f"times begin {first:g} s after the start in run.toml"
         hour = " (a whole hour: is a zone wrong?)" if abs(first / 3600.0 - round(first / 3600.0)) < 1e-3 else ""
-        return [warning(what + hour, f"{where} (line 2)", "mend start or zone in run.toml, if the log is whole")]
+        return [warning(what + hour, f"{where} (line 2)", "fix start or zone in run.toml, if the log is whole")]
     return []
 
 

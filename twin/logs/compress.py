@@ -93,7 +93,7 @@ def _over(loads: Table, edges: np.ndarray, products: Mapping[str, tuple[str, str
 def compress_stream(tables: Iterable[Table], interval: float, hold: Callable[[], float]) -> Iterator[Table]:
     """A whole log that comes in pieces, in bounded memory: means over every `interval` [s] from its first sample on.
 
-    Unlike `compress_loads` nothing is left over: the last interval ends with the log, complete or not, and a closing
+    Unlike `compress_loads` nothing is dropped: the last interval ends with the log, complete or not, and a closing
     row there tells how long it is. That row has the values of the last sample (magnitudes of what is compressed to
     those), which hold after it as after the log itself. hold(): how long the last sample holds [s], asked at the end.
     Nothing comes of a log shorter than `interval`. Raises LogError as `compress_loads` does.

@@ -58,7 +58,7 @@ def read_csv(path: Path, zone: tzinfo | None = None) -> CsvTable:
         time, values = table[:, 0] * clock.factor, table[:, 1:]
         if not np.isfinite(time).all():
             line = int(np.argmin(np.isfinite(time))) + 2
-            raise LogError("a time is missing", f"{path} (line {line})", "mend the row")
+            raise LogError("a time is missing", f"{path} (line {line})", "fix the row")
     columns = {
         name: values[:, k] * u.factor + u.offset for k, (name, u) in enumerate(zip(names[1:], units, strict=True))
     }
@@ -78,7 +78,7 @@ def _lines(path: Path) -> list[str]:
         text = raw.decode("latin-1")  # what German controls write; every byte is a character there
     if "\0" in text:
         line = re.split("\r\n|\r|\n", text[: text.index("\0")])
-        remedy = "the logger stopped while writing, or the file is UTF-16 without its mark: mend or convert it"
+        remedy = "the logger stopped while writing, or the file is UTF-16 without its mark: fix or convert it"
         raise LogError("nul bytes", f"{path} (line {len(line)})", remedy)
     # Line numbers in messages must be the file's own, so blank lines are cut at the end only.
     lines = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n ").split("\n")

@@ -15,7 +15,7 @@ from twin.logs.run import Table
 # Samples by which the speed comes late against the mean speed of the interval that starts with the sample. Whole ones
 # compare with the mean over one interval, halves with that over two: what a speed at the sample itself is like.
 _LAGS = tuple(k / 2 for k in range(-10, 13))
-_HONEST = (0.0, 0.5, 1.0)  # mean of the interval that starts, speed at the sample, mean of the interval that ended
+_PLAUSIBLE = (0.0, 0.5, 1.0)  # mean of the interval that starts, speed at the sample, mean of the interval that ended
 _LEAST = 30  # moving samples
 _SURE = 0.98  # correlation
 _PATHS = {"m/s": ("m", 1.0), "rad/s": ("rad", 1.0), "1/s": ("rad", 0.5 / math.pi)}  # a speed's position, and scale
@@ -41,7 +41,7 @@ def motion_problems(loads: Table, where: str) -> list[Problem]:
     fits = {speed: fit for speed in loads.columns if (fit := explained(loads, speed))}
     problems = []
     for speed, fit in fits.items():
-        if fit.lag not in _HONEST:
+        if fit.lag not in _PLAUSIBLE:
             shift = fit.lag - (0.5 if fit.lag % 1.0 else 1.0 if fit.lag > 0.0 else 0.0)
             late = f"{abs(shift):g} sample(s) {'late' if shift > 0.0 else 'early'}"
             problems.append(
@@ -75,8 +75,8 @@ def explained(loads: Table, speed: str) -> Fit | None:
 
 
 def _disagreement(fits: dict[str, Fit], where: str) -> list[Problem]:
-    """Honest lags that differ from axis to axis: one of the columns has slipped by a row."""
-    sharp = {name: fit for name, fit in fits.items() if fit.sharp and fit.lag in _HONEST}
+    """Plausible lags that differ from axis to axis: one of the columns has slipped by a row."""
+    sharp = {name: fit for name, fit in fits.items() if fit.sharp and fit.lag in _PLAUSIBLE}
     lags = sorted(fit.lag for fit in sharp.values())
     if len(lags) < 2 or lags[-1] - lags[0] < 1.0:
         return []
@@ -99,11 +99,11 @@ def _fit(loads: Table, position: str, speed: str, scale: float) -> Fit | None:
     if not signed and max(_agreement(moved, logged, lag)[0] for lag in _LAGS[::2]) <= _SURE:
         return None  # the mean of two magnitudes is nearly constant where sampling does not resolve the motion
     found = {lag: _agreement(moved, logged, lag) for lag in _LAGS}
-    honest = max(_HONEST, key=lambda lag: found[lag][0])
+    plausible = max(_PLAUSIBLE, key=lambda lag: found[lag][0])
     best = max(_LAGS, key=lambda lag: found[lag][0])
-    apart = 1.0 - found[honest][0]  # any other lag must be clearly better than the best honest one
-    if best not in _HONEST and (apart < 1e-3 or 1.0 - found[best][0] > 0.25 * apart):
-        best = honest
+    apart = 1.0 - found[plausible][0]  # any other lag must be clearly better than the best plausible one
+    if best not in _PLAUSIBLE and (apart < 1e-3 or 1.0 - found[best][0] > 0.25 * apart):
+        best = plausible
     others = [1.0 - found[lag][0] for lag in (best - 1.0, best + 1.0) if lag in found]
     sharp = min(others) > max(1e-3, 4.0 * (1.0 - found[best][0]))
     return Fit(position, found[best][0], best, found[best][1], sharp)

@@ -111,6 +111,6 @@ def rate_problems(run: Run) -> list[Problem]:
         Problem(
             f"rows are {usual:g} s apart, run.toml says {run.sampling:g} s: a factor {ratio:.4g}",
             str(run.folder / "loads.csv"),
-            "a factor 1000 is milliseconds, 60 is minutes: mend the unit of 'time', or sampling in run.toml",
+            "a factor 1000 is milliseconds, 60 is minutes: fix the unit of 'time', or sampling in run.toml",
         )
     ]

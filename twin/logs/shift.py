@@ -64,7 +64,7 @@ def table_shifts(run: Run) -> list[Problem]:
 
 
 def _twice_logged(loads: Table, temperatures: Table, latest: int, where: str) -> list[Problem]:
-    """A temperature in both tables shows the shift directly. latest: intervals that it may honestly be late, as -1."""
+    """A temperature in both tables shows the shift directly. latest: intervals that it may plausibly be late, as -1."""
     step = max(usual_step(loads), usual_step(temperatures))
     problems = []
     for name in loads.columns.keys() & temperatures.columns.keys():
@@ -179,7 +179,7 @@ def _residual(X: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def _heat_like(loads: Table, time: np.ndarray) -> np.ndarray:
     """What heats, as means over the intervals that end with each time, (n, k): squares of currents and torques, powers,
-    magnitudes of speeds, airs. Of many, the few combinations that vary most."""
+    magnitudes of speeds, air temperatures. Of many, the few combinations that vary most."""
     heats = []
     for name, unit in loads.units.items():
         values = held(loads.columns[name])

@@ -72,7 +72,7 @@ def signal_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
                 Problem(
                     f"column '{s.column}' is in {found}, signal '{s.name}' in {s.unit}",
                     where,
-                    "mend the unit in the header",
+                    "fix the unit in the header",
                 )
             )
     return problems

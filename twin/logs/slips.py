@@ -160,7 +160,7 @@ def temperature_slips(run: Run) -> list[Problem]:
         near = [text for text, value in fahrenheit.items() if abs(value - others) < 6.0]
         if abs(first - others) > 20.0 and near:
             what = f"'{column}' begins at {first:.1f} degC, the others at {others:.1f}: it may be in {near[0]}"
-            problems.append(warning(what, where, "mend the unit in the header"))
+            problems.append(warning(what, where, "fix the unit in the header"))
         elif not _START[0] < usual < _START[1] and first == usual:
             what = f"'{column}' begins at {first:.1f} degC, and half of the temperatures are no lower"
             problems.append(warning(what, where, "check the unit: degC, degF or K?"))

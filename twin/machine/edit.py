@@ -79,7 +79,7 @@ def _read(text: str) -> tuple[dict[str, Any], dict[str, str]]:
         return data, parameter_units(Machine.model_validate(data))
     except (tomllib.TOMLDecodeError, ValidationError, RecursionError) as e:
         what = str(e).partition("\n")[0]
-        raise DescriptionError(f"no machine description: {what}", "machine.toml", "mend it with `twin check`") from e
+        raise DescriptionError(f"no machine description: {what}", "machine.toml", "fix it with `twin check`") from e
 
 
 def _expect(text: str, expected: dict[str, Any]) -> None:

@@ -170,7 +170,7 @@ def _loads(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as e:
-        raise DescriptionError(f"not valid TOML: {e}", "machine.toml", "mend it with `twin check`") from e
+        raise DescriptionError(f"not valid TOML: {e}", "machine.toml", "fix it with `twin check`") from e
 
 
 def _expect(text: str, expected: dict[str, Any]) -> str:

@@ -88,7 +88,7 @@ def read_text(path: Path) -> str:
 def _syntax_remedy(text: str, message: str) -> str:
     line = message.rpartition("line ")[2].partition(",")[0]
     if line.isdigit() and 0 < int(line) <= len(text.splitlines()):
-        return f"mend this line or the one before it: {text.splitlines()[int(line) - 1].strip()[:80]}"
+        return f"fix this line or the one before it: {text.splitlines()[int(line) - 1].strip()[:80]}"
     return "strings need quotes, arrays a closing bracket"
 
 

@@ -242,7 +242,7 @@ def _beyond(argument: Argument, name: str, where: str, machine: Machine) -> list
         return []
     reaches = f"signal '{name}' ranges from {wired.low:g} to {wired.high:g} {wired.unit}"
     bounds = f"{argument.low:g} .. {argument.high:g} {argument.unit}"
-    remedy = f"{argument.meaning}: mend signals.{name}.range or its unit, or wire another signal"
+    remedy = f"{argument.meaning}: fix signals.{name}.range or its unit, or wire another signal"
     return [Problem(f"{reaches}, outside {bounds}", where, remedy)]
 
 
@@ -290,5 +290,5 @@ def expect_signal(name: str, si: str, where: str, machine: Machine) -> None:
         raise DescriptionError(
             f"signal '{name}' is in {entry.unit}, expected a unit of {si}",
             where,
-            "wire another signal, or mend its unit",
+            "wire another signal, or fix its unit",
         )

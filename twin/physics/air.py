@@ -24,7 +24,7 @@ _TABLE = np.array([
 
 
 def _continued(table: np.ndarray, low: float, high: float) -> np.ndarray:
-    """The table with its first and last interval continued in straight lines to `low` and `high`."""
+    """The table with its first and last interval extrapolated linearly to `low` and `high`."""
     first = table[0] + (low - table[0, 0]) / (table[1, 0] - table[0, 0]) * (table[1] - table[0])
     last = table[-1] + (high - table[-1, 0]) / (table[-1, 0] - table[-2, 0]) * (table[-1] - table[-2])
     return np.vstack([first, table, last])
@@ -51,7 +51,7 @@ class Air(NamedTuple):
 def air(temperature) -> Air:
     """Properties at a temperature [degC], number or array; linear between the rows of the table.
 
-    0 to 80 degC: within 0.2 % of CoolProp. From there to -40 and 150 degC the outer intervals go on in straight lines
+    0 to 80 degC: within 0.2 % of CoolProp. From there to -40 and 150 degC the outer intervals are extrapolated linearly
     (within 6 %, see the test), beyond that the values are held; the laws flag all of it.
     Source: CoolProp at 101325 Pa; linear interpolation as in paper 004, Fig. 5.
     """

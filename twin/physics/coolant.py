@@ -36,7 +36,7 @@ def tube_turbulent(re, pr, slenderness):
 
 
 def tube(re, pr, slenderness):
-    """Mean Nu of a smooth tube: laminar to Re = 2300, turbulent from 1e4, between them a straight line in Re.
+    """Mean Nu of a smooth tube: laminar to Re = 2300, turbulent from 1e4, between them linear in Re.
 
     slenderness = d/L. Source: VDI-Waermeatlas G1; Gnielinski, Int. J. Heat Mass Transfer 63 (2013) 134.
     """

@@ -25,7 +25,7 @@ Made from the table `twin.physics.laws.LAWS` by `python -m twin.physics.page > d
   surface. A signal that measures them can be wired instead.
 - Parameters show their default; one without must be given. Numbers are SI or strings with a unit.
 - Outside its validity a law is evaluated all the same, and the step is flagged. Air is taken from a table from 0 to 80
-  degC at the film temperature; down to -40 and up to 150 degC the table is continued in straight lines, beyond that it
+  degC at the film temperature; down to -40 and up to 150 degC the table is extrapolated linearly, beyond that it
   is held.
 - Errata (E-...) are mistakes of the papers; what was printed and why it is wrong stands with each function.
 """

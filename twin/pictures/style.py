@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-AXIS_COLOURS = {"x": "#d55e00", "y": "#009e73", "z": "#0072b2"}  # Okabe-Ito: told apart by every eye
+AXIS_COLOURS = {"x": "#d55e00", "y": "#009e73", "z": "#0072b2"}  # Okabe-Ito: distinguished by every eye
 MARKED = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c564b", "#5b4b9a")
 MUTED = "#b8bcc2"
 INK = "#22262b"

@@ -24,7 +24,7 @@ Array = Any
 # Share by which coefficients may leave those in a factor before a new one is made, offline and at the edge alike.
 FOLLOW = 0.2
 
-# Surface minus ambient: uniform in the fourth root, in which free convection (Nu ~ Ra^(1/4)) is a straight line.
+# Surface minus ambient: uniform in the fourth root, in which free convection (Nu ~ Ra^(1/4)) is linear.
 WIDEST = 100.0  # K
 _HALF = 32
 DIFFERENCES = np.sign(np.arange(-_HALF, _HALF + 1)) * (np.arange(-_HALF, _HALF + 1) / _HALF) ** 4 * WIDEST

@@ -75,7 +75,9 @@ def replay_drive(
     model = artefact.model
     prepared = prepare(model)
     start = prepared.uniform(initial) if isinstance(initial, float | int) else prepared.from_artefact(initial)
-    steps = march(prepared, inputs_of(model.load_model, drive, substeps), start, artefact.digest, checkpoints, progress)
+    steps = integrate(
+        prepared, inputs_of(model.load_model, drive, substeps), start, artefact.digest, checkpoints, progress
+    )
     states = np.concatenate([start[None], steps.z])
     if not np.isfinite(states).all():
         step = int(np.argmin(np.isfinite(states).all(axis=1)))
@@ -128,7 +130,7 @@ def replay_drive(
     )
 
 
-def march(
+def integrate(
     prepared: Prepared,
     inputs: Inputs,
     start: np.ndarray,

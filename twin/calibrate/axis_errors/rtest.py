@@ -1,7 +1,7 @@
 """R-tests and probing in a run folder: rows of tcp.csv, one measurement after the other, and the axis errors of each.
 
 Paper 000, 0.22 to 0.24: a ball stands on the table, a 3-D probe in the spindle; the rotary axes turn, the linear axes
-follow, and the deviations dx, dy, dz (tool minus workpiece) are rows of tcp.csv. Measurements are told apart by the
+follow, and the deviations dx, dy, dz (tool minus workpiece) are rows of tcp.csv. Measurements are distinguished by the
 time between them, the places of the ball within one by the time it takes to put it elsewhere.
 """
 

@@ -64,7 +64,7 @@ def floors(problem: Problem, run: FitRun) -> tuple[np.ndarray, np.ndarray]:
 def noise_at(
     evaluated: Evaluated, channels: Sequence[tuple[Channels, Channels]], x: np.ndarray
 ) -> tuple[tuple[Noise, Noise], ...]:
-    """Channels with the errors of form that the sensitivities at x give."""
+    """Channels with the model discrepancy that the sensitivities at x give."""
     tau = evaluated.problem.options.form_tolerance
     relative = [k for k, p in enumerate(evaluated.problem.parameters) if p.scale == "log"]
     per_unit = tau / evaluated.problem.scale[relative]

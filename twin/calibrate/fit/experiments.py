@@ -15,7 +15,7 @@ import numpy as np
 
 from twin.calibrate.fit.evaluated import Evaluated, noise_at, whitened_jacobian
 from twin.calibrate.fit.fit import Fit
-from twin.calibrate.fit.march import loads_for
+from twin.calibrate.fit.integration import loads_for
 from twin.calibrate.fit.measured import Measured
 from twin.calibrate.fit.problem import FitRun, Problem
 from twin.calibrate.fit.separation import Combination

@@ -131,7 +131,7 @@ def _seen(
     limits: list[tuple[np.ndarray, np.ndarray]],
     x: np.ndarray,
 ) -> tuple[tuple[Noise, Noise], ...]:
-    """The noise that the residuals at x show, at least that of the instruments, with errors of form at x."""
+    """The noise that the residuals at x show, at least that of the instruments, with model discrepancy at x."""
     channels = [
         (estimated(sensors.without_form(T), floor[0]), estimated(tcp.without_form(w), floor[1]))
         for (T, w), (sensors, tcp), floor in zip(evaluated.residuals(x), noise, limits, strict=True)

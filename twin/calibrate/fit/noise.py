@@ -3,7 +3,7 @@
 Noise: a first-order autoregression per channel, estimated and capped. Air moves; counting 144 bins of a sensor as 144
 independent witnesses makes intervals far too small. Every channel is whitened as r_t - phi r_(t-1), with the same
 operator on residual and Jacobian (generalised least squares; Cochrane, Orcutt 1949, with the first row of Prais,
-Winsten 1954). phi is capped: an uncapped one eats slow effects.
+Winsten 1954). phi is capped: an uncapped one absorbs slow effects.
 
 Form: meshes end somewhere, sensors stand a little off, and near a source both matter: what a watt of each source does
 at each sensor is known to a few per cent only, of every sensor and source independently. Its covariance is low-rank,
@@ -44,7 +44,7 @@ class Channels:
 
 @dataclass(frozen=True)
 class Noise:
-    """Channels (c) of a run with errors of form: k effects of unit prior variance each."""
+    """Channels (c) of a run with model discrepancy: k effects of unit prior variance each."""
 
     channels: Channels
     form: np.ndarray  # (n, c, k), NaN where nothing was measured
@@ -64,7 +64,7 @@ class Noise:
         return white
 
     def without_form(self, residual: np.ndarray) -> np.ndarray:
-        """residual (n, c) less the most likely share of the errors of form: what is left is noise."""
+        """residual (n, c) less the most likely share of the model discrepancy: what is left is noise."""
         result = residual.copy()
         white, form = self.channels.whiten(residual), self.channels.whiten(self.form)
         for c in range(residual.shape[1]):

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from twin.calibrate.fit.effects import Effects, Start, effects_of
-from twin.calibrate.fit.march import Rows, WindowLoads, displacements, loads_for, temperatures, trajectory
+from twin.calibrate.fit.integration import Rows, WindowLoads, displacements, loads_for, temperatures, trajectory
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.options import Options
 from twin.calibrate.fit.training import History, basis_for, trained

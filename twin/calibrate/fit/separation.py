@@ -1,8 +1,9 @@
-"""What data can tell apart: parameters they see, parameters they do not, and sets of which only combinations count.
+"""What data can distinguish: parameters they see, parameters they do not, and sets of which only combinations count.
 
 With x in prior standard deviations the data's information is J^T J of the whitened Jacobian, and the prior's is 1. An
-eigenvector with an eigenvalue below 1 is a combination on which the prior knows more than the data. A parameter that
-would be well known if it alone were free, but lies in such a combination, is not separable from its companions there.
+eigenvector with an eigenvalue below 1 is a combination on which the prior determines more than the data. A parameter
+that would be well known if it alone were free, but lies in such a combination, is not separable from its companions
+there.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
 from twin.rom.rescale import rescaled
-from twin.run.replay import march
+from twin.run.replay import integrate
 from twin.run.stepping import inputs_of
 from twin.run.system import prepare
 
@@ -57,7 +57,7 @@ def states_at(
     prepared = prepare(there)
     inputs = inputs_of(there.load_model, rescaled(drive, model.load_model, there.load_model), substeps)
     z0 = prepared.from_artefact(start)
-    z = march(prepared, inputs, z0).z
+    z = integrate(prepared, inputs, z0).z
     return prepared.to_artefact(np.concatenate([z0[None], z]))
 
 

@@ -48,7 +48,7 @@ def update_run(
     progress: Progress = silent,
     base: Result | None = None,
 ) -> tuple[Updated, Live[Any], Program[Any]]:
-    """Live through a run with the method of `options`: what it was, the state at its end, the program to go on with.
+    """Replay a run online with the method of `options`: what it was, the state at its end, the program to go on with.
 
     base: the run's replay, where it is at hand.
 

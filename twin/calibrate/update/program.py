@@ -130,7 +130,7 @@ class Program(Generic[S]):
 
 @dataclass(frozen=True)
 class Updated:
-    """A run lived through; n steps, m rows of tcp.csv inside it."""
+    """A run replayed online; n steps, m rows of tcp.csv inside it."""
 
     method: str
     time: np.ndarray  # (n + 1,) s
@@ -160,7 +160,7 @@ def replay_update(
     sensors: tuple[str, ...] = (),
     progress: Progress = silent,
 ) -> tuple[Updated, Live[S]]:
-    """Live through a run; `base` is its replay on the untouched model.
+    """Replay a run online; `base` is its replay on the untouched model.
 
     plan: which rows of tcp.csv are used, by default all; the others are predicted all the same. sensors: names of
     structural sensors in the model's order, to be read from the run's temperatures.

@@ -1,4 +1,4 @@
-"""Tests of paper 003 lived through: a base model of one output, updated by sparse measurements of it.
+"""Tests of paper 003 replayed online: a base model of one output, updated by sparse measurements of it.
 
 What `twin update` does with a run and an artefact, for any series: tests are heating phases glued together, each with
 its own initial state (erratum E-003-7).
@@ -26,7 +26,7 @@ class Lived:
     rejected: int
 
 
-def live_through(
+def replay_online(
     prior: GainPrior,
     time: np.ndarray,
     base: np.ndarray,
@@ -58,7 +58,7 @@ def live_through(
     return Lived(predicted, sigma, used, rejected)
 
 
-def live_through_003(
+def replay_online_003(
     time: np.ndarray,
     base: np.ndarray,
     measured: np.ndarray,

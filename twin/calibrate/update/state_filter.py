@@ -2,7 +2,7 @@
 
 State: z, the reduced temperatures; u, ln(value / nominal) of powers, films and conductances; gain and offset of the TCP
 error per axis; a bias per temperature sensor. Temperatures are assimilated as they come, TCP measurements when there is
-one. u drifts (random walk), gain, offset and bias wander and return (Ornstein-Uhlenbeck): what mesh, basis and missing
+one. u drifts (random walk), gain, offset and bias drift and return (Ornstein-Uhlenbeck): what mesh, basis and missing
 physics leave.
 
     y_tcp = (1 + gain) * G z + offset + v        T_sensor = T_ref + C z + bias + v

@@ -45,7 +45,7 @@ def kind_of(family: str, history: str) -> Kind:
 DAMAGES: dict[str, dict[str, Kind]] = {
     "sensor": {
         "offset": Kind(sensors.offset, "K", "reads too much by a constant"),
-        "drift": Kind(sensors.drift, "K", "drifts in a straight line, in all by this"),
+        "drift": Kind(sensors.drift, "K", "drifts linearly, in all by this"),
         "lag": Kind(sensors.lag, "s", "follows with this time constant"),
         "detached": Kind(sensors.detached, "1", "shows its surroundings (--signal) by this share", True),
         "stuck": Kind(sensors.stuck, "s", "keeps its value for this time"),
@@ -59,7 +59,7 @@ DAMAGES: dict[str, dict[str, Kind]] = {
     "slip": {"play": Kind(tcp.slip, "m", "a support has this play")},
     "initial_state": {"offset": Kind(signals.initial_state, "K", "the stated temperature is too high by this")},
     "measurement": {
-        "drift": Kind(tcp.drift, "m", "the device drifts in a straight line, in all by this"),
+        "drift": Kind(tcp.drift, "m", "the device drifts linearly, in all by this"),
         "frame": Kind(tcp.frame, "1", "reads more in proportion to the axis position, by this per metre"),
         "heating": Kind(tcp.heating, "m", "grows by this from the first to the last row of every measurement"),
     },

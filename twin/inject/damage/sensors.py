@@ -18,7 +18,7 @@ def offset(run: Run, d: Damage) -> Run:
 
 
 def drift(run: Run, d: Damage) -> Run:
-    """Drifts in a straight line, by the size from the start of the fault to its end, and stays there."""
+    """Drifts linearly, by the size from the start of the fault to its end, and stays there."""
     table, name = sensor_of(run, d.place)
     return with_sensors(run, {name: table.columns[name] + d.size * grown(table.time, d)})
 

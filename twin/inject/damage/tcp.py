@@ -44,7 +44,7 @@ def slip(run: Run, d: Damage) -> Run:
 
 
 def drift(run: Run, d: Damage) -> Run:
-    """The measuring device drifts in a straight line."""
+    """The measuring device drifts linearly."""
     return with_tcp(run, d, grown(tcp_time(run), d))
 
 

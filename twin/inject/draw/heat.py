@@ -111,7 +111,7 @@ def misplaced_source(experiment: Experiment, rng: np.random.Generator, factor: f
 
 
 def pair(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
-    """At the spindle's bearing, with n^(8/3) or n^(5/3): what hardly any data tell apart."""
+    """At the spindle's bearing, with n^(8/3) or n^(5/3): what hardly any data distinguish."""
     exponent = (8.0 / 3.0, 5.0 / 3.0)[rng.integers(2)]
     histories, top, mean = followed(experiment, "spindle_speed", exponent)
     watts = 25.0 * factor / mean
@@ -123,7 +123,7 @@ def pair(experiment: Experiment, rng: np.random.Generator, factor: float) -> Par
 
 
 def outside(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
-    """No entry of the catalogue: 25 W that come and go, in and out, by slow ramps to levels of a random telegraph."""
+    """No entry of the catalogue: 25 W that switch, in and out, by slow ramps to levels of a random telegraph."""
     place = one_of(rng, OUTER)
     watts = []
     for _ in RUNS:

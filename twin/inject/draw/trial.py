@@ -4,7 +4,7 @@
     trial.runs                                          # what a user would hand to `twin diagnose`
 
 Every trial, a null one too, has its own parameters (uniform, half widths OFF), noise, and air near the machine that
-wanders by AIR without being logged. Everything is drawn from numpy generators of the seed and the family's name.
+drifts by AIR without being logged. Everything is drawn from numpy generators of the seed and the family's name.
 """
 
 from __future__ import annotations
@@ -118,13 +118,13 @@ def _air(rng: np.random.Generator) -> Part:
     """The air that every environment really has: an Ornstein-Uhlenbeck process beside the logged one."""
     keep = np.exp(-STEP / AIR_TIME)
     white = rng.standard_normal((3, STEPS, 2))
-    wander = np.empty_like(white)
-    wander[:, 0] = white[:, 0]
+    drift = np.empty_like(white)
+    drift[:, 0] = white[:, 0]
     for k in range(1, STEPS):
-        wander[:, k] = keep * wander[:, k - 1] + np.sqrt(1.0 - keep**2) * white[:, k]
+        drift[:, k] = keep * drift[:, k - 1] + np.sqrt(1.0 - keep**2) * white[:, k]
 
     def loads(r: int, drive: Drive) -> Drive:
-        return replace(drive, environment=drive.environment + AIR * wander[r])
+        return replace(drive, environment=drive.environment + AIR * drift[r])
 
     return Part((), Behaviour(loads=loads))
 

@@ -109,7 +109,7 @@ def recovered(r: Result, known: Known) -> float | None:
 
     Reducible is what the sealed run's residuals have more than those of the same machine, air and noise without the
     hidden thing, both recalibrated. None where that is hardly any, where the instrument was at fault and not the
-    machine, and where the hidden thing comes and goes in the sealed run unlogged: no model can foresee that.
+    machine, and where the hidden thing switches in the sealed run unlogged: no model can foresee that.
     """
     if r["family"] not in known.predicts or any(t["history"] == "in windows" for t in r["truth"]):
         return None
@@ -243,7 +243,7 @@ def per_family(results: Sequence[Result], known: Known) -> list[list[str]]:
 
 
 def several(results: Sequence[Result], known: Known) -> list[list[str]]:
-    """Rows of trials with more than one thing hidden, or two that data hardly tell apart."""
+    """Rows of trials with more than one thing hidden, or two that data hardly distinguish."""
     rows = []
     for name in ("pair", "two", "effect_and_sensor"):
         own = [r for r in results if r["family"] == name]

@@ -27,14 +27,14 @@ def page(results: Sequence[Result], limits: Sequence[Limit], known: Known, machi
         "how many trials.\n",
         _table(("family", "trials", "failed", *(f"detected, {word}" for _, word in SIZES), "family", "place", "part",
                 "unknown", "covered", "recovered"), per_family(results, known)),
-        "\n## Hidden against said\n", "Sizes nominal and twice. The family of the first cause, or the verdict.\n",
+        "\n## Confusion matrix\n", "Sizes nominal and twice. The family of the first cause, or the verdict.\n",
         _table(header, rows),
     ]  # fmt: skip
     if more := several(results, known):
         head = ["trials of", "trials", "failed", "all named", "one named", "ambiguous"]
-        parts += ["\n## Several at once, and hard to tell apart\n", _table(head, more)]
+        parts += ["\n## Several at once, and hard to distinguish\n", _table(head, more)]
     if wrong_ones := mistakes(results, known):
-        head = ["hidden", "seed", "said first", "place, history", "size", "statistic"]
+        head = ["hidden", "seed", "diagnosed first", "place, history", "size", "statistic"]
         parts += ["\n## False alarms, wrong names and wrong places\n", _table(head, wrong_ones)]
     stated = [[m.family, m.unit, f"{m.size:.3g}", f"{m.smallest:.3g}", f"{m.largest:.3g}", m.place] for m in limits]
     if stated:
@@ -44,7 +44,9 @@ def page(results: Sequence[Result], limits: Sequence[Limit], known: Known, machi
 
 
 def mistakes(results: Sequence[Result], known: Known) -> list[list[str]]:
-    """Rows of false alarms and of wrong names or places: hidden, seed, what was said first, its size and statistic."""
+    """Rows of false alarms and of wrong names or places: hidden, seed, what was diagnosed first, its size and
+    statistic.
+    """
     rows = []
     for r in results:
         if "error" in r:
@@ -77,7 +79,7 @@ def _hidden(r: Result) -> str:
 
 
 def confusion(results: Sequence[Result], known: Known) -> tuple[list[str], list[list[str]]]:
-    """Header and rows: what was hidden against what was said, a family or a verdict; nominal and twice sizes."""
+    """Header and rows: what was hidden against what was diagnosed, a family or a verdict; nominal and twice sizes."""
     chosen = [r for r in results if r["factor"] >= 1.0]
     order = [*known.families, "nothing", "unknown", "error"]
     words = {said(r) for r in chosen}
@@ -88,7 +90,7 @@ def confusion(results: Sequence[Result], known: Known) -> tuple[list[str], list[
         own = Counter(said(r) for r in chosen if r["family"] == truth)
         if own:
             rows.append([truth, *(str(own[c]) if own[c] else "" for c in columns)])
-    return ["hidden \\ said", *columns], rows
+    return ["hidden \\ diagnosed", *columns], rows
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -19,7 +19,7 @@ from twin.rom.apply import with_values
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 from twin.rom.rescale import rescaled
-from twin.run.replay import march
+from twin.run.replay import integrate
 from twin.run.stepping import inputs_of
 from twin.run.system import prepare
 
@@ -80,7 +80,7 @@ def clean_runs(
         drive = with_acting(own, there.load_model, behaviour.acting(r, own))
         warmer = {body: by for (run, body), by in behaviour.warm.items() if run == r}
         start = prepared.uniform(START) + _warmer(there, prepared.back, warmer)
-        z = np.concatenate([start[None], march(prepared, inputs_of(there.load_model, drive, SUBSTEPS), start).z])
+        z = np.concatenate([start[None], integrate(prepared, inputs_of(there.load_model, drive, SUBSTEPS), start).z])
         # a row is taken at the end of the step that it falls in, as the full model's
         at = np.clip(np.searchsorted(drive.time, known.tcp_time[r] - behaviour.late.get(r, 0.0)), 0, drive.n_steps)
         tcp = np.einsum("mcn,mn->mc", rows[r], z[at])

@@ -84,7 +84,7 @@ def loads_with(run: Run, signals: Mapping[str, Sequence[Window]], name: str = ""
     """The run with a column of loads per signal: the level of its windows, in shares of the time until the next row.
 
     A window belongs to the run of its name, with an empty name to every run. Zero outside of windows.
-    name: of the run, that of its folder by default (`run_names` tells apart runs whose folders have one name).
+    name: of the run, that of its folder by default (`run_names` distinguishes runs whose folders have one name).
     """
     own = name or run.folder.resolve().name
     time = run.loads.time

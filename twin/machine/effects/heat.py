@@ -19,7 +19,7 @@ def heat_source(site: Site, effect: Effect) -> Change:
 
 
 def sun(site: Site, effect: Effect) -> Change:
-    """The sun, or a heater that comes and goes, shines on a surface."""
+    """The sun, or a heater that switches, shines on a surface."""
     if not (effect.windows or effect.signal):
         raise DescriptionError("needs a profile", f"sun at {effect.place}", "give windows, or a signal of unit 1")
     return heat_source(site, effect)

@@ -1,4 +1,4 @@
-"""The march of a diagnosis: the numbers of a calibration where nothing is hidden, and exact derivatives."""
+"""The time integration of a diagnosis: the numbers of a calibration where nothing is hidden, and exact derivatives."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pytest
 
 from tests.calibrate import lumped_case
 from tests.diagnose import small_case
-from twin.calibrate.fit import march as plain
+from twin.calibrate.fit import integration as plain
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.acted import Unit, slots_with
 from twin.diagnose.bank import nominal_run
-from twin.diagnose.bench import make_bench
 from twin.diagnose.elements import elements_of
-from twin.diagnose.march import loads_for, states_of
+from twin.diagnose.integration import loads_for, states_of
+from twin.diagnose.probed_model import make_probed_model
 from twin.diagnose.slots import no_slots
 from twin.diagnose.study import Study, make_study
 from twin.machine.load import load_machine
@@ -35,22 +35,22 @@ def units(kinds, study):
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.6])
-def test_without_slots_it_is_the_march_of_a_calibration(spread):
+def test_without_slots_it_is_the_integration_of_a_calibration(spread):
     """Steps of a minute, one matrix each, beside implicit Euler of a second and a half, at any parameters."""
     study = small_case.study()
-    bench, model = study.bench, study.bench.base
+    probed, model = study.probed, study.probed.base
     planned = study.runs[0]
-    x = spread * np.random.default_rng(1).standard_normal(len(bench.parameters))
+    x = spread * np.random.default_rng(1).standard_normal(len(probed.parameters))
     v = np.concatenate([x * study.scale, np.zeros(2)])
     empty = no_slots(planned.run.drive.n_steps, 1, 2, model.n, model)
-    got = states_of(bench.layout, bench.contacts, False, bench.system, study.effects,
+    got = states_of(probed.layout, probed.contacts, False, probed.system, study.effects,
                     loads_for(model, planned.run.drive, 1), empty, planned.z0, v)  # fmt: skip
     loads = plain.loads_for(model, planned.run.drive, 40)
     wanted = plain.trajectory(
-        bench.layout, bench.contacts, False, bench.system, study.effects, loads, planned.z0, x * study.scale
+        probed.layout, probed.contacts, False, probed.system, study.effects, loads, planned.z0, x * study.scale
     )
     assert np.ptp(wanted) > 1.0
-    got, wanted = (np.asarray(s) @ np.asarray(bench.system.C).T for s in (got, wanted))
+    got, wanted = (np.asarray(s) @ np.asarray(probed.system.C).T for s in (got, wanted))
     error = got - wanted  # the largest where a load switches a node of less than a minute
     assert np.abs(error).max() < 0.02 * np.abs(wanted).max()
     assert np.sqrt(np.mean(error**2)) < 2e-3 * np.abs(wanted).max()
@@ -60,13 +60,13 @@ def test_coarse_steps_stay_near_fine_ones():
     """Five minutes share a matrix with the means of films and contacts. The nut strokes over the screw meanwhile: what
     the screw shows of a single stroke is lost there."""
     study = small_case.study()
-    bench, model, planned = study.bench, study.bench.base, study.runs[1]
-    x = np.zeros(len(bench.parameters))
-    fine = plain.trajectory(bench.layout, bench.contacts, False, bench.system, study.effects,
+    probed, model, planned = study.probed, study.probed.base, study.runs[1]
+    x = np.zeros(len(probed.parameters))
+    fine = plain.trajectory(probed.layout, probed.contacts, False, probed.system, study.effects,
                             plain.loads_for(model, planned.run.drive, 40), planned.z0, x)  # fmt: skip
     coarse = study.states(1, x)
     assert coarse.shape == (planned.run.drive.n_steps + 1, model.n)
-    C = np.asarray(bench.system.C)
+    C = np.asarray(probed.system.C)
     error = np.sqrt(np.mean(((coarse - np.asarray(fine)) @ C.T) ** 2, axis=0))
     size = np.abs(np.asarray(fine) @ C.T).max(axis=0)
     assert model.sensors == ("front", "housing", "screw_middle")
@@ -77,7 +77,7 @@ def test_coarse_steps_stay_near_fine_ones():
 
 def test_derivatives_by_parameters_and_amplitudes():
     study = small_case.study()
-    x = 0.2 * np.random.default_rng(2).standard_normal(len(study.bench.parameters))
+    x = 0.2 * np.random.default_rng(2).standard_normal(len(study.probed.parameters))
     slots = slots_with(study, small_case.elements(), units(KINDS, study), 0)
     a = [5.0, 2.0, 3000.0, 0.3]
     J = study.jacobian(0, x, slots, a)
@@ -102,7 +102,7 @@ def test_derivatives_by_parameters_and_amplitudes():
 
 def test_derivatives_by_amplitudes_alone_are_the_same():
     study = small_case.study()
-    x = np.zeros(len(study.bench.parameters))
+    x = np.zeros(len(study.probed.parameters))
     slots = slots_with(study, small_case.elements(), units(KINDS, study), 1)
     a = [5.0, 2.0, 3000.0, 0.3]
     y, D = study.by_amplitudes(1, x, slots, a)
@@ -118,17 +118,17 @@ def test_derivatives_by_amplitudes_alone_are_the_same():
 def test_a_misplaced_source_emits_what_it_emits_where_it_is(share):
     """At another gain than declared, and heating another node: as if the machine were built so."""
     study = small_case.study()
-    bench, load = study.bench, study.bench.base.load_model
+    probed, load = study.probed, study.probed.base.load_model
     j = next(i for i, source in enumerate(load.sources) if not source.contact)
-    B = np.asarray(bench.system.B)
-    there = bench.B[next(i for i, p in enumerate(bench.places) if not np.any(bench.B[i] * B[:, j]))] - B[:, j]
+    B = np.asarray(probed.system.B)
+    there = probed.B[next(i for i, p in enumerate(probed.places) if not np.any(probed.B[i] * B[:, j]))] - B[:, j]
     slots = study.slots(0)
     slots.B[0][:, j] = there
-    x = np.zeros(len(bench.parameters))
-    x[[p.path for p in bench.parameters].index(f"sources.{load.sources[j].name}.gain")] = 0.5
+    x = np.zeros(len(probed.parameters))
+    x[[p.path for p in probed.parameters].index(f"sources.{load.sources[j].name}.gain")] = 0.5
     moved = B.copy()
     moved[:, j] += share * there
-    other = replace(study, bench=replace(bench, system=replace(bench.system, B=moved)))
+    other = replace(study, probed=replace(probed, system=replace(probed.system, B=moved)))
     np.testing.assert_allclose(study.outputs(0, x, slots, [share]), other.outputs(0, x), rtol=1e-9, atol=1e-12)
     assert np.abs(study.outputs(0, x) - other.outputs(0, x)).max() > 1.0
 
@@ -144,17 +144,17 @@ surface = "{node}"
 parameters = {{ {oil}, f0 = 2.0, diameter = "90 mm", f1 = 0.0005, load = "800 N" }}
 signals = {{ speed = "spindle_speed" }}"""
     machine = load_machine(lumped_case.FOLDER / "machine.toml", text.replace(front, warm))
-    bench = make_bench(machine, parameters(machine), small_case.runs())
-    plans = [measured(bench.base, run, b.drive, b.name) for run, b in zip(small_case.runs(), bench.runs, strict=True)]
-    return make_study(bench, plans, range(2))
+    probed = make_probed_model(machine, parameters(machine), small_case.runs())
+    plans = [measured(probed.base, run, b.drive, b.name) for run, b in zip(small_case.runs(), probed.runs, strict=True)]
+    return make_study(probed, plans, range(2))
 
 
 def test_a_misplaced_source_is_as_warm_as_where_it_is():
     """At another gain than declared: as if the machine were described so."""
     study, other = of_warm_bearing("bearing_front"), of_warm_bearing("housing")
     elements = elements_of(study, [nominal_run(study, k) for k in range(3)])
-    x = np.zeros(len(study.bench.parameters))
-    x[[p.path for p in study.bench.parameters].index("sources.front.gain")] = 0.5
+    x = np.zeros(len(study.probed.parameters))
+    x[[p.path for p in study.probed.parameters].index("sources.front.gain")] = 0.5
     column = elements.index["moved", "front>housing", "always"]
     always = tuple(np.ones(planned.run.drive.n_steps) for planned in study.runs)
     slots = slots_with(study, elements, [Unit("moved", "sources.front>housing", column, always)], 0)
@@ -166,7 +166,7 @@ def test_a_misplaced_source_is_as_warm_as_where_it_is():
 
 def test_read_is_what_outputs_say():
     study = small_case.study()
-    x = 0.3 * np.random.default_rng(3).standard_normal(len(study.bench.parameters))
+    x = 0.3 * np.random.default_rng(3).standard_normal(len(study.probed.parameters))
     T, w = study.read(0, study.states(0, x), x)
     wanted_T, wanted_w = study.runs[0].split(study.outputs(0, x))
     np.testing.assert_allclose(T, wanted_T, rtol=1e-12)
@@ -186,7 +186,7 @@ def test_a_plan_for_every_run():
 
     study = small_case.study()
     with pytest.raises(TwinError, match="a plan per run"):
-        make_study(study.bench, [study.runs[0].measured], [0])
-    again = make_study(study.bench, [p.measured for p in study.runs], range(1))
+        make_study(study.probed, [study.runs[0].measured], [0])
+    again = make_study(study.probed, [p.measured for p in study.runs], range(1))
     assert again.fitted == (0,)
     assert replace(again, fitted=(0, 1)).fitted == study.fitted

@@ -1,10 +1,10 @@
 """The window model stepped through a run with hypotheses switched on: states and exact derivatives.
 
-As `twin.calibrate.fit.march`, with three differences. Loads and moving contacts keep their own fine steps (60 s) inside
-a coarse one (300 s) of films and joints: contacts held for 300 s put nuts and the TCP off by more than the noise. A
-fine step is a two-stage SDIRK step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one matrix for
-both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold what the
-description lacks, each times an amplitude a_k that is differentiated like a parameter:
+As `twin.calibrate.fit.integration`, with three differences. Loads and moving contacts keep their own fine steps (60 s)
+inside a coarse one (300 s) of films and joints: contacts held for 300 s put nuts and the TCP off by more than the
+noise. A fine step is a two-stage SDIRK step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one
+matrix for both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold
+what the description lacks, each times an amplitude a_k that is differentiated like a parameter:
 
     (E + sum a_k E_k) x' = -(A(theta (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
                            + (B + sum a_k B_k) P + ... + sum a_k (gate_k rise_k M_k + forcing_k),
@@ -25,7 +25,7 @@ import numpy as np
 from jax import lax
 
 from twin.calibrate.fit.effects import Effects, Factors, factors_at
-from twin.calibrate.fit.march import Rows, displacements, temperatures
+from twin.calibrate.fit.integration import Rows, displacements, temperatures
 from twin.diagnose.ports_first import Basis, Factor, basis, factor, held, turned, within
 from twin.diagnose.ports_first import solved as by_factor
 from twin.diagnose.slots import Slots

@@ -1,9 +1,10 @@
-"""The yardstick of a study: what calibration can absorb, what form errors look like, and what chance produces.
+"""The detector of a study: what calibration can absorb, model discrepancy, null distribution and thresholds.
 
 Made from synthetic measurements without a cause (`nulls`), once per machine, loads, plan of measurements and
-instruments, and cached: the channels' noise and the low-rank covariance of form errors from some of them, the null
-distribution of every family's best statistic from the others. Thresholds follow from a Gumbel tail per family, at one
-common tail probability chosen so that a set of measurements without a cause passes any of them in ALARM of all cases.
+instruments, and cached: the channels' noise and the low-rank covariance of model discrepancy from some of them, the
+null distribution of every family's best statistic from the others. Thresholds follow from a Gumbel tail per family, at
+one common tail probability chosen so that a set of measurements without a cause passes any of them in ALARM of all
+cases.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ FLOOR = 36.0  # of thresholds: some families never pass in synthetic measurement
 
 
 @dataclass(frozen=True)
-class Yardstick:
+class Detector:
     """m measured numbers, n columns (elements, then readings)."""
 
     study: Study
@@ -60,8 +61,8 @@ class Yardstick:
 
 
 @dataclass(frozen=True)
-class StoredYardstick:
-    """A yardstick without the study, whose measurements come later: what the cache keeps."""
+class StoredDetector:
+    """A detector without the study, whose measurements come later: what the cache keeps."""
 
     surrogate: Surrogate
     channels: tuple[tuple[Channels, Channels], ...]
@@ -74,19 +75,19 @@ class StoredYardstick:
     thresholds: dict[str, float]
     lost: Lost
 
-    def of(self, study: Study) -> Yardstick:
-        """The yardstick of a study that differs from the one it was made for in its measured values alone."""
+    def of(self, study: Study) -> Detector:
+        """The detector of a study that differs from the one it was made for in its measured values alone."""
         fitter = Fitter(study, self.surrogate, Whitener(study, self.channels), self.others)
-        return Yardstick(
+        return Detector(
             study, fitter, self.elements, self.nominal, self.index, self.columns, self.nulls, self.thresholds, self.lost
         )
 
 
-def stored(yard: Yardstick) -> StoredYardstick:
-    fitter = yard.fitter
-    return StoredYardstick(
-        fitter.surrogate, fitter.whiten.channels, fitter.others, yard.elements, yard.nominal, yard.index, yard.columns,
-        yard.nulls, yard.thresholds, yard.lost,
+def stored(detector: Detector) -> StoredDetector:
+    fitter = detector.fitter
+    return StoredDetector(
+        fitter.surrogate, fitter.whiten.channels, fitter.others, detector.elements, detector.nominal, detector.index,
+        detector.columns, detector.nulls, detector.thresholds, detector.lost,
     )  # fmt: skip
 
 
@@ -113,17 +114,17 @@ def instruments_of(study: Study, temperature: float, tcp: float) -> Instruments:
     return Instruments(temperature, float(np.median(good)) if len(good) else tcp)
 
 
-def make_yardstick(
+def make_detector(
     study: Study,
     families: Sequence[Family],
     instruments: Instruments,
     form: Form = Form(),
     counts: tuple[int, int] = (FORM, NULLS),
     progress: Progress = silent,
-) -> Yardstick:
-    """The yardstick of a study."""
+) -> Detector:
+    """The detector of a study."""
     surrogate = make_surrogate(study, progress)
-    J = surrogate.J * surrogate.rate(np.zeros(len(study.bench.parameters)))
+    J = surrogate.J * surrogate.rate(np.zeros(len(study.probed.parameters)))
     J_of, y_of = _by_run(study, J), _by_run(study, surrogate.y0)
     with progress("responses of elementary causes", 2) as advance:
         nominal = tuple(nominal_run(study, k) for k in range(len(study.runs)))
@@ -160,7 +161,7 @@ def make_yardstick(
     nulls = {name: np.array([of_null.get(name, 0.0) for of_null in largest]) for name in names}
     small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
     lost = lost_conductances(study, elements, whiten, progress)
-    return Yardstick(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost)
+    return Detector(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost)
 
 
 def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:
@@ -229,13 +230,13 @@ def _tcp_zero(study: Study) -> np.ndarray:
 
 
 def _channels(
-    study: Study, leftover: np.ndarray, floors: list[tuple[np.ndarray, np.ndarray]]
+    study: Study, residuals: np.ndarray, floors: list[tuple[np.ndarray, np.ndarray]]
 ) -> tuple[tuple[Channels, Channels], ...]:
-    """Noise of every channel from leftovers (m, sets): memory of what the modes of form will not hold, capped."""
+    """Noise of every channel from residuals (m, sets): memory of what the modes of form will not hold, capped."""
     result, first = [], 0
     for k, (sensors, tcp) in zip(study.fitted, floors, strict=True):
         planned = study.runs[k]
-        T, w = planned.split(leftover[first : first + planned.size])
+        T, w = planned.split(residuals[first : first + planned.size])
         first += planned.size
         result.append((_pooled(T, sensors), _pooled(w, tcp)))
     return tuple(result)

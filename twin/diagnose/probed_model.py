@@ -1,4 +1,4 @@
-"""The test bench of a diagnosis: a small model of one machine in its runs, with places, ready for hypotheses.
+"""The probed model of a diagnosis: small, of one machine in its runs, with a source and a film at every location.
 
 Made once per machine and loads, and cached: rich model with places -> trajectories on these loads -> window model.
 Measurements come later, so that hundreds of synthetic ones may share it.
@@ -13,11 +13,11 @@ import numpy as np
 
 from twin.build.cache import arrays_hash, cached, machine_hash
 from twin.build.place_training import Shared, snapshots
-from twin.build.places import GHOST, Place, pruned
+from twin.build.places import DISPLACED, Place, pruned
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
-from twin.diagnose.march import INNER, NestedLoads, loads_for
-from twin.diagnose.probed import Probed, probed
+from twin.diagnose.integration import INNER, NestedLoads, loads_for
+from twin.diagnose.rich_probed_model import RichProbedModel, rich_probed_model
 from twin.errors import LogError
 from twin.logs.run import Run
 from twin.logs.signals import signal_values
@@ -40,7 +40,7 @@ LEAST = 3600.0  # s, of a log
 
 
 @dataclass(frozen=True)
-class BenchRun:
+class ProbedRun:
     """A run without its measurements."""
 
     name: str
@@ -52,7 +52,7 @@ class BenchRun:
 
 
 @dataclass(frozen=True)
-class Bench:
+class ProbedModel:
     """P places, r states in coordinates with E = 1."""
 
     base: MachineModel  # the window model of the description
@@ -65,8 +65,8 @@ class Bench:
     A: np.ndarray  # (P, r, r) m^2: its film
     M: np.ndarray  # (P, r) m^2
     H: np.ndarray  # (r, n_films) m^3: what a gradient of the air does through each film
-    ghosts: np.ndarray  # (n_sensors, r): sensors moved aside; the sensors themselves on lumped machines
-    runs: tuple[BenchRun, ...]
+    displaced: np.ndarray  # (n_sensors, r): sensors moved aside; the sensors themselves on lumped machines
+    runs: tuple[ProbedRun, ...]
     reduction: tuple[float, float]  # K, m: rms of what the window leaves of held-out trajectories at the worst output
 
 
@@ -91,11 +91,11 @@ def drive_arrays(drive: Drive) -> tuple[np.ndarray, ...]:
     )  # fmt: skip
 
 
-def make_bench(
+def make_probed_model(
     machine: Machine, parameters: Sequence[Parameter], runs: Sequence[Run], progress: Progress = silent
-) -> Bench:
-    """The bench for a machine and the loads of runs, cached by both."""
-    rich = probed(machine, progress)
+) -> ProbedModel:
+    """The probed model of a machine and the loads of runs, cached by both."""
+    rich = rich_probed_model(machine, progress)
     base = pruned(rich.rich)
     load = base.load_model
     names = run_names(runs)
@@ -148,17 +148,17 @@ def _rows(model: MachineModel) -> np.ndarray:
 
 
 def _assembled(
-    rich: Probed, V: np.ndarray, parameters: Sequence[Parameter], runs: Sequence[Run], names: Sequence[str],
+    rich: RichProbedModel, V: np.ndarray, parameters: Sequence[Parameter], runs: Sequence[Run], names: Sequence[str],
     drives: Sequence[Drive], starts: Sequence[float], reduction: tuple[float, float],
-) -> Bench:  # fmt: skip
+) -> ProbedModel:  # fmt: skip
     whole = merged(rich.rich, V)
     (body,) = whole.bodies
     body = replace(body, E=np.eye(body.n))
     n_places = len(rich.places)
     load = whole.load_model
     n_films, n_sources = len(load.films) - n_places, len(load.sources) - n_places
-    real = [k for k, s in enumerate(whole.sensors) if not s.endswith(GHOST)]
-    ghost = [whole.sensors.index(whole.sensors[k] + GHOST) if whole.sensors[k] + GHOST in whole.sensors else k
+    real = [k for k, s in enumerate(whole.sensors) if not s.endswith(DISPLACED)]
+    aside = [whole.sensors.index(whole.sensors[k] + DISPLACED) if whole.sensors[k] + DISPLACED in whole.sensors else k
              for k in real]  # fmt: skip
     parts = np.split(V, np.cumsum([b.n for b in rich.rich.bodies])[:-1])
     H = np.sum([Vb.T @ h for Vb, h in zip(parts, rich.height, strict=True)], axis=0)
@@ -168,13 +168,13 @@ def _assembled(
     made = []
     for run, name, drive, start in zip(runs, names, drives, starts, strict=True):
         made.append(
-            BenchRun(name, drive, _means(base, run, drive), start, run.initial_temperature is not None,
+            ProbedRun(name, drive, _means(base, run, drive), start, run.initial_temperature is not None,
                      loads_for(base, drive))
         )  # fmt: skip
-    return Bench(
+    return ProbedModel(
         base, prepared.layout, prepared.system, ContactPlaces.of(load), tuple(parameters), rich.places,
         B=body.B[:, n_sources:].T.copy(), A=np.array(body.A[n_films : n_films + n_places]),
-        M=body.M[:, n_films : n_films + n_places].T.copy(), H=H, ghosts=body.C[ghost], runs=tuple(made),
+        M=body.M[:, n_films : n_films + n_places].T.copy(), H=H, displaced=body.C[aside], runs=tuple(made),
         reduction=reduction,
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from twin.build.cache import cached, machine_hash
 from twin.build.full_model import FullModel, assemble
-from twin.build.places import Place, places_of, with_ghosts, with_places
+from twin.build.places import Place, places_of, with_displaced_sensors, with_places
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
 from twin.build.scenario import theta_bounds
@@ -20,19 +20,19 @@ RICH = RichOptions(samples=10, tolerance=2e-2)
 
 
 @dataclass(frozen=True)
-class Probed:
-    """The rich model of a machine with places and ghosts of its sensors, cached."""
+class RichProbedModel:
+    """The rich model of a machine with places and displaced copies of its sensors, cached."""
 
     rich: MachineModel
     places: tuple[Place, ...]
     height: tuple[np.ndarray, ...]  # per body (n, n_films of the description): A_k @ height [m^3]
 
 
-def probed(machine: Machine, progress: Progress = silent) -> Probed:
+def rich_probed_model(machine: Machine, progress: Progress = silent) -> RichProbedModel:
     """The rich model with places, cached by description and meshes."""
 
-    def make() -> Probed:
-        full = assemble(with_ghosts(machine), progress)
+    def make() -> RichProbedModel:
+        full = assemble(with_displaced_sensors(machine), progress)
         places = places_of(machine, full)
         model = with_places(full, places)
         height = _heights(machine, full, model)
@@ -48,7 +48,7 @@ def probed(machine: Machine, progress: Progress = silent) -> Probed:
             small = project(replace(body, F=None), V)
             bodies.append(replace(small, E=np.eye(small.n)))
             heights.append(V.T @ h[:, :n_films])
-        return Probed(replace(model, bodies=tuple(bodies)), places, tuple(heights))
+        return RichProbedModel(replace(model, bodies=tuple(bodies)), places, tuple(heights))
 
     return cached("probed", __name__, (machine_hash(machine),), make)
 
