@@ -131,6 +131,7 @@ def test_two_runs_share_the_machine_but_not_their_start(parameters):
     assert np.abs(dT_2[..., first]).max() == 0.0
 
 
+@pytest.mark.long
 def test_a_film_and_a_source_at_rest_are_not_separable_and_an_experiment_would():
     """Constant load from cold: the housing's warm end state tells only one number about heat in and heat out."""
     a = lumped_case.artefact()

@@ -123,6 +123,7 @@ def test_tangent_is_the_derivative_of_the_runtime(artefact):
         np.testing.assert_allclose(C @ np.asarray(dz)[:, k], central, atol=2e-4 * np.abs(central).max() + 1e-9)
 
 
+@pytest.mark.long
 def test_state_filter_makes_up_for_parameters_off_by_30_percent(lived, truth):
     """Scored before assimilating, on all rows, used or not; noise included."""
     updated, live, program = lived("state")

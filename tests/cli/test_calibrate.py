@@ -73,6 +73,7 @@ def test_a_calibrated_artefact_is_verified_against_its_own_description(calibrate
     capsys.readouterr()
 
 
+@pytest.mark.long
 def test_windows_tell_where_they_are(folder, capsys):
     status = twin(
         ["calibrate", str(folder / "A.h5"), str(folder / "truth"), "-o", str(folder / "W.h5"), *OPTIONS,
@@ -123,6 +124,7 @@ def test_nothing_that_was_there_is_replaced(folder, capsys, target, told):
     assert {p: p.read_bytes() for p in before} == before
 
 
+@pytest.mark.long
 def test_windows_without_an_r_test_and_rows_without_a_place(folder, tmp_path, capsys):
     run = lumped_case.truth({}, 7)
     position = run.tcp.position.copy()

@@ -48,6 +48,7 @@ def test_freedom_has_its_price():
     assert 2.0 < one - worth(hypothesis(q=2)) < 36.0
 
 
+@pytest.mark.long
 def test_fitted_edges_and_further_windows_are_no_proof():
     detector = small_case.made_detector()
     name = detector.study.runs[0].run.name

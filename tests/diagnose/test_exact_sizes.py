@@ -17,6 +17,8 @@ from twin.diagnose.search import search
 from twin.diagnose.sizes import sized_candidates
 from twin.diagnose.verdict import verdict_of
 
+pytestmark = pytest.mark.long
+
 
 def noise(seed):
     """(m,) of sensors and TCP."""

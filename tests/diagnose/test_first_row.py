@@ -90,6 +90,7 @@ LOST_TOO = ("step", "drift", "frame", "load")  # of "heating", a row that is los
 @pytest.mark.parametrize(
     ("kind", "lost"), [("heating", False), *((k, lost) for k in LOST_TOO for lost in (False, True))]
 )
+@pytest.mark.long
 def test_a_reading_changes_as_a_damaged_log_does(kind, lost):
     study, columns, index = read("first", lost)
     whole = runs("first", lost)

@@ -149,6 +149,7 @@ signals = {{ speed = "spindle_speed" }}"""
     return make_study(probed, plans, range(2))
 
 
+@pytest.mark.long
 def test_a_misplaced_source_is_as_warm_as_where_it_is():
     """At another gain than declared: as if the machine were described so."""
     study, other = of_warm_bearing("bearing_front"), of_warm_bearing("housing")

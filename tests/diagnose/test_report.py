@@ -121,6 +121,7 @@ SAID = {  # what the reader of each verdict must find
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
+@pytest.mark.long
 def test_the_page_of_every_verdict_says_it_first_and_has_every_section(written, verdict):
     reader = read((written(verdict) / "index.html").read_text(encoding="utf-8"))
     sentence = verdict_sentence(diagnosis(verdict))
@@ -494,6 +495,7 @@ def test_pictures_show_the_numbers_they_are_made_of():
 
 
 @pytest.mark.parametrize("verdict", ["nothing", "named"])
+@pytest.mark.long
 def test_no_gain_is_told_with_its_reason(verdict):
     d = replace(diagnosis(verdict), gain=())
     open_only = tuple(s for s in d.series if not s.sealed)

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from tests.golden.compute import Values, command, flat, numbers
-from tests.hidden.found import QUICK, made_detector, said
+from tests.hidden.found import QUICK, Said, made_detector, said
 from twin.build.workers import each
+from twin.diagnose.detector import Detector
 
 LUMPED = Path(__file__).parents[1] / "diagnose" / "four_nodes"
 TRIALS = (  # quick ones; nothing is hidden in the first two, and too little in the third
@@ -28,14 +29,15 @@ HOURS = 8
 LEVELS = np.array([0.0, 1.0, 0.6, 0.6, 0.0, 1.0, 0.3, 0.8, 0.8])  # of the lumped machine's load, an hour each
 
 
-def trial_values() -> Values:
-    """Thresholds, and what is said of every trial."""
-    thresholds = made_detector(QUICK).thresholds
-    values: dict[str, Any] = {"thresholds": {family: numbers(value) for family, value in thresholds.items()}}
-    answers = each(said, QUICK, TRIALS, lambda name: print(name, file=sys.stderr), long=0.0)
-    for name, told in zip(TRIALS, answers, strict=True):
-        values[name] = {"verdict": told.verdict, "part": told.part, **_causes([asdict(c) for c in told.causes])}
-    return dict(flat(values, "trials"))
+def trial_values(name: str, told: Said) -> Values:
+    """What is said of a trial."""
+    answer = {"verdict": told.verdict, "part": told.part, **_causes([asdict(c) for c in told.causes])}
+    return dict(flat({name: answer}, "trials"))
+
+
+def threshold_values(detector: Detector) -> Values:
+    """What all trials are compared with."""
+    return dict(flat({family: numbers(value) for family, value in detector.thresholds.items()}, "trials.thresholds"))
 
 
 def lumped_values(folder: Path) -> Values:
@@ -105,7 +107,10 @@ def _settings(settings: Mapping[str, float | str]) -> Values:
 
 def main(target: str) -> None:
     with tempfile.TemporaryDirectory() as temporary:
-        values = lumped_values(Path(temporary)) | trial_values()
+        values = lumped_values(Path(temporary))
+    values |= threshold_values(made_detector(QUICK))
+    for name, told in zip(TRIALS, each(said, QUICK, TRIALS, long=0.0), strict=True):
+        values |= trial_values(name, told)
     Path(target).write_text(json.dumps(values), encoding="utf-8")
 
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from tests.hidden.found import OWN, QUICK, SETTINGS, Said, made_detector, said
+from tests.hidden.found import OWN, made_detector
 from tests.hidden.trials import DRAWN, EXPERIMENT, TRIALS, expected
-from twin.build.workers import each
 from twin.diagnose.verdict import limits_at, limits_of
 from twin.inject.judge.match import effect, known_of, place_of, same_place
 
@@ -20,9 +19,11 @@ AGAIN = (  # of families of which a drawn one is tried anyway: together some min
     "joint", "zone", "forced_convection", "loss_law", "expansion", "capacity", "scale_expansion", "slip", "not_thermal",
     "measurement",
 )  # fmt: skip
-# Not said as it should be: `make hidden` shows it, with the long ones.
+# Not said as it should be: `make test-all` shows it, with the long ones.
 MISSED = ("coolant", "film_gain", "initial_state", "drawn_signal")
 SLOW = pytest.mark.slow
+
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("trials")]
 
 
 def _marked(names: Iterable[str]) -> list[Any]:
@@ -31,22 +32,6 @@ def _marked(names: Iterable[str]) -> list[Any]:
                      [SLOW] if name in (*LONG, *ROUGH, *AGAIN) else [])
         for name in names
     ]  # fmt: skip
-
-
-@pytest.fixture(scope="session")
-def settings(request):
-    """Fewer synthetic measurements where only the fast tests are asked for."""
-    return QUICK if request.config.getoption("markexpr") == "not slow" else SETTINGS
-
-
-@pytest.fixture(scope="session")
-def everything(request, settings) -> dict[str, Said]:
-    """All trials that were asked for, two at a time."""
-    items = [item for item in request.session.items if "everything" in item.fixturenames and hasattr(item, "callspec")]
-    asked = {item.callspec.params["name"] for item in items}
-    names = [name for name in TRIALS if name in asked]
-    made_detector(settings)
-    return dict(zip(names, each(said, settings, names, long=0.0), strict=True))
 
 
 def _same(place: str, wanted: str) -> bool:

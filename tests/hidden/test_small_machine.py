@@ -1,4 +1,4 @@
-"""Faults of six families hidden in a small FE machine, and none: each must be said as what it is."""
+"""Faults of five families hidden in a small FE machine, and none: each must be said as what it is."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from twin.machine.load import load_machine
 SETTINGS = Settings(temperature_sigma=0.05, tcp_sigma=0.5e-6, form=12, nulls=24)
 IN_MACHINE = {
     "heat_source": ("bed.y_max", "15 W"),
-    "joint": ("contacts.block", "0.05"),
+    "joint": ("contacts.screw_end", "0.02"),
     "expansion": ("parts.screw", "1.6"),
 }
 IN_LOG = {
@@ -90,10 +90,10 @@ def test_a_heat_source_is_named_at_its_place_with_its_size(folder, detector):
 
 
 def test_a_joint_that_lost_its_preload_is_said_to_be_out_of_tolerance(folder, detector):
-    """Its conductance is a declared parameter: a twentieth of it is no missing effect, but a number that is wrong."""
+    """Its conductance is a declared parameter: a fiftieth of it is no missing effect, but a number that is wrong."""
     verdict, (cause,) = said(detector, in_machine(folder, "joint"))
-    assert (verdict, cause.family, cause.place) == ("out_of_tolerance", "joint", "contacts.block")
-    assert cause.ci95[0] <= 0.05 <= cause.ci95[1]
+    assert (verdict, cause.family, cause.place) == ("out_of_tolerance", "joint", "contacts.screw_end")
+    assert cause.ci95[0] <= 0.02 <= cause.ci95[1] < 0.5
 
 
 def test_a_screw_that_expands_too_much_is_named_with_its_factor(folder, detector):

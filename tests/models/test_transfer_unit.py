@@ -77,6 +77,7 @@ def test_one_capacity_explained_by_a_film_alone_and_with_the_source():
 
 
 @pytest.mark.parametrize(("passive", "dynamic"), [(True, True), (True, False), (False, True), (False, False)])
+@pytest.mark.long
 def test_groups_of_sources_are_switched_and_heat_balances(thermal, passive, dynamic):
     """Full model, ten minutes of the part program: every step closes to 1e-8, what is off gives nothing."""
     groups = script("heat_groups.py")

@@ -31,6 +31,7 @@ def test_report_draws_every_picture_and_a_page_that_shows_them(slide_artefact, f
         assert f"{name}.png" in printed
 
 
+@pytest.mark.long
 def test_equal_results_give_equal_pictures(slide_artefact, folder):
     artefact = read_artefact(slide_artefact)
     first = {p: p.read_bytes() for p in write_report(artefact, folder)}

@@ -221,6 +221,7 @@ def loads(model, hours=2.0):
 
 @pytest.mark.parametrize("projection", ["galerkin", "oblique"])
 @pytest.mark.parametrize(("follow", "tolerance"), [(0.0, 1e-9), (0.2, 2e-3)])
+@pytest.mark.long
 def test_both_steppers_alike_with_every_law_following(follow, tolerance, projection):
     model = following_machine()
     model = oblique(model) if projection == "oblique" else model

@@ -81,6 +81,7 @@ def test_order_of_convergence_against_the_exact_exponential(integrated, tableau)
 @TABLEAUS
 @pytest.mark.parametrize("projection", ["galerkin", "oblique"])
 @pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.long
 def test_host_and_jax_give_the_same_states_and_close_the_heat_balance(tableau, projection, substeps):
     """Axes move; factors exact."""
     model = synthetic.oblique(MODEL) if projection == "oblique" else MODEL

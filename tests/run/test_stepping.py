@@ -130,6 +130,7 @@ def test_a_machine_at_the_temperature_of_its_surroundings_stays_there(model):
     np.testing.assert_allclose(dense.temperature(prepared.to_artefact(steps.z)), 26.0, atol=1e-10)
 
 
+@pytest.mark.long
 def test_a_kept_factor_equals_factorising_every_step(model):
     prepared = prepare(model)
     inputs = inputs_of(model.load_model, DRIVE, 4, follow=0.0)

@@ -38,6 +38,7 @@ def test_verify_passes_and_stores_the_certificate(slide_artefact, tmp_path):
     assert stored["worst_relative"] < 0.01
 
 
+@pytest.mark.long
 def test_verify_fails_with_status_1_when_the_model_is_too_small(tmp_path, capsys):
     path = tmp_path / "small.h5"
     assert run(["build", str(SLIDE / "machine.toml"), "-o", str(path), "--states", "8", "--training", "4"]) == 1
@@ -140,6 +141,7 @@ def test_noise_is_added_as_asked_and_repeats(tmp_path):
     assert not any(np.array_equal(a[k], c[k]) for k in a)
 
 
+@pytest.mark.long
 def test_equal_input_gives_an_equal_file(slide_artefact, tmp_path, monkeypatch):
     monkeypatch.setenv("TWIN_CACHE", str(tmp_path / "cache"))  # nothing of the first build may help the second
     again = tmp_path / "again.h5"
@@ -153,6 +155,7 @@ def test_equal_input_gives_an_equal_file(slide_artefact, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("stage", ["meshes", "rich basis", "compact against rich"])
+@pytest.mark.long
 def test_interrupted_build_leaves_nothing_and_can_be_repeated(tmp_path, stage):
     target = tmp_path / "slide.h5"
     command = [sys.executable, "-u", "-m", "twin.cli.main", "build", str(SLIDE), "-o", str(target), "--states", "40"]
