@@ -41,11 +41,11 @@ check: $(READY) ## style, format, types, the import rules and the size of functi
 
 .PHONY: test
 test: $(READY) ## every behaviour, with hidden effects of five families in a small machine (five minutes at most)
-	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 .PHONY: test-hidden
 test-hidden: $(READY) ## the rest of what continuous integration runs: hidden effects in the five-axis machine, long tests
-	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "long and not slow" $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "long and not slow" $(PYTEST_ARGS)
 
 .PHONY: test-all
 test-all: $(READY) ## every test, the slow ones too

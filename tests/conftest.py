@@ -21,13 +21,8 @@ import pytest  # noqa: E402 - after the threads are set
 FIRST = ("hidden", "golden")  # folders with tests that take minutes: what takes longest must not start last
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of a file stay on one worker, unless they say otherwise: they share what their fixtures have made."""
     items.sort(key=lambda item: item.path.parent.name not in FIRST)
-    for item in items:
-        if item.get_closest_marker("xdist_group") is None:
-            item.add_marker(pytest.mark.xdist_group(item.path.relative_to(ROOT).as_posix()))
 
 
 @pytest.fixture(scope="session")

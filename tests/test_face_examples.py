@@ -11,8 +11,8 @@ import pytest
 import twin
 
 ROOT = Path(__file__).parents[1]
-QUICK = ("load", "check", "read", "build", "run", "simulate", "score", "update", "rtest", "hide")
-SLOW = ("calibrate", "diagnose")
+BRIEF = ("load", "check", "read", "build", "run", "simulate", "score", "update", "rtest", "hide")
+LONG = ("calibrate", "diagnose")
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def executed(text: str, name: str) -> int:
     return result.attempted
 
 
-@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)])
+@pytest.mark.parametrize("name", [*BRIEF, *(pytest.param(n, marks=pytest.mark.long) for n in LONG)])
 def test_the_example_of_a_function_does_what_it_says(name, repository):
     assert executed(getattr(twin, name).__doc__, f"twin.{name}") >= 2
 
@@ -53,9 +53,27 @@ def recipes() -> dict[str, str]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_recipes_run_in_their_order(repository):
     assert len(recipes()) == 10
     names: dict[str, object] = {}
     for title, code in recipes().items():
         exec(compile(code, title, "exec"), names)
+
+
+SMALL = {"models/five_axis": "tests/machines/spindle", "experiment_a": "warm_up", "4 h": "30 min"}
+
+
+@pytest.mark.long
+def test_the_lines_of_the_readme_run(repository):
+    """On a small machine, in days that it is simulated in."""
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    for written, small in SMALL.items():
+        assert written in code
+        code = code.replace(written, small)
+    machine, days = "tests/machines/spindle", {}
+    for seed, day in enumerate(("monday", "tuesday", "wednesday")):
+        noise = twin.SimulateOptions(noise_temperature="0.1 K", noise_tcp="1 um", seed=seed)
+        days[day] = twin.simulate(machine, f"{machine}/runs/warm_up", f"out/{day}", noise)
+    exec(compile(code, "README.md", "exec"), days)
+    assert Path("out/report/report.json").is_file()

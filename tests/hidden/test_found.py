@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.hidden.found import OWN, made_detector
+from tests.golden import verdicts
+from tests.golden.compare import differences
+from tests.golden.compute import Values
+from tests.hidden.found import OWN, QUICK, SETTINGS, Said, made_detector, said
 from tests.hidden.trials import DRAWN, EXPERIMENT, TRIALS, expected
+from twin.build.workers import each
+from twin.diagnose.diagnose import Settings
 from twin.diagnose.verdict import limits_at, limits_of
 from twin.inject.judge.match import effect, known_of, place_of, same_place
 
 KNOWN = known_of(EXPERIMENT)
+GOLDEN: dict[str, Any] = json.loads((Path(verdicts.__file__).parent / "verdicts.json").read_text(encoding="utf-8"))
+TOLERANCE = 1e-9  # of each quantity's own scale
 ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few of CI
 LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a null distribution of their own
 AGAIN = (  # of families of which a drawn one is tried anyway: together some minutes
-    "joint", "zone", "forced_convection", "loss_law", "expansion", "capacity", "scale_expansion", "slip", "not_thermal",
-    "measurement",
+    "forced_convection", "loss_law", "expansion", "capacity", "not_thermal",
 )  # fmt: skip
 # Not said as it should be: `make test-all` shows it, with the long ones.
 MISSED = ("coolant", "film_gain", "initial_state", "drawn_signal")
 SLOW = pytest.mark.slow
 
-pytestmark = [pytest.mark.long, pytest.mark.xdist_group("trials")]
+pytestmark = pytest.mark.long
 
 
 def _marked(names: Iterable[str]) -> list[Any]:
@@ -32,6 +40,22 @@ def _marked(names: Iterable[str]) -> list[Any]:
                      [SLOW] if name in (*LONG, *ROUGH, *AGAIN) else [])
         for name in names
     ]  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def settings(request: pytest.FixtureRequest) -> Settings:
+    """Thresholds from many synthetic measurements where every test is asked for, from few otherwise."""
+    return SETTINGS if "slow or" in request.config.getoption("markexpr") else QUICK
+
+
+@pytest.fixture(scope="session")
+def everything(request: pytest.FixtureRequest, settings: Settings) -> dict[str, Said]:
+    """What is said of all trials that were asked for, two at a time."""
+    items = [item for item in request.session.items if "everything" in getattr(item, "fixturenames", ())]
+    asked = {item.callspec.params.get("name") for item in items if hasattr(item, "callspec")}
+    names = [name for name in TRIALS if name in asked]
+    made_detector(settings)
+    return dict(zip(names, each(said, settings, names, long=0.0), strict=True))
 
 
 def _same(place: str, wanted: str) -> bool:
@@ -80,10 +104,10 @@ def test_what_was_drawn_is_said_or_below_its_limit(everything, settings, name):
 
 
 def test_most_of_what_was_drawn_is_detected(everything):
-    verdicts = [everything[name].verdict for name in DRAWN if name in everything]
-    if not verdicts:
+    answers = [everything[name].verdict for name in DRAWN if name in everything]
+    if not answers:
         pytest.skip("none of the drawn trials was asked for")
-    assert sum(verdict != "nothing" for verdict in verdicts) >= 0.8 * len(verdicts)
+    assert sum(verdict != "nothing" for verdict in answers) >= 0.8 * len(answers)
 
 
 def test_what_is_too_small_is_below_its_limit(settings):
@@ -92,3 +116,40 @@ def test_what_is_too_small_is_below_its_limit(settings):
     limits = [limit for limit in limits_of(made_detector(settings)) if limit.family == hidden.family]
     assert limits
     assert all(limit.smallest > hidden.size for limit in limits)
+
+
+# --- golden values: the diagnoses are the stored ones to the last digits
+
+
+def compare(studied: str, found: Values) -> None:
+    golden = {name: value for name, value in GOLDEN.items() if name.startswith(f"{studied}.")}
+    wrong = differences(golden, found, TOLERANCE)
+    assert not wrong, "\n" + "\n".join(wrong)
+
+
+@pytest.fixture
+def quick(settings: Settings) -> None:
+    if settings is not QUICK:
+        pytest.skip("stored are those of `make test-hidden`, with few synthetic measurements")
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("name", verdicts.TRIALS)
+def test_the_diagnosis_of_a_trial_is_the_stored_one(everything: dict[str, Said], name: str) -> None:
+    compare(f"trials.{name}", verdicts.trial_values(name, everything[name]))
+
+
+@pytest.mark.usefixtures("quick")
+def test_thresholds_are_the_stored_ones() -> None:
+    compare("trials.thresholds", verdicts.threshold_values(made_detector(QUICK)))
+
+
+def test_diagnoses_of_a_lumped_machine_are_the_stored_ones(tmp_path: Path) -> None:
+    compare("lumped", verdicts.lumped_values(tmp_path))
+
+
+def test_something_is_hidden_in_most_and_nothing_in_some() -> None:
+    stored = {name: value for name, value in GOLDEN.items() if name.endswith(".verdict")}
+    assert len(stored) >= 12
+    assert list(stored.values()).count("nothing") >= 3
+    assert any(name.startswith("lumped.") for name in stored)
