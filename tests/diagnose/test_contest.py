@@ -28,6 +28,8 @@ from twin.diagnose.contest import (
 from twin.diagnose.diagnosis import Window
 from twin.diagnose.verdict import cause_of
 
+pytestmark = pytest.mark.long
+
 
 def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
     when = History(
@@ -48,7 +50,6 @@ def test_freedom_has_its_price():
     assert 2.0 < one - worth(hypothesis(q=2)) < 36.0
 
 
-@pytest.mark.long
 def test_fitted_edges_and_further_windows_are_no_proof():
     detector = small_case.made_detector()
     name = detector.study.runs[0].run.name

@@ -24,6 +24,8 @@ from twin.diagnose.verdict import verdict_of
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 
+pytestmark = pytest.mark.long
+
 
 @cache
 def logged(signal: str, factor: float) -> Study:

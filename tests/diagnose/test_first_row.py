@@ -18,6 +18,8 @@ from twin.inject.damage.channels import Damage
 from twin.inject.damage.kinds import damaged
 from twin.logs.run import Run
 
+pytestmark = pytest.mark.long
+
 SIZE = 4e-6  # m
 EVERY = 2400.0  # s, between measurements of three rows
 KINDS = ("scale", "expansion", "slip", "step", "probe", "frame", "heated", "load")
@@ -90,7 +92,6 @@ LOST_TOO = ("step", "drift", "frame", "load")  # of "heating", a row that is los
 @pytest.mark.parametrize(
     ("kind", "lost"), [("heating", False), *((k, lost) for k in LOST_TOO for lost in (False, True))]
 )
-@pytest.mark.long
 def test_a_reading_changes_as_a_damaged_log_does(kind, lost):
     study, columns, index = read("first", lost)
     whole = runs("first", lost)

@@ -23,6 +23,8 @@ from twin.diagnose.search_strained import _weak, closed, strained
 from twin.diagnose.settled import settled
 from twin.diagnose.verdict import verdict_of
 
+pytestmark = pytest.mark.long
+
 
 def in_windows(n: int) -> Accepted:
     """Heat that switches n times."""

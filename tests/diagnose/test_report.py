@@ -139,6 +139,7 @@ def test_the_page_of_every_verdict_says_it_first_and_has_every_section(written, 
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
+@pytest.mark.long
 def test_report_json_is_the_diagnosis(written, verdict):
     folder = written(verdict)
     with open(folder / "report.json", encoding="utf-8") as f:

@@ -25,10 +25,10 @@ TOLERANCE = 1e-9  # of each quantity's own scale
 ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few of CI
 LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a null distribution of their own
 AGAIN = (  # of families and kinds that other trials of continuous integration have
-    "pair", "effect_and_sensor", "below_limit", "forced_convection", "loss_law", "expansion", "capacity", "scale_expansion",
-    "slip", "not_thermal", "measurement", "drawn_heat_source", "drawn_forced_convection", "drawn_loss_law", "drawn_joint",
-    "drawn_zone", "drawn_scale_expansion", "drawn_misplaced_source", "drawn_initial_state", "drawn_sensor",
-    "drawn_measurement", "drawn_not_thermal",
+    "pair", "effect_and_sensor", "below_limit", "forced_convection", "loss_law", "expansion", "capacity",
+    "scale_expansion", "slip", "not_thermal", "measurement", "drawn_heat_source", "drawn_forced_convection",
+    "drawn_loss_law", "drawn_joint", "drawn_zone", "drawn_scale_expansion", "drawn_misplaced_source",
+    "drawn_initial_state", "drawn_sensor", "drawn_measurement", "drawn_not_thermal",
 )  # fmt: skip
 # Not said as it should be: `make test-all` shows it, with the long ones.
 MISSED = ("coolant", "film_gain", "initial_state", "drawn_signal")
