@@ -143,7 +143,8 @@ def test_an_old_artefact_without_parameters_says_what_to_do(folder, tmp_path, ca
     a = lumped_case.artefact()
     old = tmp_path / "old.h5"
     bare = replace(
-        a.model, bodies=tuple(replace(b, members=(), E_members=None, G_members=None) for b in a.model.bodies)
+        a.model,
+        bodies=tuple(replace(b, members=(), E_members=None, G_members=None, W_members=None) for b in a.model.bodies),
     )
     write_artefact(old, bare, a.description, {"step": 60.0}, a.provenance)
     with h5py.File(old, "a") as f:

@@ -28,12 +28,17 @@ from twin.run.replay import replay_drive
 def test_verify_passes_and_stores_the_certificate(slide_artefact, tmp_path):
     path = tmp_path / "slide.h5"
     shutil.copy(slide_artefact, path)
-    assert read_artefact(path).certificate["rich_temperature_error"] is None
+    assert [p["name"] for p in read_artefact(path).certificate["parts"]] == ["reduction", "time step", "poses"]
     assert run(["verify", str(path)]) == 0
     stored = read_artefact(path).certificate
     assert len(stored["scenarios"]) == 19
     assert len(stored["full_scenarios"]) == 2
-    assert 0 < stored["rich_temperature_error"] < stored["limit_temperature"] / 2
+    parts = {p["name"]: np.max(p["temperature_error_in_case"]) for p in stored["parts"]}
+    assert 0 < parts["rich basis"] < stored["limit_temperature"] / 2
+    assert 0 < parts["time step"] < stored["limit_temperature"] / 2
+    assert np.shape(stored["displacement_error_at_positions"]) == (20, 3)
+    assert stored["step_halved"] < 0.2  # the reference's own step does not count
+    assert np.max(stored["temperature_error_in_case"]) <= sum(parts.values())
     assert np.max(stored["temperature_error_in_case"]) <= stored["limit_temperature"]
     assert stored["worst_relative"] < 0.01
 

@@ -116,4 +116,7 @@ def verified(
     full = full_model(machine, progress)
     rich = rich_model(machine, full, options.rich, progress)
     of_full = full.thermal if full_scenarios else None
+    stored = artefact.certificate.get("substeps")
+    if stored is not None:  # it runs with these
+        options = replace(options, substeps=int(stored))
     return certificate(machine, rich, artefact.model, of_full, options, VERIFY_SEED, full_scenarios, progress=progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -51,6 +51,7 @@ def correct(
     _check_output(Path(output))
     loaded = read(model).artefact
     errors, at = read_pose_errors(Path(result), loaded.digest, wanted)
+    errors = replace(errors, model=loaded.model)
     if zero is not None:
         check_zero(zero, errors.axes, loaded.model.load_model.axes)
     degrees = _degrees(degree, errors.axes, default_degrees(errors))

@@ -98,7 +98,7 @@ class Model:
         output: str | Path | None = None,
         *,
         dt: Quantity = "60 s",
-        substeps: int = 4,
+        substeps: int | None = None,
         initial: Result | np.ndarray | Quantity | None = None,
         checkpoints: Checkpoints | None = None,
         progress: Progress | bool | None = None,

@@ -44,7 +44,7 @@ class Result:
 
     @property
     def tcp_actual(self) -> xarray.DataArray:
-        """(time, component) m: the TCP error where the axes are, interpolated between the poses."""
+        """(time, component) m: the TCP error where the axes are (of old artefacts interpolated between the poses)."""
         dims = ("time", "component")
         return self._of(self.numbers.tcp_actual, dims, "tcp_actual", "m", "TCP error at the actual position")
 
@@ -109,6 +109,8 @@ class Result:
             f"{told['steps']} steps of {told['step_s']:g} s; {largest}; "
             f"heat balance closes to {told['heat']['max_balance_error']:.1e} of the throughput"
         ]
+        if not self.numbers.exact and len(self.numbers.poses) > 1:
+            lines.append("TCP error at the actual position: interpolated, for the artefact is older; build it again")
         raised = {name: flag for name, flag in told["flags"].items() if flag["steps"]}
         if raised:
             lines.append(f"outside what was certified in {told['flagged_steps']} of {told['steps']} steps:")

@@ -32,7 +32,7 @@ class Result:
     tcp: np.ndarray  # (n + 1, n_poses, 3) m, TCP error at every pose
     axes: tuple[str, ...]
     position: np.ndarray  # (n + 1, n_axes) m
-    tcp_actual: np.ndarray  # (n + 1, 3) m, TCP error at the actual position, interpolated between the poses
+    tcp_actual: np.ndarray  # (n + 1, 3) m, TCP error at the actual position
     sources: tuple[str, ...]
     power: np.ndarray  # (n, n_sources) W
     films: tuple[str, ...]
@@ -46,6 +46,7 @@ class Result:
     states: np.ndarray  # (n + 1, N) artefact coordinates, bodies one after the other
     artefact: str  # sha256 of the model
     substeps: int
+    exact: bool = True  # `tcp_actual` is that of the position; False: interpolated between the poses
 
     @property
     def state(self) -> np.ndarray:
@@ -79,6 +80,7 @@ def summary(result: Result) -> dict[str, Any]:
         },
         "tcp": {
             "max_abs_m": np.abs(result.tcp).max(axis=(0, 1)).tolist(),
+            "at_actual_position": "exact" if result.exact else "interpolated between the poses",
             "max_abs_at_actual_position_m": np.abs(result.tcp_actual).max(axis=0).tolist(),
             "worst": {
                 "component": "xyz"[component],
@@ -133,7 +135,8 @@ def _write_hdf5(path: Path, result: Result) -> None:
         scale(f, "state", np.arange(result.states.shape[1]), "", "bodies one after the other")
         put(f, "temperature", result.temperature, "degC", ("time", "sensor"))
         put(f, "tcp", result.tcp, "m", ("time", "pose", "component"), "TCP error at all poses")
-        put(f, "tcp_actual", result.tcp_actual, "m", ("time", "component"), "TCP error at the actual position")
+        at_position = "TCP error at the actual position" + ("" if result.exact else ", interpolated between the poses")
+        put(f, "tcp_actual", result.tcp_actual, "m", ("time", "component"), at_position)
         put(f, "pose_position", result.poses, "m", ("pose", "pose_axis"))
         put(f, "position", result.position, "m", ("time", "axis"))
         put(f, "power", result.power, "W", ("step", "source"))
