@@ -184,7 +184,7 @@ def _compared(
     for reader, finer in ways:
         moving = reader.outputs(scenario, substeps, finer)
         made.append([np.concatenate(both) for both in zip(moving, steady[reader], strict=True)])
-    result = []
+    result: list[tuple[np.ndarray, ...]] = []
     for a, b in pairs:
         (T, u), (T_other, u_other) = made[a], made[b]
         errors = np.abs(T_other - T).max(axis=0), np.abs(u_other - u).max(axis=0)
