@@ -19,7 +19,7 @@ def main() -> None:
     one_pose = galerkin(rich(), trajectories(rich(), still), options.states, unit)
     moving = [draw(load, VERIFY_SEED + i, options.hours, options.step) for i in range(6)]
     for label, model in (("trained at one pose", one_pose), ("ours", compact())):
-        result = compare(rich(), model, moving, 2)
+        result = compare(rich(), model, moving)
         T, u = result.temperature_error.max(), result.displacement_error.max()
         share = (result.temperature_error.max(axis=0) / result.temperature_range).max()
         print(

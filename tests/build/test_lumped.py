@@ -14,7 +14,7 @@ from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.machine.load import load_machine
 from twin.rom.drive import Drive, evaluate
 from twin.rom.lumped_structure import integral
-from twin.rom.tableau import SDIRK2_4, Tableau
+from twin.rom.tableau import SDIRK2_6, Tableau
 
 AXIS = """
 [axes.x]
@@ -85,7 +85,7 @@ def test_one_node_warms_by_its_time_constant(tmp_path):
     error = []
     for dt in (60.0, 30.0):
         stepper, drive = CoupledStepper(full.thermal), drive_of(full, 1.0, dt, 10.0)
-        decay = decay_of_a_step(SDIRK2_4, dt / tau)
+        decay = decay_of_a_step(SDIRK2_6, dt / tau)
         for step, (x,), _ in stepper.run(drive, stepper.uniform(20.0)):
             assert x[0] == pytest.approx(rise * (1.0 - decay ** (step + 1)), rel=1e-12)  # the method, exactly
         error.append(abs(x[0] - rise * (1.0 - np.exp(-3600.0 / tau))))

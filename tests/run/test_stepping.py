@@ -11,7 +11,7 @@ from dense_reference import Dense, gamma
 from twin.rom.contact import station_weights
 from twin.rom.drive import evaluate
 from twin.rom.load_model import EnvironmentWiring
-from twin.rom.tableau import IMPLICIT_EULER, SDIRK2_4
+from twin.rom.tableau import IMPLICIT_EULER, SDIRK2_6
 from twin.run.matrix import system_blocks
 from twin.run.replay import integrate
 from twin.run.stepping import advance, inputs_of
@@ -59,7 +59,7 @@ def test_system_matrix_equals_the_dense_one(model):
         S[offsets[i] : offsets[i + 1], offsets[j] : offsets[j + 1]] = block
     x = np.random.default_rng(0).standard_normal(model.n)
     z = prepared.from_artefact(x)
-    expected = np.linalg.solve(dense.E, dense.A(9) @ x) + 4 / 60.0 / SDIRK2_4.diagonal * x
+    expected = np.linalg.solve(dense.E, dense.A(9) @ x) + 4 / 60.0 / SDIRK2_6.diagonal * x
     np.testing.assert_allclose(prepared.to_artefact(S @ z), expected, rtol=1e-11, atol=1e-12 * np.abs(expected).max())
 
 

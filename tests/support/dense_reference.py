@@ -6,7 +6,7 @@ import numpy as np
 
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
-from twin.rom.tableau import SDIRK2_4, Tableau
+from twin.rom.tableau import SDIRK2_6, Tableau
 
 
 def gamma(model: MachineModel, drive: Drive, step: int) -> np.ndarray:
@@ -83,7 +83,7 @@ class Dense:
             states.append(x)
         return np.array(states)
 
-    def runge_kutta(self, x: np.ndarray, substeps: int = 1, tableau: Tableau = SDIRK2_4) -> np.ndarray:
+    def runge_kutta(self, x: np.ndarray, substeps: int = 1, tableau: Tableau = SDIRK2_6) -> np.ndarray:
         """States (n_steps + 1, N) by rates k_i = E^-1 (f - A (x + h sum_j a_ij k_j)) of the stages."""
         states = [x]
         for step in range(self.drive.n_steps):

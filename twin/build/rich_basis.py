@@ -32,7 +32,7 @@ LARGEST_AT_ONCE = 100_000  # nodes of a body of which several factors are held i
 class RichOptions:
     samples: int = 16  # points in (shift, films)
     shift_low: float = 1e-6  # 1/s: eleven days
-    shift_high: float = 1 / 15.0  # 1/s: beyond the 1/(0.343 * 60 s) that a step of a minute is solved at
+    shift_high: float = 1 / 15.0  # 1/s: beyond the 1/(0.3345 * 60 s) that a step of a minute is solved at
     # Directions below this share of a response (E-norm) are dropped, to begin with: it is halved until the basis holds
     # its share of the limits (`twin.build.rich_check`).
     tolerance: float = 8e-3

@@ -14,8 +14,8 @@ from twin.build.factorize import factorize
 from twin.machine.description import Limits
 from twin.rom.model import AffineBody
 
-# Shifts [1/s] of the checks: of a step of a minute (1/(0.343 h), `twin.rom.tableau.SDIRK2_4`), and of three hours.
-SHIFTS = (1.0 / (0.343 * 60.0), 1e-4)
+# Shifts [1/s] of the checks: of a step of a minute (1/(0.3345 h), `twin.rom.tableau.SDIRK2_6`), and of three hours.
+SHIFTS = (1.0 / (0.3345 * 60.0), 1e-4)
 
 SHARE = 1 / 3  # of the limits that a rich basis may use; the rest is for the reduction and the time step
 

@@ -51,7 +51,7 @@ def simulate(
     tcp_time: np.ndarray,
     tcp_positions: np.ndarray,
     start: float,
-    substeps: int = 2,
+    substeps: int = 1,
     noise: Noise = Noise(),
     progress: Progress = silent,
 ) -> Simulation:
@@ -98,7 +98,7 @@ def simulate_run(
     machine: Machine | Path,
     run: Run | Path,
     dt: float = 60.0,
-    substeps: int = 2,
+    substeps: int = 1,
     hours: float | None = None,
     tcp_every: float = 1800.0,
     noise: Noise = Noise(),

@@ -31,7 +31,7 @@ from twin.rom.drive import Drive
 from twin.rom.following import FOLLOW, FilmPlan
 from twin.rom.model import MachineModel
 from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, source_powers, step_loads
-from twin.rom.tableau import SDIRK2_4, Feedback, Tableau, stages
+from twin.rom.tableau import SDIRK2_6, Feedback, Tableau, stages
 
 
 def contact_matrix(model: MachineModel, drive: Drive, step: int) -> np.ndarray:
@@ -53,7 +53,7 @@ class _Factored:
 class CoupledStepper:
     """Steps a MachineModel whose bodies are sparse (full) or dense (rich); keeps the last factors per body."""
 
-    def __init__(self, model: MachineModel, keep: int = 2, follow: float = FOLLOW, tableau: Tableau = SDIRK2_4):
+    def __init__(self, model: MachineModel, keep: int = 2, follow: float = FOLLOW, tableau: Tableau = SDIRK2_6):
         self.model, self._tableau = model, tableau
         self._cache: tuple[list[_Factored], ...] = tuple([] for _ in model.bodies)  # latest last
         self._keep, self._follow = keep, follow

@@ -31,7 +31,7 @@ def _options() -> type[Any]:
               "(needs the mesh extra)")  # fmt: skip
 @click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
 @click.option(
-    "--substeps", default=2, show_default=True, type=click.IntRange(1), help="time integrator's steps per step"
+    "--substeps", default=1, show_default=True, type=click.IntRange(1), help="time integrator's steps per step"
 )
 @click.option("--hours", type=click.FloatRange(0, min_open=True), help="stop after this time; the whole run by default")
 @click.option("--tcp-every", default="30 min", show_default=True, type=Quantity("s"),

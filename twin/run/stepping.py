@@ -32,7 +32,7 @@ from twin.rom.drive import Drive
 from twin.rom.following import FOLLOW
 from twin.rom.load_model import LoadModel
 from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, source_powers, step_loads
-from twin.rom.tableau import SDIRK2_4, Feedback, Tableau
+from twin.rom.tableau import SDIRK2_6, Feedback, Tableau
 from twin.run.block_factor import BlockFactor
 from twin.run.integrator import Sums, integrate
 from twin.run.matrix import by_factor, factor_of, terms_of
@@ -75,7 +75,7 @@ class StepHeat:
 
 
 def inputs_of(
-    load_model: LoadModel, drive: Drive, substeps: int, follow: float = FOLLOW, tableau: Tableau = SDIRK2_4
+    load_model: LoadModel, drive: Drive, substeps: int, follow: float = FOLLOW, tableau: Tableau = SDIRK2_6
 ) -> Inputs:
     """The drive as stacked step inputs (n_steps, ...), with the steps marked in which rate or contacts change."""
     n_steps, contacts = drive.n_steps, contact_entries(load_model, drive)
