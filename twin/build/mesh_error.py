@@ -19,7 +19,7 @@ nodes of linear elements of half the size, so with the same order
 
     error = difference to linear elements / (2^p - 1)
 
-This is an indication only: on three machines 0.2 to 10 times what the finer mesh shows.
+This is an indication only: on three machines 0.15 to 11 times what the finer mesh shows.
 """
 
 from __future__ import annotations
