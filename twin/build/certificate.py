@@ -13,7 +13,7 @@ Errors add up: |compact in steps - full in fine steps| <= |compact in steps - co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -177,6 +177,12 @@ def certify(
         worst_displacement=_worst_pose(model, places, compact),
         parts=tuple(made),
     )
+
+
+def with_part(known: Certificate, part: Part, limits: Limits) -> Certificate:
+    """The certificate with one more part that does not count; in the place of one of the same name."""
+    others = tuple(p for p in known.parts if p.name != part.name)
+    return replace(known, parts=(*others, _part_error(part, limits, len(known.displacement_error))))
 
 
 def _part_error(part: Part, limits: Limits, n_poses: int) -> PartError:

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from twin.build.elastic_inputs import elastic_inputs
+from twin.build.linear import linear_body, straightened
 from twin.build.lumped import assemble_lumped, lumped_bodies
 from twin.build.lumped_structure import lumped_structure
 from twin.build.mesh import BodyMesh, load_body_meshes
@@ -39,18 +40,32 @@ def assemble(machine: Machine, progress: Progress = silent) -> FullModel:
     """Read meshes, assemble and condense, or assemble nodes and bars. Raises DescriptionError and ModelError."""
     if machine.lumped:
         return _assemble_lumped(machine)
-    with progress("meshes and thermal matrices", 2) as advance:
+    with progress("meshes", 1) as advance:
         bodies = load_body_meshes(machine)
         advance("meshes")
+    return assemble_meshed(machine, bodies, progress)
+
+
+def assemble_meshed(
+    machine: Machine, bodies: tuple[BodyMesh, ...], progress: Progress = silent, linear: bool = False
+) -> FullModel:
+    """The full model on these meshes of the bodies, in the order of `bodies_of`; raises as `assemble`.
+
+    linear: with linear elements on the same tetrahedra, faces flat (`twin.build.linear`).
+    """
+    bodies = tuple(straightened(body) for body in bodies) if linear else bodies
+    with progress("thermal matrices", 1) as advance:
         thermal = assemble_thermal(machine, bodies)
         advance("thermal matrices")
-    structure = assemble_structure(machine, bodies, progress)
+    structure = assemble_structure(machine, bodies, progress, linear)
     rows = structure.pose_rows(thermal.poses)
     meshes = zip(bodies, thermal.bodies, strict=True)
     surfaces, selections = zip(*(_surface(mesh, body.n) for mesh, body in meshes), strict=True)
     acting, inputs = elastic_inputs(structure)
     parts = zip(thermal.bodies, rows, inputs, selections, strict=True)
     full = tuple(replace(b, G=G, W=W, F=F) for b, G, W, F in parts)
+    if linear:
+        full = tuple(linear_body(mesh, body) for mesh, body in zip(bodies, full, strict=True))
     thermal = replace(thermal, bodies=full, structure=acting)
     return FullModel(thermal, structure, bodies, surfaces)
 

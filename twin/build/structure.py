@@ -22,6 +22,7 @@ from twin.build.elastic_ports import PortTable
 from twin.build.elasticity import body_elasticity
 from twin.build.encoder import EncoderTerms
 from twin.build.flexibility import BodyFlexibility, block_count, condense
+from twin.build.linear import linear_elasticity
 from twin.build.mesh import BodyMesh
 from twin.build.springs import spring_system
 from twin.build.workers import workers
@@ -122,10 +123,13 @@ class Structure(ElasticStructure):
         return f, np.array([self._about_origin(i) @ scaled[i] for i in range(len(self.bodies))])
 
 
-def assemble_structure(machine: Machine, bodies: tuple[BodyMesh, ...], progress: Progress = silent) -> Structure:
+def assemble_structure(
+    machine: Machine, bodies: tuple[BodyMesh, ...], progress: Progress = silent, linear: bool = False
+) -> Structure:
     """Condense every body to its elastic ports, and check that no body moves freely within the strokes.
 
-    bodies: the meshes in the order of `bodies_of`. Raises DescriptionError (contacts that do not touch, pads without a
+    bodies: the meshes in the order of `bodies_of`. linear: displacements between vertices are (`twin.build.linear`),
+    on straight meshes. Raises DescriptionError (contacts that do not touch, pads without a
     normal) and ModelError (a mechanism, naming body and direction).
     """
     ports = PortTable(bodies)
@@ -137,7 +141,10 @@ def assemble_structure(machine: Machine, bodies: tuple[BodyMesh, ...], progress:
     ):
 
         def condensed(body: BodyMesh, names: list[str], U: csr_array) -> BodyFlexibility:
-            found = condense(body.name, tuple(names), U, body_elasticity(machine, body), body.nodes, advance)
+            solid, points = body_elasticity(machine, body), body.nodes
+            if linear:
+                solid, U, points = linear_elasticity(body, solid, U)
+            found = condense(body.name, tuple(names), U, solid, points, advance)
             tanks = len(tanks_on(machine, tuple(part.name for part in body.parts)))  # these move nothing
             return replace(found, H=np.pad(found.H, ((0, 0), (0, tanks)))) if tanks else found
 

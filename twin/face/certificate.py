@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from twin.rom.certificate_table import table
+
 
 class Certificate(Mapping[str, Any]):
     """Figures of a certificate by name, as the artefact stores them (docs/artefact.md); K and m."""
@@ -45,7 +47,7 @@ class Certificate(Mapping[str, Any]):
         return f"Certificate(passed={self.passed})"
 
     def lines(self, every_output: bool = False) -> list[str]:
-        """Summary lines, one per figure; with `every_output` also a line per sensor."""
+        """Summary lines, one per figure; with `every_output` also a table of all outputs."""
         error_T, span_T = (_largest(self[f"temperature_{k}"]) for k in ("error", "range"))
         error_u, span_u = (_largest(self[f"displacement_{k}"]) for k in ("error", "range"))
         text = [
@@ -65,11 +67,7 @@ class Certificate(Mapping[str, Any]):
         if not self["full_scenarios"]:
             text.append("  the full model is not in this chain yet: twin verify puts it there")
         if every_output:
-            columns = ("sensors", "temperature_error_in_case", "temperature_error", "temperature_range")
-            text += [
-                f"    {name:<24} {case:.4f} K in the case; as drawn {error:.4f} K of {span:.1f} K"
-                for name, case, error, span in zip(*(self[c] for c in columns), strict=True)
-            ]
+            text += table(self)
         return [*text, "passed"] if self.passed else [*text, *(f"FAILED: {reason}" for reason in self.reasons())]
 
     def _parts(self) -> list[str]:

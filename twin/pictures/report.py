@@ -20,6 +20,7 @@ from twin.pictures.temperatures import temperature_figure
 from twin.pictures.workspace import workspace_figure
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
+from twin.rom.certificate_table import table
 
 _SHARES = (1 / 12, 1 / 3, 1 / 2, 1.0)  # of a run: the four times of the surface picture
 
@@ -124,10 +125,12 @@ def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
         f"<figcaption>{html.escape(caption)}</figcaption></figure>"
         for name, caption in captions.items()
     )
+    errors = html.escape("\n".join(table(artefact.certificate))) if artefact.certificate else "no certificate"
     title = html.escape(f"{artefact.model.name}: result")
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
 body {{ font: 15px/1.5 system-ui, sans-serif; color: #22262b; max-width: 1100px; margin: 2rem auto; padding: 0 1rem; }}
+pre {{ overflow-x: auto; font-size: 12px; }}
 figure {{ margin: 2rem 0; }} img {{ max-width: 100%; }} figcaption {{ color: #6a7078; }}
 </style></head><body>
 <h1>{title}</h1>
@@ -135,6 +138,11 @@ figure {{ margin: 2rem 0; }} img {{ max-width: 100%; }} figcaption {{ color: #6a
 {items}
 </ul>
 {pictures}
+<h2>Errors of the model</h2>
+<p>Largest over the held-out scenarios of the certificate, K and um.</p>
+<pre>
+{errors}
+</pre>
 <p>Numbers behind the pictures: <a href="result.h5">result.h5</a>, <a href="temperatures.csv">temperatures.csv</a>,
 <a href="tcp.csv">tcp.csv</a>, <a href="summary.json">summary.json</a>.</p>
 </body></html>
