@@ -70,9 +70,9 @@ def _mean_of_euler_steps(name: str, gamma: float, last: tuple[float, ...]) -> Ta
     left = 1.0 - conditions[:, 3:] @ last
     beta = np.array([*np.linalg.solve(conditions[:, :3], left), *last])
     b = gamma * beta[::-1].cumsum()[::-1]
-    # A stage's loads are read at its own place, i gamma of the step, ahead of the stage before; those of the first at the
-    # step's start. Of the one with the largest weight at such a place that the weighted mean of all is at the middle of
-    # the step, which second order asks for.
+    # A stage's loads are read at its own place, i gamma of the step, ahead of the stage before; those of the first at
+    # the step's start. Of the one with the largest weight at such a place that the weighted mean of all is at the
+    # middle of the step, which second order asks for.
     c = gamma * i
     c[0] = 0.0
     most = int(np.abs(b).argmax())
