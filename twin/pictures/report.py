@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from twin.atomic import atomic_path
 from twin.machine.description import Machine
-from twin.pictures.placed import described, placed_surface, poses_in_space
+from twin.pictures.placed import described, no_tcp, placed_surface, poses_in_space
 from twin.pictures.raster import Camera
 from twin.pictures.result import Drawn, read_result
 from twin.pictures.surface import surface_figure
@@ -113,7 +113,7 @@ def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
         f"largest TCP displacement {1e6 * result.tcp[worst]:+.1f} µm in {'xyz'[worst[2]]} "
         f"after {result.hours[worst[0]]:.2f} h"
         if artefact.model.moves
-        else "no temperature moves the tool: the description has no [tcp.expansion] and no [tcp.screws]",
+        else f"no temperature moves the tool: {no_tcp(artefact)}",
         f"{int(result.outside.sum())} steps outside the certified box",
     ]
     if not artefact.fields:
