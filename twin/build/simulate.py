@@ -144,7 +144,11 @@ def simulate_run(
         zone=run.zone,
         sampling=run.sampling,
         provenance=f"twin simulate: full model of '{machine.machine.name}', noise seed {noise.seed}",
-        synthetic=("temperatures", "tcp", *(("loads",) if "loads" in run.synthetic else ())),
+        synthetic=(
+            "temperatures",
+            *(("tcp",) if len(result.tcp_time) else ()),
+            *(("loads",) if "loads" in run.synthetic else ()),
+        ),
         initial_temperature=start,
     )
     return simulated, float(result.balance_error.max(initial=0.0))

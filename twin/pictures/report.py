@@ -124,6 +124,8 @@ def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
         f"<figcaption>{html.escape(caption)}</figcaption></figure>"
         for name, caption in captions.items()
     )
+    files = ["result.h5", "temperatures.csv", *(["tcp.csv"] if artefact.model.moves else []), "summary.json"]
+    links = ", ".join(f'<a href="{name}">{name}</a>' for name in files)
     title = html.escape(f"{artefact.model.name}: result")
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
@@ -135,7 +137,6 @@ figure {{ margin: 2rem 0; }} img {{ max-width: 100%; }} figcaption {{ color: #6a
 {items}
 </ul>
 {pictures}
-<p>Numbers behind the pictures: <a href="result.h5">result.h5</a>, <a href="temperatures.csv">temperatures.csv</a>,
-<a href="tcp.csv">tcp.csv</a>, <a href="summary.json">summary.json</a>.</p>
+<p>Numbers behind the pictures: {links}.</p>
 </body></html>
 """
