@@ -71,7 +71,7 @@ def test_verify_speaks_of_temperatures_alone(artefact, tmp_path, capsys):
 
 
 def test_temperatures_are_within_20_mk_of_the_converged_ones_everywhere(tmp_path):
-    """On the whole surface, in each of the first 120 minutes, against elements and steps half and a quarter as large."""
+    """On all the surface, in each of the first 120 minutes, against elements and steps half and a quarter as large."""
     path = tmp_path / "plate.h5"
     build_artefact(PLATE, path, QUICK)
     result = twin.run(twin.read(path), HEATING)
