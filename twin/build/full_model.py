@@ -31,7 +31,7 @@ class SurfaceMesh:
 @dataclass(frozen=True)
 class FullModel:
     thermal: MachineModel  # sparse bodies, G filled for the pose grid, W for all positions, F for their surfaces
-    structure: Structure | LumpedStructure
+    structure: Structure | LumpedStructure  # the latter, with nothing that moves, of machines without a TCP
     bodies: tuple[BodyMesh, ...]  # none of a lumped machine
     surfaces: tuple[SurfaceMesh, ...]  # likewise
 
@@ -57,7 +57,11 @@ def assemble_meshed(
     with progress("thermal matrices", 1) as advance:
         thermal = assemble_thermal(machine, bodies)
         advance("thermal matrices")
-    structure = assemble_structure(machine, bodies, progress, linear)
+    structure: Structure | LumpedStructure
+    if machine.has_tcp:
+        structure = assemble_structure(machine, bodies, progress, linear)
+    else:
+        structure = LumpedStructure(thermal.pose_axes, tuple(np.zeros((3, body.n)) for body in thermal.bodies), ())
     rows = structure.pose_rows(thermal.poses)
     meshes = zip(bodies, thermal.bodies, strict=True)
     surfaces, selections = zip(*(_surface(mesh, body.n) for mesh, body in meshes), strict=True)

@@ -100,11 +100,11 @@ def step_halved(model: MachineModel, scenarios: Sequence[Scenario], step: Compar
 
 
 def positions_off_grid(model: MachineModel, seed: int, count: int = POSITIONS) -> np.ndarray:
-    """Random positions (count, n_axes) [m] between the poses of the grid; none without axes."""
+    """Random positions (count, n_axes) [m] between the poses of the grid; none without axes or TCP."""
     low = np.array([nodes[0] for nodes in model.pose_grid])
     high = np.array([nodes[-1] for nodes in model.pose_grid])
     rng = np.random.default_rng([seed, 20261])
-    return rng.uniform(low, high, (count if len(low) else 0, len(low)))
+    return rng.uniform(low, high, (count if len(low) and model.moves else 0, len(low)))
 
 
 def chosen_for_full(load: LoadModel, scenarios: Sequence[Scenario], count: int) -> list[Scenario]:

@@ -57,12 +57,17 @@ class Certificate(Mapping[str, Any]):
             f"  sensors   {self.temperature_error:.4f} K in a {self['case_temperature']:g} K case "
             f"(limit {self['limit_temperature']:g} K); as drawn {error_T:.3f} K at ranges up to {span_T:.0f} K: "
             f"{self['worst_temperature']}",
-            f"  TCP       {1e6 * self.displacement_error:.3f} um in a {1e6 * self['case_displacement']:g} um case "
-            f"(limit {1e6 * self['limit_displacement']:g} um); as drawn {1e6 * error_u:.2f} um at ranges up to "
-            f"{1e6 * span_u:.0f} um: {self['worst_displacement']}",
-            f"  relative to its own range {100 * self['worst_relative']:.2f} % "
-            f"(limit {100 * self['limit_relative']:g} %): {self.get('worst_relative_output') or 'any output'}",
         ]
+        if span_u > 0.0:
+            text.append(
+                f"  TCP       {1e6 * self.displacement_error:.3f} um in a {1e6 * self['case_displacement']:g} um case "
+                f"(limit {1e6 * self['limit_displacement']:g} um); as drawn {1e6 * error_u:.2f} um at ranges up to "
+                f"{1e6 * span_u:.0f} um: {self['worst_displacement']}"
+            )
+        text.append(
+            f"  relative to its own range {100 * self['worst_relative']:.2f} % "
+            f"(limit {100 * self['limit_relative']:g} %): {self.get('worst_relative_output') or 'any output'}"
+        )
         text += self._parts()
         if not self["full_scenarios"]:
             text.append("  the full model is not in this chain yet: twin verify puts it there")
@@ -75,9 +80,10 @@ class Certificate(Mapping[str, Any]):
         text = []
         for part in self.get("parts", ()):
             T, u = (_largest(part[f"{k}_error_in_case"]) for k in ("temperature", "displacement"))
+            of_tcp = f"  {1e6 * u:7.3f} um" if _largest(self["displacement_range"]) > 0.0 else ""
             beside = "" if part["counts"] else ", not in the sums"
             text.append(
-                f"    {part['name']:<11} {T:.4f} K  {1e6 * u:7.3f} um  {part['between']}, "
+                f"    {part['name']:<11} {T:.4f} K{of_tcp}  {part['between']}, "
                 f"{len(part['scenarios'])} scenarios{beside}"
             )
         return ["  in the case, of it:", *text] if text else []

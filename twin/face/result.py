@@ -97,14 +97,14 @@ class Result:
 
     def __str__(self) -> str:
         told = self.summary
-        worst = told["tcp"]["worst"]
-        place = ", ".join(f"{axis} {1e3 * value:.0f} mm" for axis, value in worst["pose_m"].items())
-        largest = (
-            f"largest TCP error d{worst['component']} {1e6 * worst['value_m']:.1f} um after "
-            f"{worst['time_s'] / 3600:.2f} h at {place or 'the only pose'}"
-            if self.model.artefact.model.moves
-            else "no temperature moves the tool"
-        )
+        largest = "no temperature moves the tool"
+        if told["tcp"] is not None:
+            worst = told["tcp"]["worst"]
+            place = ", ".join(f"{axis} {1e3 * value:.0f} mm" for axis, value in worst["pose_m"].items())
+            largest = (
+                f"largest TCP error d{worst['component']} {1e6 * worst['value_m']:.1f} um after "
+                f"{worst['time_s'] / 3600:.2f} h at {place or 'the only pose'}"
+            )
         lines = [
             f"{told['steps']} steps of {told['step_s']:g} s; {largest}; "
             f"heat balance closes to {told['heat']['max_balance_error']:.1e} of the throughput"

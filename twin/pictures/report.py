@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from twin.atomic import atomic_path
 from twin.machine.description import Machine
-from twin.pictures.placed import described, placed_surface, poses_in_space
+from twin.pictures.placed import described, no_tcp, placed_surface, poses_in_space
 from twin.pictures.raster import Camera
 from twin.pictures.result import Drawn, read_result
 from twin.pictures.surface import surface_figure
@@ -114,7 +114,7 @@ def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
         f"largest TCP displacement {1e6 * result.tcp[worst]:+.1f} µm in {'xyz'[worst[2]]} "
         f"after {result.hours[worst[0]]:.2f} h"
         if artefact.model.moves
-        else "no temperature moves the tool: the description has no [tcp.expansion] and no [tcp.screws]",
+        else f"no temperature moves the tool: {no_tcp(artefact)}",
         f"{int(result.outside.sum())} steps outside the certified box",
     ]
     if not artefact.fields:
@@ -126,6 +126,8 @@ def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
         for name, caption in captions.items()
     )
     errors = html.escape("\n".join(table(artefact.certificate))) if artefact.certificate else "no certificate"
+    files = ["result.h5", "temperatures.csv", *(["tcp.csv"] if artefact.model.moves else []), "summary.json"]
+    links = ", ".join(f'<a href="{name}">{name}</a>' for name in files)
     title = html.escape(f"{artefact.model.name}: result")
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
@@ -143,7 +145,6 @@ figure {{ margin: 2rem 0; }} img {{ max-width: 100%; }} figcaption {{ color: #6a
 <pre>
 {errors}
 </pre>
-<p>Numbers behind the pictures: <a href="result.h5">result.h5</a>, <a href="temperatures.csv">temperatures.csv</a>,
-<a href="tcp.csv">tcp.csv</a>, <a href="summary.json">summary.json</a>.</p>
+<p>Numbers behind the pictures: {links}.</p>
 </body></html>
 """

@@ -26,6 +26,14 @@ from twin.rom.springs import Positions, SpringSystem
 FREE = 1e-9  # rigid-body stiffness (scaled to lengths) below this share of the largest is a mechanism
 
 
+class Mechanism(ModelError):
+    """A body moves freely, alone or together with others."""
+
+    def __init__(self, what: str, remedy: str, bodies: tuple[str, ...]):
+        super().__init__(what, "the structure is a mechanism", remedy)
+        self.bodies = bodies  # the one that moves most first
+
+
 @dataclass(frozen=True)
 class PortFlexibility:
     """A body seen from its p elastic ports."""
@@ -52,12 +60,20 @@ class ElasticStructure:
     def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
         """Z_b (3, n_ports_b) per body: the TCP displacement is sum_b Z_b h_b at this pose, plus `scale_rows`.
 
-        Raises ModelError where a body can move freely.
+        Raises Mechanism where a body can move freely.
         """
         J, t = self.system.gap_rows(positions), self.system.tcp_rows(positions)
         # the system is symmetric: solved for the rows of the TCP
         f, _ = self._solve(J, -J @ (self._flexibility @ t.T), (t @ self._motions).T)
         return tuple(np.split(t + f.T @ J, self.system.offsets[1:-1], axis=1))
+
+    def refuse_mechanism(self, positions: Positions) -> None:
+        """Raises Mechanism where a body can move freely, as `rows` does; displacements are not solved for."""
+        J = self.system.gap_rows(positions)
+        B = J @ self._motions
+        if not len(B):
+            self._refuse_mechanism(np.zeros((B.shape[1],) * 2))
+        self._refuse_mechanism(B.T @ cho_solve(self._yielding(J), B))
 
     @cached_property
     def _flexibility(self) -> np.ndarray:
@@ -79,18 +95,23 @@ class ElasticStructure:
     def _solve(self, J: np.ndarray, gap: np.ndarray, resultant: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Spring forces f and rigid motions a of S f - B a = gap, -B^T f = resultant, with S = 1/k + J F J^T, B = J R.
 
-        Raises ModelError where B^T S^-1 B, the stiffness of the springs and bodies against rigid motion, is singular.
+        Raises Mechanism where B^T S^-1 B, the stiffness of the springs and bodies against rigid motion, is singular.
         """
         B = J @ self._motions
         if not len(B):
             self._refuse_mechanism(np.zeros((B.shape[1],) * 2))
-        used = np.flatnonzero(J.any(axis=0))  # a pad faces two segments of its rail, not all
-        S = np.diag(1.0 / self.system.stiffness) + J[:, used] @ self._flexibility[np.ix_(used, used)] @ J[:, used].T
-        factor = cho_factor(S)
+        factor = self._yielding(J)
         stiffness = B.T @ cho_solve(factor, B)
         self._refuse_mechanism(stiffness)
         a = np.linalg.solve(stiffness, -resultant - B.T @ cho_solve(factor, gap))
         return cho_solve(factor, gap + B @ a), a
+
+    def _yielding(self, J: np.ndarray) -> tuple[np.ndarray, bool]:
+        """S = 1/k + J F J^T, factored."""
+        used = np.flatnonzero(J.any(axis=0))  # a pad faces two segments of its rail, not all
+        S = np.diag(1.0 / self.system.stiffness) + J[:, used] @ self._flexibility[np.ix_(used, used)] @ J[:, used].T
+        factor: tuple[np.ndarray, bool] = cho_factor(S)
+        return factor
 
     def _refuse_mechanism(self, stiffness: np.ndarray) -> None:
         eigenvalues, vectors = np.linalg.eigh(stiffness)
@@ -105,9 +126,9 @@ class ElasticStructure:
         name = self.bodies[worst // 6].name
         others = [n for n in together if n != name]
         kind, axis = ("moves freely along" if worst % 6 < 3 else "turns freely about"), "xyz"[worst % 3]
-        raise ModelError(
+        raise Mechanism(
             f"body '{name}' {kind} {axis}" + (f", together with {', '.join(others)}" if others else ""),
-            "the structure is a mechanism",
             f"{free.shape[1]} free motion(s): give stiffness in that direction to a moving contact of the body "
             "(axial for its screw; normal, lateral for its guides) or to a support",
+            (name, *others),
         )

@@ -130,6 +130,7 @@ def replay_drive(
         states=modal,
         artefact=artefact.digest,
         substeps=substeps,
+        moves=model.moves,
         exact=is_exact(model),
     )
 
