@@ -22,6 +22,8 @@ from twin.rom.following import FOLLOW, difference_place
 from twin.rom.load_model import LoadModel
 from twin.rom.model import MachineModel
 
+STEPPED = 5  # held-out scenarios for the error of the time step: each takes four times the steps of the others
+CHOICE = 4  # training scenarios for the number of substeps
 POSITIONS = 20  # between the poses of the grid, where the certificate reads the TCP displacement too
 LARGE = 10_000  # nodes of a full model of which each scenario takes its own process from the start
 TRAINING_SEED = 1000
@@ -73,14 +75,13 @@ def held_out(model: MachineModel, options: BuildOptions, seed: int) -> list[Scen
 def enough_substeps(model: MachineModel, limits: Limits, options: BuildOptions) -> int:
     """As few substeps, of 1, 2 or 4, as keep the error of the time step below half of the limits.
 
-    Judged on six of the training scenarios, drawn at the step that the certificate is for: held-out ones that had a say
-    in the choice would not be held out.
+    Judged on some training scenarios, drawn at the step that the certificate is for: held-out ones that had a say in
+    the choice would not be held out.
     """
-    scenarios = [draw(model.load_model, TRAINING_SEED + i, options.hours / 2, options.step) for i in range(6)]
-    one, two = compare_ways([Way(model, 4), Way(model, 1), Way(model, 2)], [(0, 1), (0, 2)], scenarios)
-    # of second order: what steps half as long still miss is a third of the difference between the two
-    for substeps, error, share in ((1, one, 1.0), (2, two, 4.0 / 3.0)):
-        T, u = (share * e.max(initial=0.0) for e in error.scaled(limits))
+    scenarios = [draw(model.load_model, TRAINING_SEED + i, options.hours / 2, options.step) for i in range(CHOICE)]
+    for substeps in (1, 2):
+        (found,) = compare_ways([Way(model, FINER), Way(model)], [(0, 1)], scenarios, substeps)
+        T, u = (e.max(initial=0.0) for e in found.scaled(limits))
         if limits.temperature / 2 >= T and limits.displacement / 2 >= u:
             return substeps
     return 4
@@ -89,13 +90,15 @@ def enough_substeps(model: MachineModel, limits: Limits, options: BuildOptions) 
 def step_halved(model: MachineModel, scenarios: Sequence[Scenario], step: Comparison, substeps: int) -> float:
     """The change of the reference of the time step's error when its steps are halved, as a share of that error.
 
-    In the scenario with the largest error of a temperature, and in that of the displacement; the larger share.
+    In the scenario with the largest error of a temperature; of temperatures and displacements the larger share.
     """
-    errors = step.temperature_error, step.displacement_error
-    worst = sorted({int(e.reshape(len(scenarios), -1).max(axis=1, initial=0.0).argmax()) for e in errors})
+    worst = scenarios[int(step.temperature_error.max(axis=1, initial=0.0).argmax())]
     ways = [Way(model, 2 * FINER), Way(model, FINER)]
-    (halved,) = compare_ways(ways, [(0, 1)], [scenarios[i] for i in worst], substeps, long=LONG / 2)
-    pairs = zip((halved.temperature_error, halved.displacement_error), errors, strict=True)
+    (halved,) = compare_ways(ways, [(0, 1)], [worst], substeps)
+    pairs = (
+        (halved.temperature_error, step.temperature_error),
+        (halved.displacement_error, step.displacement_error),
+    )
     return max(float(h.max(initial=0.0) / max(e.max(initial=0.0), TINY)) for h, e in pairs)
 
 
@@ -144,16 +147,18 @@ def certificate(
     full_scenarios: int = 2,
     progress: Progress = silent,
 ) -> Certificate:
-    """Compact against rich, and in steps against finer ones, on all held-out scenarios; rich against full on some.
-
-    The latter where `full` is given.
+    """Compact against rich on all held-out scenarios, in steps against finer ones on the first of them, and, where
+    `full` is given, rich against full on some.
     """
     scenarios, positions = held_out(rich, options, seed), positions_off_grid(rich, seed)
     substeps = options.substeps or enough_substeps(compact, machine.limits, options)
-    with progress("compact against rich, and against finer steps", len(scenarios)) as advance:
-        ways = [Way(rich), Way(compact), Way(compact, FINER)]
-        reduction, step = compare_ways(ways, [(0, 1), (2, 1)], scenarios, substeps, positions, advance)
-    halved = step_halved(compact, scenarios, step, substeps)
+    with progress("compact against rich", len(scenarios)) as advance:
+        (reduction,) = compare_ways([Way(rich), Way(compact)], [(0, 1)], scenarios, substeps, positions, advance)
+    stepped = scenarios[:STEPPED]
+    with progress("compact against finer steps", len(stepped)) as advance:
+        ways = [Way(compact, FINER), Way(compact)]
+        (step,) = compare_ways(ways, [(0, 1)], stepped, substeps, positions, advance)
+    halved = step_halved(compact, stepped, step, substeps)
     parts = [
         Part(REDUCTION, "compact against rich", reduction),
         Part(STEP, f"steps of {options.step / substeps:g} s against a quarter of them", step),

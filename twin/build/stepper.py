@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +32,11 @@ from twin.rom.following import FOLLOW, FilmPlan
 from twin.rom.model import MachineModel
 from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, source_powers, step_loads
 from twin.rom.tableau import SDIRK2_6, Feedback, Tableau, stages
+
+
+# States of all bodies up to which one product with the inverse of the whole machine takes less time than a solve per
+# body and what joins them: a step of 22 states spends its time in Python, not in arithmetic.
+SMALL = 100
 
 
 def contact_matrix(model: MachineModel, drive: Drive, step: int) -> np.ndarray:
@@ -49,6 +54,11 @@ class _Factored:
     X: np.ndarray  # (n, n_ports_b) S^-1 P
     Q: np.ndarray  # (n_ports_b, n_ports_b)
 
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """S^-1 (n, n) of a dense body."""
+        return self.solve(np.eye(len(self.X)))
+
 
 class CoupledStepper:
     """Steps a MachineModel whose bodies are sparse (full) or dense (rich); keeps the last factors per body."""
@@ -62,6 +72,7 @@ class CoupledStepper:
         n_films, n_theta = len(model.load_model.films), len(model.load_model.theta_names)
         self._film_rows = tuple(body.film_rows for body in model.bodies)
         self._dense = tuple(None if scipy.sparse.issparse(b.E) else DenseTerms(b, n_films) for b in model.bodies)
+        self._small = all(self._dense) and ends[-1] <= SMALL
         # area and first moment of height of the films
         self._area, self._moment = np.zeros(n_theta), np.zeros(n_theta)
         for body in model.bodies:
@@ -225,7 +236,7 @@ class CoupledStepper:
             gamma = dense(np, self._contacts, contacts.at(step))
             forcing = np.concatenate(self.forcing(loads))
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
-            solve = partial(self._solve_twice, factors, self.across(factors, gamma), rest)
+            solve = partial(self._solve_twice, self._whole(factors, self.across(factors, gamma)), rest)
             capacity = partial(self._capacity, factors)
             after = before = np.concatenate(x)
             own, seen = np.zeros_like(before), np.zeros_like(before)  # means over the step
@@ -251,21 +262,34 @@ class CoupledStepper:
         parts = zip(factors, self._parts(x), strict=True)
         return np.concatenate([factor.rate * self._stored(b, xb) for b, (factor, xb) in enumerate(parts)])
 
+    def _whole(self, factors: list[_Factored], across: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """The solution (N,) of all bodies in contact for a right-hand side (N,)."""
+        if not self._small:
+            return lambda right: np.concatenate(self.solve(self._parts(right), factors, across))
+        N = self._rows[-1].stop
+        inverse, X, Y = np.zeros((N, N)), np.zeros((N, len(across))), np.zeros((len(across), N))
+        for body, f, own in zip(self.model.bodies, factors, self._rows, strict=True):
+            ports = list(body.ports)
+            inverse[own, own] = f.inverse
+            X[own, ports], Y[ports, own] = f.X, body.port_rows @ f.inverse
+        inverse -= X @ (across @ Y)
+        return lambda right: inverse @ right
+
     def _solve_twice(
         self,
-        factors: list[_Factored],
-        across: np.ndarray,
+        whole: Callable[[np.ndarray], np.ndarray],
         rest: Sequence[Callable[[np.ndarray], np.ndarray] | None],
         right: np.ndarray,
         near: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """The solution (N,), and the state at which it took what the factors leave out: `near`, then what that gave."""
-        known, seen = self._parts(right), near
-        for _ in range(1 if all(r is None for r in rest) else 2):
+        if all(r is None for r in rest):
+            return whole(right), near
+        seen = near
+        for _ in range(2):
             seen = near
-            parts = zip(known, rest, self._parts(seen), strict=True)
-            rhs = [k if r is None else k - r(s) for k, r, s in parts]
-            near = np.concatenate(self.solve(rhs, factors, across))
+            parts = zip(rest, self._parts(seen), strict=True)
+            near = whole(right - np.concatenate([np.zeros_like(s) if r is None else r(s) for r, s in parts]))
         return near, seen
 
     def _stored(self, b: int, x: np.ndarray) -> np.ndarray:

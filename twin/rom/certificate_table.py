@@ -14,7 +14,7 @@ def table(figures: Mapping[str, Any]) -> list[str]:
     """Lines: per sensor and TCP component the parts of its error in the case, those that count and their sum first.
 
     Then what does not count (the mesh), and error and range as drawn. Of the TCP the worst pose or position of each
-    figure, so that a sum may be less than its parts. Artefacts of before 0.7 have no parts.
+    figure, so that a sum may be less than its parts; none where nothing moves it. Artefacts of before 0.7 have no parts.
     """
     parts = sorted(figures.get("parts", ()), key=lambda part: not part["counts"])
     counted = [part["name"] for part in parts if part["counts"]]
@@ -29,7 +29,7 @@ def table(figures: Mapping[str, Any]) -> list[str]:
     together = _components(figures, "displacement_error_in_case", "displacement_error_at_positions_in_case")
     drawn = _components(figures, "displacement_error", "displacement_error_at_positions")
     moved = _components(figures, "displacement_range")
-    for k, component in enumerate("xyz"):
+    for k, component in enumerate("xyz" if moved.any() else ""):
         own = [np.asarray(part["displacement_error_in_case"])[k] for part in parts]
         numbers = [*_around(own, together[k], len(counted)), drawn[k], moved[k]]
         lines.append(_line(f"TCP {component} [um]", [1e6 * number for number in numbers], 3))
