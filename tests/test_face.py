@@ -89,6 +89,7 @@ def test_objects_and_paths_give_the_same(model, result, tmp_path):
     assert (tmp_path / "out" / "result.h5").exists()
 
 
+@pytest.mark.long
 def test_a_saved_model_is_the_file_that_the_command_writes(tmp_path):
     assert command(["build", str(SPINDLE), "-o", str(tmp_path / "command.h5")]) == 0
     built = twin.read(tmp_path / "command.h5")

@@ -67,6 +67,7 @@ def test_writes_the_artefact_the_report_and_the_description(folder, calibrated, 
     assert max(abs(row["pull"]) for row in again["parameters"] if row["learned"] > 0.9) < 0.5
 
 
+@pytest.mark.long
 def test_a_calibrated_artefact_is_verified_against_its_own_description(calibrated, capsys):
     assert twin(["verify", str(calibrated)]) == 0  # a lumped machine's artefact is exact
     assert "holds_for" not in read_artefact(calibrated).certificate

@@ -70,6 +70,7 @@ def test_radiating_fin(tmp_path: Path):
     judge(Case("radiating fin, steady", source, "T at 3 places"), exact, full, reduced, base - AIR)
 
 
+@pytest.mark.long
 def test_fin_in_free_convection(tmp_path: Path):
     def flux(T: np.ndarray) -> np.ndarray:
         return np.asarray(free_horizontal_up_incropera(T, AIR, PATCH)) * (T - AIR)

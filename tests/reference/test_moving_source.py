@@ -130,6 +130,7 @@ def both_models(folder: Path, time: np.ndarray, x: np.ndarray, steps: Steps) -> 
     return both.full.time[1:], *(np.column_stack([m.temperature[f"s{i}"][1:] for i in range(len(AT))]) for m in models)
 
 
+@pytest.mark.long
 def test_nut_moves_once_along_a_bar(tmp_path: Path):
     # in steps of a quarter of a minute: within a step the heat is spread evenly over the way of the nut
     duration, pad = 7200.0, 3.0**0.5 * ROD.length / SEGMENTS

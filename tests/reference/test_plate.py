@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.reference import described as d
 from tests.reference.models import Steps, run_both
@@ -53,6 +54,7 @@ def series(point: tuple[float, float, float], time: np.ndarray, across: int = 20
     return np.asarray(AIR + weight.sum() - decay)
 
 
+@pytest.mark.long
 def test_plate_in_the_steps_of_the_runtime(tmp_path: Path):
     text = (
         d.head("plate", AIR)

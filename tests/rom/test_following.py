@@ -121,6 +121,7 @@ def test_the_mean_over_a_step_is_of_coefficients_and_not_of_speeds():
     assert abs(at_mean / exact - 1.0) > 0.05
 
 
+@pytest.mark.long
 def test_one_step_of_lag_is_of_first_order_and_small_beside_the_implicit_solution():
     """Cooling plate with free convection and radiation: lagged coefficients, fully implicit ones, the exact."""
     model = plate([Film("plate", PLATE, 0, 1.0, 50.0, emissivity=0.9)])

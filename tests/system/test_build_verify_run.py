@@ -25,6 +25,7 @@ from twin.rom.artefact import read_artefact
 from twin.run.replay import replay_drive
 
 
+@pytest.mark.long
 def test_verify_passes_and_stores_the_certificate(slide_artefact, tmp_path):
     path = tmp_path / "slide.h5"
     shutil.copy(slide_artefact, path)
@@ -114,6 +115,7 @@ def test_runtime_equals_the_offline_stepper_on_the_same_model(slide_artefact):
     assert np.max(result.balance_error) < 1e-8
 
 
+@pytest.mark.long
 def test_simulated_truth_and_reduced_run_agree(slide_artefact, tmp_path):
     truth, out = tmp_path / "truth", tmp_path / "out"
     loads = SLIDE / "runs" / "short"
@@ -134,6 +136,7 @@ def test_simulated_truth_and_reduced_run_agree(slide_artefact, tmp_path):
     assert summary["heat"]["max_balance_error"] < 1e-8
 
 
+@pytest.mark.long
 def test_noise_is_added_as_asked_and_repeats(tmp_path):
     arguments = ["simulate", str(SLIDE), str(SLIDE / "runs" / "short"), "--noise-temperature", "0.1 K"]
     for name, seed in (("a", "3"), ("b", "3"), ("c", "4"), ("clean", None)):

@@ -60,6 +60,7 @@ def test_check_finds_nothing_wrong(capsys):
     assert capsys.readouterr().out.count("no problems found") == 2
 
 
+@pytest.mark.long
 def test_verify_speaks_of_temperatures_alone(artefact, tmp_path, capsys):
     path = Path(shutil.copy(artefact, tmp_path))
     assert run(["verify", str(path)]) == 0
@@ -70,6 +71,7 @@ def test_verify_speaks_of_temperatures_alone(artefact, tmp_path, capsys):
     assert read_artefact(path).certificate["passed"]
 
 
+@pytest.mark.long
 def test_temperatures_are_within_20_mk_of_the_converged_ones_everywhere(tmp_path):
     """On all the surface, in each of the first 120 minutes, against elements and steps half and a quarter as large."""
     path = tmp_path / "plate.h5"
@@ -118,6 +120,7 @@ def test_run_writes_no_displacements(result, artefact, tmp_path, capsys):
     assert run(["info", str(artefact)]) == 0
 
 
+@pytest.mark.long
 def test_verbs_that_need_a_tcp_say_so(artefact, result, measured, tmp_path, capsys):
     for command in (
         ["correction", str(artefact), str(result), "-o", str(tmp_path / "c.json")],
@@ -131,6 +134,7 @@ def test_verbs_that_need_a_tcp_say_so(artefact, result, measured, tmp_path, caps
         assert "describe its TCP" in told
 
 
+@pytest.mark.long
 def test_measurements_hold_temperatures_alone_and_correct_the_film(artefact, measured, tmp_path, capsys):
     log = read_run(measured)
     assert log.tcp is None
