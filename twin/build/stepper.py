@@ -33,7 +33,6 @@ from twin.rom.model import MachineModel
 from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, source_powers, step_loads
 from twin.rom.tableau import SDIRK2_6, Feedback, Tableau, stages
 
-
 # States of all bodies up to which one product with the inverse of the whole machine takes less time than a solve per
 # body and what joins them: a step of 22 states spends its time in Python, not in arithmetic.
 SMALL = 100

@@ -13,8 +13,8 @@ _NAME, _COLUMN = 26, 12  # characters
 def table(figures: Mapping[str, Any]) -> list[str]:
     """Lines: per sensor and TCP component the parts of its error in the case, those that count and their sum first.
 
-    Then what does not count (the mesh), and error and range as drawn. Of the TCP the worst pose or position of each
-    figure, so that a sum may be less than its parts; none where nothing moves it. Artefacts of before 0.7 have no parts.
+    Then what does not count (the mesh), and error and range as drawn. Of the TCP, where anything moves it, the worst
+    pose or position of each figure, so that a sum may be less than its parts. Artefacts of before 0.7 have no parts.
     """
     parts = sorted(figures.get("parts", ()), key=lambda part: not part["counts"])
     counted = [part["name"] for part in parts if part["counts"]]
