@@ -1,4 +1,4 @@
-"""Experiments A and B as they are: the runtime's model against the full model at every minute of 12 h."""
+"""Experiments A and B as they are: the runtime's model in its steps against the full model in much finer ones, 12 h."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from twin.build.volumetric import volumetric_shares
 from twin.logs.read import read_run
 from twin.logs.signals import signal_values
 from twin.progress import bar
-from twin.rom.drive import evaluate
+from twin.rom.drive import evaluate, split
+
+SUBSTEPS = 1  # with which `twin build` certifies the machine
+# Steps of the full model in a minute. In experiment A, 8 and 16 of the reduced one differ by 0.0001 K.
+FINER = 4
 
 
 def main() -> None:
@@ -26,7 +30,8 @@ def _case(name: str) -> None:
     start = run.initial_temperature if run.initial_temperature is not None else float(drive.environment[0, 0])
     a, b = CoupledStepper(reference), CoupledStepper(candidate)
     T, T_error, u, u_error, balance = [], [], [], [], 0.0
-    steps = zip(a.run(drive, a.uniform(start), 4), b.run(drive, b.uniform(start), 4), strict=True)
+    every_minute = (made for made in a.run(split(drive, FINER), a.uniform(start)) if (made[0] + 1) % FINER == 0)
+    steps = zip(every_minute, b.run(drive, b.uniform(start), SUBSTEPS), strict=True)
     with bar(f"full model, {name}", drive.n_steps) as advance:
         for (_, xa, heat), (_, xb, _) in steps:
             balance = max(balance, heat.balance_error)

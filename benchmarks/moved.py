@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.five_axis import compact, machine, rich
-from twin.build.certificate import compare
+from twin.build.comparison import compare
 from twin.build.compress import Tolerances, galerkin, trajectories
 from twin.build.pipeline import VERIFY_SEED, BuildOptions, training_scenarios
 from twin.build.scenario import draw
@@ -19,7 +19,7 @@ def main() -> None:
     one_pose = galerkin(rich(), trajectories(rich(), still), options.states, unit)
     moving = [draw(load, VERIFY_SEED + i, options.hours, options.step) for i in range(6)]
     for label, model in (("trained at one pose", one_pose), ("ours", compact())):
-        result = compare(rich(), model, moving, options.substeps)
+        result = compare(rich(), model, moving)
         T, u = result.temperature_error.max(), result.displacement_error.max()
         share = (result.temperature_error.max(axis=0) / result.temperature_range).max()
         print(

@@ -141,6 +141,7 @@ def test_segments_may_start_anew(artefact):
     assert figure(wrong, "scored", "glued", "first", "T02", MODEL).rms < 0.01
 
 
+@pytest.mark.long
 def test_command_writes_every_figure(path, folders, tmp_path, capsys):
     out = tmp_path / "out"
     arguments = [str(path), folders[0], "--sealed", folders[1], "--train", folders[2], "-o", str(out)]

@@ -108,7 +108,7 @@ def test_tangent_is_the_derivative_of_the_runtime(artefact):
     for step in at:
         state, dz = tangent_step(prepared.layout, prepared.system, acts, state, u, dz, du, step)
     C = np.asarray(prepared.system.C)
-    nominal = replay(artefact, short).temperature[-1, : len(C)]
+    nominal = replay(artefact, short, substeps=4).temperature[-1, : len(C)]
     np.testing.assert_allclose(20.0 + C @ np.asarray(state.z), nominal, atol=1e-9)
     for kind in KINDS:
         k = [p.kind for p in chosen].index(kind)
@@ -117,7 +117,7 @@ def test_tangent_is_the_derivative_of_the_runtime(artefact):
         for sign in (1.0, -1.0):
             value = p.nominal * np.exp(sign * e) if p.scale == "log" else p.nominal + sign * e
             other = dataclasses.replace(artefact, model=with_values(model, chosen, {p.path: value}))
-            ends.append(replay(other, short).temperature[-1, : len(C)])
+            ends.append(replay(other, short, substeps=4).temperature[-1, : len(C)])
         central = (ends[0] - ends[1]) / (2.0 * e)
         assert np.abs(central).max() > 0.0
         np.testing.assert_allclose(C @ np.asarray(dz)[:, k], central, atol=2e-4 * np.abs(central).max() + 1e-9)

@@ -189,6 +189,7 @@ def test_a_terminal_gets_at_most_ten_lines_with_the_verdict(verdict):
     assert any("corrects the declaration" in line for line in lines) == (verdict == "signal")
 
 
+@pytest.mark.long
 def test_equal_diagnoses_give_equal_pages(written):
     assert page(diagnosis("sensor")) == (written("sensor") / "index.html").read_text(encoding="utf-8")
 
@@ -353,6 +354,7 @@ def search_of_a_strong_source():
     return detector, source, found
 
 
+@pytest.mark.long
 def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
     """As `twin diagnose` finds it: in the fit it stands at its declared value, and the size of the cause is told."""
     detector, source, found = search_of_a_strong_source()
@@ -421,6 +423,7 @@ def test_a_clock_that_is_off_changes_no_description():
     assert "The model of the machine is left as it is." in lines
 
 
+@pytest.mark.long
 def test_every_sealed_run_is_distinguished():
     d = replace(diagnosis("named"), ranked=(), whiteness=(), pulls=(), nulls={})
     assert "sealed run</th>" not in gain_table(d)

@@ -89,6 +89,7 @@ def test_a_heat_source_is_named_at_its_place_with_its_size(folder, detector):
     assert high - low < 7.5
 
 
+@pytest.mark.long
 def test_a_joint_that_lost_its_preload_is_said_to_be_out_of_tolerance(folder, detector):
     """Its conductance is a declared parameter: a fiftieth of it is no missing effect, but a number that is wrong."""
     verdict, (cause,) = said(detector, in_machine(folder, "joint"))

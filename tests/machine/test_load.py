@@ -151,7 +151,7 @@ def test_empty_file_lists_what_is_needed_once_each(tmp_path):
     (tmp_path / "machine.toml").write_text("")
     problems = problems_of(tmp_path)
     assert [p.what for p in problems] == [
-        f"missing key '{k}'" for k in ("machine", "materials", "parts", "environment", "films", "tcp", "supports")
+        f"missing key '{k}'" for k in ("machine", "materials", "parts", "environment", "films")
     ]
 
 

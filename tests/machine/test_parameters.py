@@ -73,7 +73,7 @@ def test_defaults_are_those_of_the_reference_page():
 def test_nominal_values_are_those_of_the_description_and_lie_inside_their_bounds(path):
     machine = load_machine(path)
     found = parameters(machine)
-    assert len(found) > 20
+    assert len(found) > (20 if machine.has_tcp else 2)  # a plate: its heater, its film, its heat capacity
     assert len({p.path for p in found}) == len(found)
     for p in found:
         value = machine

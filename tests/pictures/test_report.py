@@ -29,6 +29,8 @@ def test_report_draws_every_picture_and_a_page_that_shows_them(slide_artefact, f
         assert picture[..., :3].std() > 0.02, f"{name} is blank"
         assert f'src="{name}.png"' in page
         assert f"{name}.png" in printed
+    for output in (*read_artefact(slide_artefact).model.sensors, "TCP z"):
+        assert len([line for line in page.splitlines() if line.strip().startswith(f"{output} [")]) == 1
 
 
 @pytest.mark.long

@@ -14,6 +14,7 @@ from twin.machine.parameters import parameters
 from twin.rom.apply import member_field, member_mean, with_values
 from twin.rom.drive import evaluate
 from twin.rom.rescale import rescaled
+from twin.rom.tcp import tcp_rows
 
 
 def everything(machine, seed: int) -> dict[str, float]:
@@ -34,6 +35,9 @@ def test_as_the_description_with_these_values(seed):
         assert abs(a.E - b.E).max() < 1e-9 * abs(b.E).max()
         np.testing.assert_allclose(a.energy, b.energy, rtol=1e-12)
         np.testing.assert_allclose(a.G, b.G, rtol=1e-9, atol=1e-12 * abs(b.G).max(initial=1e-30))
+    between = np.random.default_rng(seed).uniform(-0.1, 0.3, (5, len(got.pose_axes)))
+    for a, b in zip(tcp_rows(got, between), tcp_rows(wanted, between), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12 * abs(b).max(initial=1e-30))
     for kind in ("sources", "films", "joints", "pairs", "environments"):
         for a, b in zip(getattr(got.load_model, kind), getattr(wanted.load_model, kind), strict=True):
             for name in {"gain", "conductance", "offset"} & set(vars(a)):
@@ -55,6 +59,7 @@ def test_a_projection_of_the_other_model_is_the_projection_with_other_values():
         alone = with_values(replace(full, bodies=(small,)), parameters(machine), values).bodies[0]
         np.testing.assert_allclose(alone.E, V.T @ (other.bodies[k].E @ V), atol=1e-12)
         np.testing.assert_allclose(alone.G, other.bodies[k].G @ V, atol=1e-18)
+        np.testing.assert_allclose(alone.W, other.bodies[k].W @ V, atol=1e-12)
 
 
 def test_members_share_out_the_body():

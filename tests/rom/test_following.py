@@ -121,6 +121,7 @@ def test_the_mean_over_a_step_is_of_coefficients_and_not_of_speeds():
     assert abs(at_mean / exact - 1.0) > 0.05
 
 
+@pytest.mark.long
 def test_one_step_of_lag_is_of_first_order_and_small_beside_the_implicit_solution():
     """Cooling plate with free convection and radiation: lagged coefficients, fully implicit ones, the exact."""
     model = plate([Film("plate", PLATE, 0, 1.0, 50.0, emissivity=0.9)])
@@ -142,7 +143,7 @@ def test_one_step_of_lag_is_of_first_order_and_small_beside_the_implicit_solutio
     ratios = np.abs(np.diff(lagged))  # free of the tables' own error
     assert ratios[0] / ratios[1] == pytest.approx(2.0, rel=0.2)
     with_substeps = history(model, 2.0, 60.0, 60.0, substeps=4)[0][-1, 0] - exact
-    assert abs(with_substeps) < abs(lagged[1])
+    assert with_substeps == pytest.approx(lagged[1], rel=0.1)  # films are read once per step, whatever the substeps
 
 
 def test_a_winding_that_warms_makes_more_heat():

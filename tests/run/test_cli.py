@@ -82,8 +82,8 @@ def test_resume_of_a_finished_run_and_equal_files(inputs, output, tmp_path):
 
 
 def test_flags_are_told(inputs, tmp_path):
-    told = call(run, *inputs, "-o", str(tmp_path / "r"), "--dt", "30 s")
-    assert "substep shorter than the certified 15 s: 121 steps" in told.output
+    told = call(run, *inputs, "-o", str(tmp_path / "r"), "--dt", "10 s")
+    assert "substep shorter than the certified 15 s: 361 steps" in told.output
 
 
 def test_info_tells_states_poses_and_parameters(inputs):

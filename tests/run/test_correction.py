@@ -3,12 +3,14 @@
 import itertools
 import json
 import shutil
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from tests.calibrate import lumped_case
 from twin.cli.correction import command
 from twin.cli.main import run
 from twin.errors import ModelError, TwinError
@@ -16,6 +18,7 @@ from twin.machine.bodies import bodies_of
 from twin.machine.kinematics import direction, linear_axes, moved_bodies
 from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact
+from twin.rom.tcp import by_body, tcp_at, tcp_rows
 from twin.run.correction import PoseErrors, corrected_error, default_degrees, fit_correction, quality
 from twin.run.correction_axes import _tool_sign, offset_matrix, uncorrectable
 from twin.run.correction_file import read_correction, read_pose_errors, write_correction
@@ -334,3 +337,17 @@ def test_other_files_are_not_replaced(content, tmp_path, capsys):
     assert "not replaced" in told
     assert "Traceback" not in told
     assert path.read_bytes() == content
+
+
+def test_errors_between_the_poses_are_those_of_the_model_where_it_has_its_structure():
+    model = lumped_case.artefact().model
+    state = 5.0 * np.random.default_rng(2).normal(size=model.n)
+    at_poses = tcp_at(model, by_body(model, state), model.poses)
+    errors = PoseErrors(model.pose_axes, model.pose_grid, model.poses, at_poses, model, state)
+    position = np.random.default_rng(3).uniform(model.poses.min(), model.poses.max(), (7, 1))
+    wanted = np.array([sum(G[k] @ x for G, x in zip(tcp_rows(model, position), by_body(model, state), strict=True))
+                       for k in range(7)])  # fmt: skip
+    np.testing.assert_allclose(errors.at(position), wanted, atol=1e-9 * np.abs(wanted).max())
+    interpolated = replace(errors, model=None).at(position)
+    assert np.abs(interpolated - wanted).max() > 1e-3 * np.abs(wanted).max()
+    np.testing.assert_allclose(errors.at(model.poses), at_poses, rtol=1e-12, atol=1e-15)

@@ -8,13 +8,20 @@ import synthetic
 import synthetic_run
 from dense_reference import Dense
 
+from tests.calibrate import lumped_case
+from twin.build.full_model import assemble
 from twin.errors import LogError, TwinError
+from twin.logs.read import read_run
 from twin.logs.run import Run, Table
+from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact
 from twin.rom.drive import evaluate
+from twin.rom.poses import pose_weights
+from twin.rom.tcp import by_body
 from twin.run import replay as module
 from twin.run.checkpoint import CheckpointFolder
 from twin.run.replay import replay
+from twin.run.results import summary
 
 MODEL = synthetic.machine()
 RUN = synthetic_run.run(MODEL)
@@ -34,7 +41,7 @@ def test_outputs_are_those_of_the_dense_model(result):
     time, signals = synthetic.loads(MODEL.load_model, 3.0)
     drive = evaluate(MODEL.load_model, time, signals, 60.0)
     dense = Dense(MODEL, drive)
-    states = dense.euler(dense.uniform(drive.environment[0, 0]), 4)
+    states = dense.runge_kutta(dense.uniform(drive.environment[0, 0]))
     n = len(MODEL.sensors)
     np.testing.assert_allclose(result.temperature[:, :n], dense.temperature(states), rtol=1e-11)
     np.testing.assert_allclose(result.tcp, dense.tcp(states), rtol=1e-9, atol=1e-11 * np.abs(result.tcp).max())
@@ -47,7 +54,31 @@ def test_tcp_at_the_actual_position_is_that_of_the_pose_there(artefact):
     still = {name: np.full_like(v, 0.4) if name.endswith("_position") else v for name, v in RUN.loads.columns.items()}
     result = replay(artefact, dataclasses.replace(RUN, loads=Table(RUN.loads.time, still, RUN.loads.units)))
     (middle,) = np.flatnonzero((MODEL.poses == 0.4).all(axis=1))
-    np.testing.assert_array_equal(result.tcp_actual, result.tcp[:, middle])
+    np.testing.assert_allclose(result.tcp_actual, result.tcp[:, middle], rtol=1e-11, atol=1e-18)
+
+
+def test_tcp_at_the_actual_position_is_exact_where_the_artefact_has_its_structure():
+    a, full = lumped_case.artefact(), assemble(load_machine(lumped_case.FOLDER))
+    (folder,) = [f for f in (lumped_case.FOLDER / "runs").iterdir() if f.is_dir()]
+    result = replay(a, read_run(folder))
+    assert result.exact
+    assert summary(result)["tcp"]["at_actual_position"] == "exact"
+    # the artefact's states are the nodes' temperatures times the square roots of their capacities
+    root = np.concatenate([np.sqrt(b.E.diagonal()) for b in full.thermal.bodies])
+    fields = by_body(full.thermal, result.states / root)
+    at = np.arange(0, len(result.time), 5)
+    wanted = [full.structure.displacement(result.position[n], [f[n] for f in fields]) for n in at]
+    np.testing.assert_allclose(result.tcp_actual[at], wanted, atol=1e-12)
+    between = np.einsum("np,npc->nc", pose_weights(a.model.pose_grid, result.position)[0], result.tcp)
+    assert np.abs(between[at] - wanted).max() > 1e-8
+
+
+def test_old_artefacts_interpolate_and_say_so(result):
+    assert not result.exact
+    assert summary(result)["tcp"]["at_actual_position"] == "interpolated between the poses"
+    weights, _ = pose_weights(MODEL.pose_grid, result.position[:, [result.axes.index(a) for a in MODEL.pose_axes]])
+    between = np.einsum("np,npc->nc", weights, result.tcp)
+    np.testing.assert_allclose(result.tcp_actual, between, rtol=1e-9, atol=1e-16)
 
 
 def test_starts_where_it_is_told(artefact, result):
@@ -132,7 +163,8 @@ def test_flags_of_the_runtime(artefact, result):
         return {name for k, name in enumerate(r.flag_names) if r.flags[:, k].any()}
 
     assert raised(result) == set()
-    assert raised(replay(artefact, RUN, dt=30.0)) == {"substep shorter than the certified 15 s"}
+    assert raised(replay(artefact, RUN, dt=30.0)) == set()
+    assert raised(replay(artefact, RUN, dt=10.0)) == {"substep shorter than the certified 15 s"}
     position = RUN.loads.columns["x_position"] * 0.9 / 0.8
     beyond = raised(replay(artefact, synthetic_run.run(MODEL, x_position=position)))
     assert {"axes.x beyond its stroke", "position outside the pose grid, TCP error of its border"} <= beyond

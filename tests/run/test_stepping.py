@@ -11,6 +11,7 @@ from dense_reference import Dense, gamma
 from twin.rom.contact import station_weights
 from twin.rom.drive import evaluate
 from twin.rom.load_model import EnvironmentWiring
+from twin.rom.tableau import IMPLICIT_EULER, SDIRK2_6
 from twin.run.matrix import system_blocks
 from twin.run.replay import integrate
 from twin.run.stepping import advance, inputs_of
@@ -58,7 +59,7 @@ def test_system_matrix_equals_the_dense_one(model):
         S[offsets[i] : offsets[i + 1], offsets[j] : offsets[j + 1]] = block
     x = np.random.default_rng(0).standard_normal(model.n)
     z = prepared.from_artefact(x)
-    expected = np.linalg.solve(dense.E, dense.A(9) @ x) + 4 / 60.0 * x
+    expected = np.linalg.solve(dense.E, dense.A(9) @ x) + 4 / 60.0 / SDIRK2_6.diagonal * x
     np.testing.assert_allclose(prepared.to_artefact(S @ z), expected, rtol=1e-11, atol=1e-12 * np.abs(expected).max())
 
 
@@ -67,7 +68,7 @@ def test_steps_equal_plain_numpy(model, substeps):
     prepared, dense = prepare(model), Dense(model, DRIVE)
     start = prepared.uniform(23.0)
     steps = integrate(prepared, inputs_of(model.load_model, DRIVE, substeps), start)
-    expected = dense.euler(dense.uniform(23.0), substeps)
+    expected = dense.runge_kutta(dense.uniform(23.0), substeps)
     states = prepared.to_artefact(np.concatenate([start[None], steps.z]))
     for ours, theirs in (
         (dense.temperature(states), dense.temperature(expected)),
@@ -84,7 +85,9 @@ def test_first_order_against_the_exact_exponential():
     for n in (32, 64):
         drive = evaluate(MODEL.load_model, time, signals, 960.0 / n)
         prepared, dense = prepare(MODEL), Dense(MODEL, drive)
-        steps = integrate(prepared, inputs_of(MODEL.load_model, drive, 1), prepared.uniform(15.0))
+        steps = integrate(
+            prepared, inputs_of(MODEL.load_model, drive, 1, tableau=IMPLICIT_EULER), prepared.uniform(15.0)
+        )
         exact = dense.temperature(dense.exact(dense.uniform(15.0)))[1:]
         error = np.abs(dense.temperature(prepared.to_artefact(steps.z)) - exact)
         errors.append(error[n // 32 - 1 :: n // 32].max())
@@ -98,7 +101,8 @@ def test_four_substeps_with_one_factor_are_three_to_four_times_closer():
     exact = dense.temperature(dense.exact(dense.uniform(20.0)))[1:]
 
     def error(substeps):
-        steps = integrate(prepared, inputs_of(MODEL.load_model, drive, substeps), prepared.uniform(20.0))
+        inputs = inputs_of(MODEL.load_model, drive, substeps, tableau=IMPLICIT_EULER)
+        steps = integrate(prepared, inputs, prepared.uniform(20.0))
         return np.abs(dense.temperature(prepared.to_artefact(steps.z)) - exact).max()
 
     assert 3.0 < error(1) / error(4) < 4.1
@@ -171,7 +175,7 @@ def test_bodies_in_any_order_and_without_contacts():
     drive = evaluate(alone.load_model, time, signals, 60.0)
     prepared, dense = prepare(alone), Dense(alone, drive)
     steps = integrate(prepared, inputs_of(alone.load_model, drive, 4, follow=0.0), prepared.uniform(10.0))
-    expected = dense.euler(dense.uniform(10.0), 4)[1:]
+    expected = dense.runge_kutta(dense.uniform(10.0), 4)[1:]
     np.testing.assert_allclose(
         dense.temperature(prepared.to_artefact(steps.z)), dense.temperature(expected), rtol=1e-12
     )

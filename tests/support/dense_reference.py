@@ -6,6 +6,7 @@ import numpy as np
 
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
+from twin.rom.tableau import SDIRK2_6, Tableau
 
 
 def gamma(model: MachineModel, drive: Drive, step: int) -> np.ndarray:
@@ -79,6 +80,21 @@ class Dense:
             S, f = rate * self.E + self.A(step), self.f(step)
             for _ in range(substeps):
                 x = np.linalg.solve(S, rate * self.E @ x + f)
+            states.append(x)
+        return np.array(states)
+
+    def runge_kutta(self, x: np.ndarray, substeps: int = 1, tableau: Tableau = SDIRK2_6) -> np.ndarray:
+        """States (n_steps + 1, N) by rates k_i = E^-1 (f - A (x + h sum_j a_ij k_j)) of the stages."""
+        states = [x]
+        for step in range(self.drive.n_steps):
+            h = (self.drive.time[step + 1] - self.drive.time[step]) / substeps
+            A, f = self.A(step), self.f(step)
+            for _ in range(substeps):
+                rates: list[np.ndarray] = []
+                for row in tableau.rows:
+                    known = x + h * sum((a * k for a, k in zip(row, rates, strict=False)), np.zeros_like(x))
+                    rates.append(np.linalg.solve(self.E + h * row[-1] * A, f - A @ known))
+                x = x + h * sum((b * k for b, k in zip(tableau.weights, rates, strict=True)), np.zeros_like(x))
             states.append(x)
         return np.array(states)
 

@@ -14,7 +14,12 @@ from twin.rom.model import MachineModel
 
 
 def artefact(path: Path, model: MachineModel) -> Path:
-    write_artefact(path, model, certificate={"step": 60.0, "confidence": 0.95}, provenance={"command": "synthetic"})
+    write_artefact(
+        path,
+        model,
+        certificate={"step": 60.0, "substeps": 1, "finest_step": 15.0, "confidence": 0.95},
+        provenance={"command": "synthetic"},
+    )
     return path
 
 

@@ -25,15 +25,21 @@ from twin.rom.artefact import read_artefact
 from twin.run.replay import replay_drive
 
 
+@pytest.mark.long
 def test_verify_passes_and_stores_the_certificate(slide_artefact, tmp_path):
     path = tmp_path / "slide.h5"
     shutil.copy(slide_artefact, path)
-    assert read_artefact(path).certificate["rich_temperature_error"] is None
+    assert [p["name"] for p in read_artefact(path).certificate["parts"]] == ["reduction", "time step", "poses"]
     assert run(["verify", str(path)]) == 0
     stored = read_artefact(path).certificate
     assert len(stored["scenarios"]) == 19
     assert len(stored["full_scenarios"]) == 2
-    assert 0 < stored["rich_temperature_error"] < stored["limit_temperature"] / 2
+    parts = {p["name"]: np.max(p["temperature_error_in_case"]) for p in stored["parts"]}
+    assert 0 < parts["rich basis"] < stored["limit_temperature"] / 2
+    assert 0 < parts["time step"] < stored["limit_temperature"] / 2
+    assert np.shape(stored["displacement_error_at_positions"]) == (20, 3)
+    assert stored["step_halved"] < 0.2  # the reference's own step does not count
+    assert np.max(stored["temperature_error_in_case"]) <= sum(parts.values())
     assert np.max(stored["temperature_error_in_case"]) <= stored["limit_temperature"]
     assert stored["worst_relative"] < 0.01
 
@@ -109,6 +115,7 @@ def test_runtime_equals_the_offline_stepper_on_the_same_model(slide_artefact):
     assert np.max(result.balance_error) < 1e-8
 
 
+@pytest.mark.long
 def test_simulated_truth_and_reduced_run_agree(slide_artefact, tmp_path):
     truth, out = tmp_path / "truth", tmp_path / "out"
     loads = SLIDE / "runs" / "short"
@@ -129,6 +136,7 @@ def test_simulated_truth_and_reduced_run_agree(slide_artefact, tmp_path):
     assert summary["heat"]["max_balance_error"] < 1e-8
 
 
+@pytest.mark.long
 def test_noise_is_added_as_asked_and_repeats(tmp_path):
     arguments = ["simulate", str(SLIDE), str(SLIDE / "runs" / "short"), "--noise-temperature", "0.1 K"]
     for name, seed in (("a", "3"), ("b", "3"), ("c", "4"), ("clean", None)):

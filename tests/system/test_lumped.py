@@ -53,6 +53,7 @@ def test_check_tells_what_it_consists_of(capsys):
     assert run(["check", str(WARM_UP)]) == 0
 
 
+@pytest.mark.long
 def test_the_compact_model_is_the_full_one_and_the_certificate_says_so(artefact, tmp_path, capsys):
     path = tmp_path / "spindle.h5"
     shutil.copy(artefact, path)
@@ -61,11 +62,14 @@ def test_the_compact_model_is_the_full_one_and_the_certificate_says_so(artefact,
     assert stored.model.n == 22
     assert len(stored.certificate["scenarios"]) == 19
     assert np.max(stored.certificate["temperature_range"]) > 10.0
-    assert np.max(stored.certificate["temperature_error"]) < 1e-9
-    assert 0 < stored.certificate["rich_temperature_error"] < 1e-9
+    parts = {p["name"]: np.max(p["temperature_error_in_case"]) for p in stored.certificate["parts"]}
+    assert parts["reduction"] < 1e-9
+    assert 0 < parts["rich basis"] < 1e-9
+    assert 1e-6 < parts["time step"] <= np.max(stored.certificate["temperature_error_in_case"]) < 0.02
     assert "passed" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_too_few_states_reduce_it_and_are_certified_as_such(tmp_path):
     path = tmp_path / "small.h5"
     assert not build_artefact(SPINDLE, path, replace(QUICK, states=8)).passed
@@ -87,7 +91,9 @@ def test_info_gives_totals_their_unit(artefact, capsys):
 
 def test_run_agrees_with_the_full_model_off_the_grid_of_poses(artefact, result, tmp_path):
     truth = tmp_path / "truth"
-    assert run(["simulate", str(SPINDLE), str(WARM_UP), "-o", str(truth), "--tcp-every", "5 min"]) == 0
+    substeps = read_artefact(artefact).certificate["substeps"]
+    steps = ("--tcp-every", "5 min", "--substeps", str(substeps))
+    assert run(["simulate", str(SPINDLE), str(WARM_UP), "-o", str(truth), *steps]) == 0
     simulated = read_run(truth)
     with h5py.File(result / "result.h5") as f:
         names = [n.decode() for n in f["sensor"][:]]
@@ -173,7 +179,7 @@ def test_a_machine_without_axes_and_tcp(tmp_path, capsys):
     log = read_run(folder)
     drive = evaluate(full.load_model, log.loads.time, signal_values(log, full.load_model.signals), 60.0)
     stepper = CoupledStepper(full)
-    (*_, (_, x, _)) = stepper.run(drive, stepper.uniform(20.0), 4)
+    (*_, (_, x, _)) = stepper.run(drive, stepper.uniform(20.0), read_artefact(path).certificate["substeps"])
     with h5py.File(out / "result.h5") as f:
         assert f["temperature"][-1, 0] == pytest.approx(sensor_temperatures(full, x)[0], abs=1e-9)
         assert f["temperature"][-1, 0] > 25.0

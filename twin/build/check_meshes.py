@@ -11,6 +11,7 @@ from twin.build.encoder import scale_gaps
 from twin.build.interface import interface
 from twin.build.lumped import lumped_ports
 from twin.build.lumped_body import count
+from twin.build.mechanism import mechanisms
 from twin.build.mesh import BodyMesh, PartMesh, body_mesh, load_part_mesh
 from twin.build.ports import ContactPorts, contact_ports
 from twin.build.surface import Patch, patch
@@ -56,8 +57,11 @@ def check_meshes(machine: Machine) -> MeshReport:
         problems += surfaces
         if not surfaces:
             problems += [*_fixed(machine, bodies, meshes), *_moving(machine, parts, meshes), *_scales(machine, meshes)]
-        problems += [*_grounded(machine, bodies), *_driven(machine), *_sensors(machine, parts)]
-        problems += [] if surfaces else _tcp(machine, bodies, parts)
+        problems += _sensors(machine, parts)
+        if machine.has_tcp:
+            problems += [*_grounded(machine, bodies), *_driven(machine)]
+            problems += [] if surfaces else _tcp(machine, bodies, parts)
+            problems += [] if any(not p.warning for p in problems) else mechanisms(machine, meshes)
     return MeshReport(
         problems=tuple(dict.fromkeys(problems)),
         parts=len(machine.parts),
@@ -146,8 +150,9 @@ def _other_uses(machine: Machine) -> Iterator[tuple[str, str]]:
         yield f"scales.{name}.surface", added.surface
     for name, support in machine.supports.items():
         yield f"supports.{name}.surface", support.surface
-    yield "tcp.tool.surface", machine.tcp.tool.surface
-    yield "tcp.work.surface", machine.tcp.work.surface
+    if machine.has_tcp:
+        yield "tcp.tool.surface", machine.tcp.tool.surface
+        yield "tcp.work.surface", machine.tcp.work.surface
 
 
 def _fixed(machine: Machine, bodies: tuple[Body, ...], meshes: tuple[BodyMesh, ...]) -> Iterator[Problem]:
@@ -156,7 +161,7 @@ def _fixed(machine: Machine, bodies: tuple[Body, ...], meshes: tuple[BodyMesh, .
             continue
         body = body_of(bodies, split_surface(contact.surfaces[0])[0])
         try:
-            interface(meshes[bodies.index(body)], *contact.surfaces, where=f"contacts.{name}")
+            interface(meshes[bodies.index(body)], *contact.surfaces, where=f"contacts.{name}", gap=contact.gap)
         except TwinError as e:
             yield from e.problems
 

@@ -16,9 +16,10 @@ from twin.build.elastic_ports import PortTable
 from twin.build.elasticity import Elasticity, body_elasticity
 from twin.build.factorize import factorize
 from twin.build.mesh import BodyMesh
-from twin.build.springs import Positions, SpringSystem, spring_system
+from twin.build.springs import spring_system
 from twin.machine.bodies import bodies_of
 from twin.machine.description import Machine
+from twin.rom.springs import Positions, SpringSystem
 
 
 @dataclass(frozen=True)

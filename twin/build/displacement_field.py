@@ -10,10 +10,11 @@ from twin.build.elastic_ports import PortTable, rigid_modes
 from twin.build.elasticity import Elasticity, body_elasticity
 from twin.build.flexibility import SupportedBody
 from twin.build.mesh import BodyMesh
-from twin.build.springs import Positions, spring_system
+from twin.build.springs import spring_system
 from twin.build.structure import Structure
 from twin.machine.bodies import bodies_of
 from twin.machine.description import Machine
+from twin.rom.springs import Positions
 
 
 class DisplacementField:

@@ -17,50 +17,9 @@ from twin.build.mesh import BodyMesh, PartMesh
 from twin.build.surface import Patch, facet_nodes, patch, segments
 from twin.errors import DescriptionError
 from twin.machine.bodies import split_surface
+from twin.rom.elastic_ports import AxialPort, MeanPort, RailPort, RigidPort
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
-
-
-@dataclass(frozen=True)
-class MeanPort:
-    """Three columns: the mean displacement [m] of a patch."""
-
-    body: int
-    first: int  # column within the body's ports
-    centroid: np.ndarray  # (3,) m, mesh coordinates
-
-
-@dataclass(frozen=True)
-class RigidPort:
-    """Six columns: mean displacement [m] and rotation vector [rad] of a patch."""
-
-    body: int
-    first: int
-    centroid: np.ndarray  # (3,) m, mesh coordinates
-    normal: np.ndarray  # (3,) area-mean outward normal: of length 1 for a plane patch
-
-    def motion_at(self, point: np.ndarray) -> np.ndarray:
-        """(3, 6): displacement at `point` (3,) [m, mesh coordinates] of the patch's rigid motion."""
-        return np.hstack([np.eye(3), -cross_matrix(point - self.centroid)])
-
-
-@dataclass(frozen=True)
-class RailPort:
-    """Three columns per segment, in order along the axis."""
-
-    body: int
-    first: int
-    centroids: np.ndarray  # (n_segments, 3) m, mesh coordinates
-    stations: np.ndarray  # (n_segments,) m along the axis
-
-
-@dataclass(frozen=True)
-class AxialPort:
-    """One column: the displacement [m] along a direction at a point of a surface's centre line."""
-
-    body: int
-    first: int
-    point: np.ndarray  # (3,) m, mesh coordinates
 
 
 @dataclass
@@ -201,11 +160,6 @@ def fitted_slope(p: Patch, direction: np.ndarray) -> np.ndarray:
     """
     towards = np.linalg.pinv(p.second_moment, rcond=1e-9, hermitian=True) @ direction
     return towards @ p.moment
-
-
-def cross_matrix(r: np.ndarray) -> np.ndarray:
-    """[r]x with [r]x w = r x w."""
-    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
 
 
 def rigid_modes(points: np.ndarray) -> np.ndarray:

@@ -65,6 +65,7 @@ def solid_elasticity(mesh: Mesh, material: Material) -> Elasticity:
 def body_elasticity(machine: Machine, body: BodyMesh) -> Elasticity:
     """The matrices of a body: its solids, glued at their fixed joints by penalty (meshes need not match).
 
+    Gaps pass no force: `twin.machine.references` sees that other joints hold the body together.
     Raises DescriptionError where two joined surfaces do not touch or lie apart.
     """
     solids = [solid_elasticity(p.mesh, machine.materials[machine.parts[p.name].material]) for p in body.parts]
@@ -72,7 +73,7 @@ def body_elasticity(machine: Machine, body: BodyMesh) -> Elasticity:
     KT = csr_array(block_diag([s.KT for s in solids], format="csr"))
     names = {p.name for p in body.parts}
     for name, contact in machine.contacts.items():
-        if contact.surfaces is not None and split_surface(contact.surfaces[0])[0] in names:
+        if contact.glues and contact.surfaces is not None and split_surface(contact.surfaces[0])[0] in names:
             K = K + _glue(machine, body, contact.surfaces, f"contacts.{name}")
     return Elasticity(K, KT)
 

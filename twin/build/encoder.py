@@ -24,66 +24,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.build.elastic_ports import AxialPort, PortTable, RigidPort, fitted_slope
+from twin.build.elastic_ports import PortTable, fitted_slope
 from twin.build.mesh import BodyMesh
 from twin.errors import DescriptionError, Problem
 from twin.machine.description import Machine
 from twin.machine.kinematics import direction, displacement, linear_axes
+from twin.rom.scales import LinearEncoder, ScaleStrip
 
 SLICES = 24  # along a scale: means over whole slices are exact, only within a slice is a field taken as linear
 
 FAR = 0.1  # m between a reader and its scale's line
-
-
-@dataclass(frozen=True)
-class ScaleStrip:
-    """Temperature under a scale as a function of the coordinate along it: linear within each of n slices."""
-
-    body: int
-    nodes: np.ndarray  # (m,) of the body
-    borders: np.ndarray  # (n + 1,) m along the axis, in the body's mesh coordinates
-    centres: np.ndarray  # (n,) m: centroids of the slices along the axis
-    mean: np.ndarray  # (n, m) 1: rows of the slices' mean temperature
-    slope: np.ndarray  # (n, m) 1/m: rows of the temperature's slope along the axis
-
-    def integral(self, start: float, end: float) -> np.ndarray:
-        """Row (m,) [m] of int T ds from `start` to `end` [m]; negative where `end` comes first.
-
-        Beyond the scale's ends its last slices go on.
-        """
-        low, high = min(start, end), max(start, end)
-        a = np.clip(np.append(-np.inf, self.borders[1:-1]), low, high)
-        b = np.clip(np.append(self.borders[1:-1], np.inf), low, high)
-        length = b - a
-        row = length @ self.mean + (length * ((a + b) / 2 - self.centres)) @ self.slope
-        return row if end >= start else -row
-
-
-@dataclass(frozen=True)
-class LinearEncoder:
-    """The scale and reader of one axis."""
-
-    axis: int
-    along: np.ndarray  # (3,) unit vector of the axis
-    sign: float  # of the carried side's shift: -1 where the reader is carried, +1 where the scale is
-    reader: RigidPort
-    fixing: AxialPort
-    fixed_at: float  # m along the axis, in mesh coordinates
-    expansion: float  # 1/K
-    strip: ScaleStrip
-
-    def facing(self, offset: np.ndarray) -> float:
-        """Coordinate [m] on the scale that faces the reader; offset (3,) [m]: scale's body to reader's body by pose."""
-        return float((self.reader.centroid + offset) @ self.along)
-
-    def reader_row(self, offset: np.ndarray) -> np.ndarray:
-        """(6,): axial displacement of the reading head at the scale's line per port displacement of the reader."""
-        mark = self.fixing.point + (self.facing(offset) - self.fixed_at) * self.along
-        return self.along @ self.reader.motion_at(mark - offset)
-
-    def scale_row(self, offset: np.ndarray) -> np.ndarray:
-        """(m,) [m/K]: growth of the scale from its fixing point to the reader per T - T_ref at `strip.nodes`."""
-        return self.expansion * self.strip.integral(self.fixed_at, self.facing(offset))
 
 
 @dataclass(frozen=True)

@@ -21,18 +21,16 @@ from scipy.sparse import csr_array
 from twin.build.elastic_ports import rigid_modes
 from twin.build.elasticity import Elasticity
 from twin.build.factorize import factorize
+from twin.rom.elastic_structure import PortFlexibility
 
 BLOCK = 48  # ports solved at once: bounds the dense right-hand sides to 48 * 3n numbers
 
 
 @dataclass(frozen=True)
-class BodyFlexibility:
+class BodyFlexibility(PortFlexibility):
     """p ports, n nodes."""
 
-    name: str
     ports: tuple[str, ...]
-    F: np.ndarray  # (p, p) m/N (or rad/(N m) ...): port displacement of the supported body per port force
-    R: np.ndarray  # (p, 6) port displacement per translation [m] and rotation about the machine origin [rad]
     H: np.ndarray  # (p, n) m/K: port displacement of the supported body per nodal temperature
 
 
@@ -100,7 +98,7 @@ def condense(
         F[:, block] = gather @ X
         H[block] = (heat @ X).T
         advance(f"{name}, {block.stop} of {p} ports")
-    return BodyFlexibility(name, ports, (F + F.T) / 2, gather @ rigid_modes(points), H)
+    return BodyFlexibility(name, (F + F.T) / 2, gather @ rigid_modes(points), ports, H)
 
 
 def block_count(n_ports: int) -> int:

@@ -7,13 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from twin.build.elastic_inputs import elastic_inputs
+from twin.build.linear import linear_body, straightened
 from twin.build.lumped import assemble_lumped, lumped_bodies
-from twin.build.lumped_structure import LumpedStructure, lumped_structure
+from twin.build.lumped_structure import lumped_structure
 from twin.build.mesh import BodyMesh, load_body_meshes
 from twin.build.structure import Structure, assemble_structure
 from twin.build.thermal import assemble_thermal
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
+from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.model import MachineModel
 
 
@@ -27,8 +30,8 @@ class SurfaceMesh:
 
 @dataclass(frozen=True)
 class FullModel:
-    thermal: MachineModel  # sparse bodies, G filled for the pose grid, F for their surfaces
-    structure: Structure | LumpedStructure
+    thermal: MachineModel  # sparse bodies, G filled for the pose grid, W for all positions, F for their surfaces
+    structure: Structure | LumpedStructure  # the latter, with nothing that moves, of machines without a TCP
     bodies: tuple[BodyMesh, ...]  # none of a lumped machine
     surfaces: tuple[SurfaceMesh, ...]  # likewise
 
@@ -37,17 +40,37 @@ def assemble(machine: Machine, progress: Progress = silent) -> FullModel:
     """Read meshes, assemble and condense, or assemble nodes and bars. Raises DescriptionError and ModelError."""
     if machine.lumped:
         return _assemble_lumped(machine)
-    with progress("meshes and thermal matrices", 2) as advance:
+    with progress("meshes", 1) as advance:
         bodies = load_body_meshes(machine)
         advance("meshes")
+    return assemble_meshed(machine, bodies, progress)
+
+
+def assemble_meshed(
+    machine: Machine, bodies: tuple[BodyMesh, ...], progress: Progress = silent, linear: bool = False
+) -> FullModel:
+    """The full model on these meshes of the bodies, in the order of `bodies_of`; raises as `assemble`.
+
+    linear: with linear elements on the same tetrahedra, faces flat (`twin.build.linear`).
+    """
+    bodies = tuple(straightened(body) for body in bodies) if linear else bodies
+    with progress("thermal matrices", 1) as advance:
         thermal = assemble_thermal(machine, bodies)
         advance("thermal matrices")
-    structure = assemble_structure(machine, bodies, progress)
+    structure: Structure | LumpedStructure
+    if machine.has_tcp:
+        structure = assemble_structure(machine, bodies, progress, linear)
+    else:
+        structure = LumpedStructure(thermal.pose_axes, tuple(np.zeros((3, body.n)) for body in thermal.bodies), ())
     rows = structure.pose_rows(thermal.poses)
     meshes = zip(bodies, thermal.bodies, strict=True)
     surfaces, selections = zip(*(_surface(mesh, body.n) for mesh, body in meshes), strict=True)
-    parts = zip(thermal.bodies, rows, selections, strict=True)
-    thermal = replace(thermal, bodies=tuple(replace(b, G=G, F=F) for b, G, F in parts))
+    acting, inputs = elastic_inputs(structure)
+    parts = zip(thermal.bodies, rows, inputs, selections, strict=True)
+    full = tuple(replace(b, G=G, W=W, F=F) for b, G, W, F in parts)
+    if linear:
+        full = tuple(linear_body(mesh, body) for mesh, body in zip(bodies, full, strict=True))
+    thermal = replace(thermal, bodies=full, structure=acting)
     return FullModel(thermal, structure, bodies, surfaces)
 
 
@@ -56,8 +79,10 @@ def _assemble_lumped(machine: Machine) -> FullModel:
     thermal = assemble_lumped(machine, bodies)
     structure = lumped_structure(machine, bodies)
     rows = structure.pose_rows(thermal.poses)
-    parts = zip(thermal.bodies, rows, strict=True)
-    return FullModel(replace(thermal, bodies=tuple(replace(b, G=G) for b, G in parts)), structure, (), ())
+    acting, inputs = elastic_inputs(structure)
+    parts = zip(thermal.bodies, rows, inputs, strict=True)
+    full = tuple(replace(b, G=G, W=W) for b, G, W in parts)
+    return FullModel(replace(thermal, bodies=full, structure=acting), structure, (), ())
 
 
 def _surface(body: BodyMesh, n: int) -> tuple[SurfaceMesh, sp.csr_array]:

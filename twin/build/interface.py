@@ -1,8 +1,11 @@
-"""Two surfaces of a body joined over their common area, whether or not their meshes match.
+"""Two surfaces of a body joined over their common area, whether or not their meshes match, or across a gap.
 
 Facet pairs are intersected (polygon clipping) and integrated exactly, as scikit-fem has no three-dimensional mortar
 integration. The result, int (N_A - N_B)(N_A - N_B)^T dA, serves thermal joints (times a conductance) and, per
 component, the stiffness that glues displacements. Its rows sum to zero: no jump, no flux.
+
+Across a gap, points face each other along the normals of the first surface, and the area is measured on it: what leaves
+one point arrives at the other, so heat is conserved where the two areas differ, too (coaxial cylinders).
 """
 
 from __future__ import annotations
@@ -22,6 +25,8 @@ from twin.machine.bodies import split_surface
 # Facets that face each other: exact for coplanar ones; the tolerances admit facetted cylinders and rounded coordinates.
 MIN_COSINE = 0.95  # of the angle between a normal and the other's reverse
 MAX_GAP = 0.1  # distance of the planes, in sizes of the smaller facet
+ROUNDED = 1e-6  # share by which a gap may be exceeded: coordinates are rounded
+TWICE = 1.001  # common area beyond this share of the first surface's: its points face several layers of the second
 PAIRS = 20_000  # facet pairs integrated at once
 
 
@@ -42,28 +47,39 @@ class _Facets:
     normal: np.ndarray  # (m, 3) unit, outward
 
 
-def interface(body: BodyMesh, a: str, b: str, where: str = "contacts") -> Interface:
+def interface(body: BodyMesh, a: str, b: str, where: str = "contacts", gap: float | None = None) -> Interface:
     """Intersect the surfaces `a` and `b` ("part.surface") of a body.
 
-    Raises DescriptionError where they do not touch or a surface is unknown.
+    gap: m, up to which points that face each other are joined; without one the surfaces lie on each other.
+    Raises DescriptionError where they do not touch, or do not face each other within the gap, or more than once, or a
+    surface is unknown.
     """
     fa, fb = _facets(body, a), _facets(body, b)
-    pairs = _facing(fa, fb)
+    pairs = _facing(fa, fb, gap)
     matrix, area = sp.csr_array((body.n, body.n)), 0.0
     for start in range(0, len(pairs), PAIRS):
         i, j = pairs[start : start + PAIRS].T
-        nodes, local, shared = _intersect(fa, fb, i, j)
+        nodes, local, shared = _intersect(fa, fb, i, j, gap)
         matrix, area = matrix + scatter(nodes, nodes, local, body.n), area + shared
     touching = 1e-9 * min(_area(fa), _area(fb))
     if not area > touching:
-        gap = float(cKDTree(fb.centre).query(fa.centre)[0].min())
-        raise DescriptionError(
-            f"'{a}' and '{b}' have no common area",
-            where,
-            f"fixed contacts join faces that lie on each other (nearest facet centres are {gap:.3g} m apart): "
-            "check positions, mesh_unit and surface names",
-        )
+        raise _apart(fa, fb, (a, b), where, gap)
+    if gap is not None and area > TWICE * _area(fa):
+        what = f"within {gap * 1e3:g} mm points of '{a}' face '{b}' more than once"
+        raise DescriptionError(what, f"{where}.gap", "give a smaller gap, or name a surface of one layer")
     return Interface(matrix, area)
+
+
+def _apart(fa: _Facets, fb: _Facets, names: tuple[str, str], where: str, gap: float | None) -> DescriptionError:
+    """What to say of surfaces without common area."""
+    both, check = f"'{names[0]}' and '{names[1]}'", "check positions, mesh_unit and surface names"
+    nearest = float(cKDTree(fb.centre).query(fa.centre)[0].min())
+    told = f"(nearest facet centres are {nearest:.3g} m apart)"
+    if gap is not None:
+        what = f"{both} face each other nowhere within {gap * 1e3:g} mm"
+        return DescriptionError(what, f"{where}.gap", f"give the largest distance between them {told}, or {check}")
+    remedy = f'fixed contacts join faces that lie on each other {told}: {check}; across a gap give gap = "2 mm"'
+    return DescriptionError(f"{both} have no common area", where, remedy)
 
 
 def _facets(body: BodyMesh, surface: str) -> _Facets:
@@ -87,26 +103,30 @@ def _area(f: _Facets) -> float:
     return float(np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 2)
 
 
-def _facing(fa: _Facets, fb: _Facets) -> np.ndarray:
-    """Index pairs (k, 2) of facets that may overlap: near, facing each other, in one plane."""
-    near = cKDTree(fb.centre).query_ball_point(fa.centre, fa.radius + fb.radius.max())
+def _facing(fa: _Facets, fb: _Facets, gap: float | None) -> np.ndarray:
+    """Index pairs (k, 2) of facets that may overlap: near, facing each other, in one plane or in front of it."""
+    reach = gap or 0.0
+    near = cKDTree(fb.centre).query_ball_point(fa.centre, fa.radius + fb.radius.max() + reach)
     i = np.repeat(np.arange(len(fa.centre)), [len(n) for n in near])
     j = np.concatenate([np.asarray(n, dtype=int) for n in near]) if len(i) else i
     offset = fb.centre[j] - fa.centre[i]
-    gap = np.abs(np.einsum("kx,kx->k", offset, fa.normal[i]))
-    keep = (
-        (np.linalg.norm(offset, axis=1) < fa.radius[i] + fb.radius[j])
-        & (np.einsum("kx,kx->k", fa.normal[i], fb.normal[j]) < -MIN_COSINE)
-        & (gap < MAX_GAP * np.minimum(fa.radius[i], fb.radius[j]))
+    keep = (np.linalg.norm(offset, axis=1) < fa.radius[i] + fb.radius[j] + reach) & (
+        np.einsum("kx,kx->k", fa.normal[i], fb.normal[j]) < -MIN_COSINE
     )
+    if gap is None:
+        distance = np.abs(np.einsum("kx,kx->k", offset, fa.normal[i]))
+        keep &= distance < MAX_GAP * np.minimum(fa.radius[i], fb.radius[j])
     return np.column_stack([i[keep], j[keep]])
 
 
-def _intersect(fa: _Facets, fb: _Facets, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _intersect(
+    fa: _Facets, fb: _Facets, i: np.ndarray, j: np.ndarray, gap: float | None
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Unknowns (t, 12), local matrices (t, 12, 12) and the area of the intersections of facet pairs.
 
     Each corner of B's triangle carries its barycentric coordinates in A (projected along A's normal) and in B; both
-    are linear, so clipping where A's turn negative keeps both along.
+    are linear, so clipping where A's turn negative keeps both along, and so does clipping where the distance from A's
+    plane, linear too, leaves the gap.
     """
     a = fa.corners[i]
     edge_1, edge_2 = a[:, 1] - a[:, 0], a[:, 2] - a[:, 0]
@@ -120,6 +140,12 @@ def _intersect(fa: _Facets, fb: _Facets, i: np.ndarray, j: np.ndarray) -> tuple[
     counts = np.full(len(i), 3)
     for side in range(3):
         polygons, counts = clip(polygons, counts, polygons[:, :, side])
+    if gap is not None:
+        off = np.einsum("kcx,kx->kc", lever, fa.normal[i])  # m in front of A, of B's corners
+        inside = MAX_GAP * np.minimum(fa.radius[i], fb.radius[j])  # facetted cylinders may cut into each other
+        for sign, reach in ((1.0, inside), (-1.0, np.full(len(i), gap * (1.0 + ROUNDED)))):
+            distance = np.einsum("kvc,kc->kv", polygons[:, :, 3:], sign * off) + reach[:, None]
+            polygons, counts = clip(polygons, counts, distance)
     triangles, owner = fan(polygons, counts)
 
     rule, weights = triangle_rule(4)

@@ -136,7 +136,7 @@ def load_part_mesh(name: str, part: Part, folder: Path) -> PartMesh:
     path = Path(folder) / str(part.mesh)
     file = read_tetra_file(path, part.mesh_unit, f"{where}.mesh")
     mesh = skfem_mesh(file)
-    return part_mesh(name, mesh, _match_surfaces(mesh, file, str(path)), str(path))
+    return part_mesh(name, mesh, match_surfaces(mesh, file, str(path)), str(path))
 
 
 def load_body_meshes(machine: Machine) -> tuple[BodyMesh, ...]:
@@ -164,7 +164,7 @@ def _order(mesh: Mesh) -> int:
     return 6 if isinstance(mesh, MeshTet2) else 4
 
 
-def _match_surfaces(mesh: Mesh, file: TetraFile, where: str) -> dict[str, np.ndarray]:
+def match_surfaces(mesh: Mesh, file: TetraFile, where: str) -> dict[str, np.ndarray]:
     """Facet indices of the file's triangles. Raises DescriptionError for triangles that are no outer facets."""
     vertex = np.full(file.points.shape[0] + 1, -1)  # the last entry catches points that no tetrahedron uses
     used = np.unique(file.tetra[:, :4])

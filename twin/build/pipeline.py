@@ -10,17 +10,21 @@ import numpy as np
 
 from twin.build.cached_models import full_model as full_model  # the first stages, offered beside the others
 from twin.build.cached_models import rich_model as rich_model
-from twin.build.certificate import Certificate, Comparison, certify, compare
+from twin.build.certificate import REDUCTION, RICH, STEP, Certificate, Part, certify
+from twin.build.comparison import FINER, TINY, Comparison, Way, compare_ways
 from twin.build.compress import Tolerances, balanced, galerkin, trajectories
 from twin.build.rich_basis import RichOptions
 from twin.build.scenario import Scenario, draw
 from twin.build.workers import LONG
-from twin.machine.description import Machine
+from twin.machine.description import Limits, Machine
 from twin.progress import Progress, silent
 from twin.rom.following import FOLLOW, difference_place
 from twin.rom.load_model import LoadModel
 from twin.rom.model import MachineModel
 
+STEPPED = 5  # held-out scenarios for the error of the time step: each takes four times the steps of the others
+CHOICE = 4  # training scenarios for the number of substeps
+POSITIONS = 20  # between the poses of the grid, where the certificate reads the TCP displacement too
 LARGE = 10_000  # nodes of a full model of which each scenario takes its own process from the start
 TRAINING_SEED = 1000
 BUILD_SEED = 5000  # held-out scenarios of `twin build`
@@ -34,19 +38,19 @@ class BuildOptions:
     method: Literal["galerkin", "balanced"] = "galerkin"
     states: int = 500  # of the whole machine
     rich: RichOptions = RichOptions()
-    training: int = 90  # scenarios: two thirds long ones at twice the step, one third short ones at the substep
+    training: int = 90  # scenarios: two thirds long ones at twice the step, one third short ones at a quarter of it
     held_out: int = 19
     hours: float = 2.0  # of every held-out scenario; its steady state comes on top
     step: float = 60.0  # s
-    substeps: int = 4  # of the held-out scenarios, as many as `twin run` takes
+    substeps: int | None = None  # of a step, in the certificate and by `twin run`; None: as few as hold the limits
 
 
 def training_scenarios(load: LoadModel, options: BuildOptions, still: bool = False) -> list[Scenario]:
-    """Long ones for the slow modes, short ones at the substep for the fast modes that a load step excites.
+    """Long ones for the slow modes, short ones in short steps for the fast modes that a load step excites.
 
     still: with all axes at rest in mid-stroke.
     """
-    kinds = [(4.0, 2 * options.step)] * 2 + [(1.0, options.step / options.substeps)]
+    kinds = [(4.0, 2 * options.step)] * 2 + [(1.0, options.step / 4)]
     return [draw(load, TRAINING_SEED + i, *kinds[i % 3], still) for i in range(options.training)]
 
 
@@ -66,6 +70,44 @@ def compact_model(
 
 def held_out(model: MachineModel, options: BuildOptions, seed: int) -> list[Scenario]:
     return [draw(model.load_model, seed + i, options.hours, options.step) for i in range(options.held_out)]
+
+
+def enough_substeps(model: MachineModel, limits: Limits, options: BuildOptions) -> int:
+    """As few substeps, of 1, 2 or 4, as keep the error of the time step below half of the limits.
+
+    Judged on some training scenarios, drawn at the step that the certificate is for: held-out ones that had a say in
+    the choice would not be held out.
+    """
+    scenarios = [draw(model.load_model, TRAINING_SEED + i, options.hours / 2, options.step) for i in range(CHOICE)]
+    for substeps in (1, 2):
+        (found,) = compare_ways([Way(model, FINER), Way(model)], [(0, 1)], scenarios, substeps)
+        T, u = (e.max(initial=0.0) for e in found.scaled(limits))
+        if limits.temperature / 2 >= T and limits.displacement / 2 >= u:
+            return substeps
+    return 4
+
+
+def step_halved(model: MachineModel, scenarios: Sequence[Scenario], step: Comparison, substeps: int) -> float:
+    """The change of the reference of the time step's error when its steps are halved, as a share of that error.
+
+    In the scenario with the largest error of a temperature; of temperatures and displacements the larger share.
+    """
+    worst = scenarios[int(step.temperature_error.max(axis=1, initial=0.0).argmax())]
+    ways = [Way(model, 2 * FINER), Way(model, FINER)]
+    (halved,) = compare_ways(ways, [(0, 1)], [worst], substeps)
+    pairs = (
+        (halved.temperature_error, step.temperature_error),
+        (halved.displacement_error, step.displacement_error),
+    )
+    return max(float(h.max(initial=0.0) / max(e.max(initial=0.0), TINY)) for h, e in pairs)
+
+
+def positions_off_grid(model: MachineModel, seed: int, count: int = POSITIONS) -> np.ndarray:
+    """Random positions (count, n_axes) [m] between the poses of the grid; none without axes or TCP."""
+    low = np.array([nodes[0] for nodes in model.pose_grid])
+    high = np.array([nodes[-1] for nodes in model.pose_grid])
+    rng = np.random.default_rng([seed, 20261])
+    return rng.uniform(low, high, (count if len(low) and model.moves else 0, len(low)))
 
 
 def chosen_for_full(load: LoadModel, scenarios: Sequence[Scenario], count: int) -> list[Scenario]:
@@ -105,14 +147,27 @@ def certificate(
     full_scenarios: int = 2,
     progress: Progress = silent,
 ) -> Certificate:
-    """Compact against rich on all held-out scenarios; rich against full on some, where `full` is given."""
-    scenarios = held_out(rich, options, seed)
+    """Compact against rich on all held-out scenarios, in steps against finer ones on the first of them, and, where
+    `full` is given, rich against full on some.
+    """
+    scenarios, positions = held_out(rich, options, seed), positions_off_grid(rich, seed)
+    substeps = options.substeps or enough_substeps(compact, machine.limits, options)
     with progress("compact against rich", len(scenarios)) as advance:
-        small = compare(rich, compact, scenarios, options.substeps, advance)
-    large: Comparison | None = None
+        (reduction,) = compare_ways([Way(rich), Way(compact)], [(0, 1)], scenarios, substeps, positions, advance)
+    stepped = scenarios[:STEPPED]
+    with progress("compact against finer steps", len(stepped)) as advance:
+        ways = [Way(compact, FINER), Way(compact)]
+        (step,) = compare_ways(ways, [(0, 1)], stepped, substeps, positions, advance)
+    halved = step_halved(compact, stepped, step, substeps)
+    parts = [
+        Part(REDUCTION, "compact against rich", reduction),
+        Part(STEP, f"steps of {options.step / substeps:g} s against a quarter of them", step),
+    ]
     if full is not None:
         chosen = chosen_for_full(rich.load_model, scenarios, full_scenarios)
         with progress("rich against full", len(chosen)) as advance:
             at_once = 0.0 if full.n > LARGE else LONG
-            large = compare(full, rich, chosen, options.substeps, advance, at_once)
-    return certify(rich, small, large, machine.limits, options.hours, options.step, options.substeps)
+            ways = [Way(full), Way(rich)]
+            (large,) = compare_ways(ways, [(0, 1)], chosen, substeps, positions, advance, at_once)
+            parts.append(Part(RICH, "rich against full", large))
+    return certify(rich, parts, machine.limits, options.hours, options.step, substeps, halved, positions)

@@ -2,7 +2,7 @@
 
 A *place* is a surface with a source and a film of its own, both of zero strength: the description stays what it is, but
 a basis that has seen them can answer what a watt, or a watt per square metre and kelvin, would do there. Surfaces that
-a fixed contact joins are one place; the pads of a moving contact are one place, named by the contact.
+a fixed contact joins without a gap are one place; the pads of a moving contact are one place, named by the contact.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def places_of(machine: Machine, full: FullModel) -> tuple[Place, ...]:
     taken: dict[tuple[str, str], str] = {}  # surfaces that belong to a place of another name, or to none
     pads: dict[str, list[tuple[str, str]]] = {}
     for name, contact in machine.contacts.items():
-        if contact.surfaces:
+        if contact.surfaces and contact.glues:
             taken[split_surface(contact.surfaces[1])] = ""
         for _, pad in contact.pairs:
             taken[split_surface(pad)] = f"contacts.{name}"

@@ -11,15 +11,18 @@ import numpy as np
 
 from twin import __version__
 from twin.build.cache import machine_hash
-from twin.build.certificate import Certificate
+from twin.build.certificate import Certificate, with_part
 from twin.build.import_closure import closure_hash
+from twin.build.mesh_error import SCENARIOS, mesh_part, refuse_lumped
 from twin.build.pipeline import (
     BUILD_SEED,
     VERIFY_SEED,
     BuildOptions,
     certificate,
+    chosen_for_full,
     compact_model,
     full_model,
+    held_out,
     rich_model,
 )
 from twin.errors import ArtefactError
@@ -73,15 +76,17 @@ def verify_artefact(
     options: BuildOptions = BuildOptions(),
     full_scenarios: int = 2,
     progress: Progress = silent,
+    mesh: bool = False,
 ) -> Certificate:
     """Certify an artefact on scenarios it has never seen, with the full model in the chain, and store the result in it.
 
+    mesh: with the error of the full model's mesh (`twin.build.mesh_error`), which lumped machines have none of.
     The machine is read from where the artefact was built, or from `machine_path`; it must be the one the artefact was
     built from. Raises ArtefactError otherwise. A calibrated artefact brings its own description, to the meshes of the
     one it started from.
     """
     artefact: Artefact = read_artefact(path)
-    result = verified(artefact, machine_path, options, full_scenarios, progress, str(path))
+    result = verified(artefact, machine_path, options, full_scenarios, progress, str(path), mesh)
     write_artefact(
         path, artefact.model, artefact.description, result.to_json(), artefact.provenance, artefact.fields,
         parameters=artefact.parameters,
@@ -96,10 +101,11 @@ def verified(
     full_scenarios: int = 2,
     progress: Progress = silent,
     where: str = "",
+    mesh: bool = False,
 ) -> Certificate:
     """The certificate that `verify_artefact` stores; with no full scenarios of compact against rich only.
 
-    where: the artefact's name in messages.
+    where: the artefact's name in messages. mesh: with the error of the mesh, on two of the scenarios.
     """
     where = where or artefact.model.name
     origin = Path(machine_path or artefact.provenance.get("machine", ""))
@@ -113,7 +119,20 @@ def verified(
             where,
             "build again, or name the right description with --machine",
         )
+    if mesh:
+        refuse_lumped(machine)
     full = full_model(machine, progress)
     rich = rich_model(machine, full, options.rich, progress)
     of_full = full.thermal if full_scenarios else None
-    return certificate(machine, rich, artefact.model, of_full, options, VERIFY_SEED, full_scenarios, progress=progress)
+    stored = artefact.certificate.get("substeps")
+    if stored is not None:  # it runs with these
+        options = replace(options, substeps=int(stored))
+    result = certificate(
+        machine, rich, artefact.model, of_full, options, VERIFY_SEED, full_scenarios, progress=progress
+    )
+    if not mesh:
+        return result
+    chosen = chosen_for_full(rich.load_model, held_out(rich, options, VERIFY_SEED), SCENARIOS)
+    positions = np.array(result.positions).reshape(len(result.positions), len(rich.pose_axes))
+    part = mesh_part(machine, full, chosen, result.substeps, positions, progress)
+    return with_part(result, part, machine.limits)

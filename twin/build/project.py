@@ -35,12 +35,13 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
         return (R + R.T) / 2 if W is None else R
 
     one = left.T @ (body.E @ body.one)
-    E_members, G_members = _members(body, left, V, congruent)
+    E_members, G_members, W_members = _members(body, left, V, congruent)
     return replace(
         body,
         first=(),
         E_members=E_members,
         G_members=G_members,
+        W_members=W_members,
         E=congruent(body.E),
         A0=congruent(body.A0),
         A=tuple(congruent(a) for a in body.A),
@@ -52,6 +53,7 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
         H=None if body.H is None else left.T @ body.H,
         C=body.C @ V,
         G=body.G @ V,
+        W=None if body.W is None else body.W @ V,
         one=one,
         energy=V.T @ body.energy,
         F=None if body.F is None else body.F @ V,
@@ -60,18 +62,21 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
 
 def _members(
     body: AffineBody, left: np.ndarray, V: np.ndarray, congruent: Callable[[Matrix], np.ndarray]
-) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Shares of the members in the projected E and G: slices of the full model, matrices of a reduced one."""
+) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+    """Shares of the members in the projected E, G and W: slices of the full model, matrices of a reduced one."""
     if not body.members:
-        return None, None
+        return None, None, None
     if body.E_members is not None and body.G_members is not None:
-        return np.array([congruent(E) for E in body.E_members]), body.G_members @ V
-    E, G = [], []
+        W_members = None if body.W_members is None else body.W_members @ V
+        return np.array([congruent(E) for E in body.E_members]), body.G_members @ V, W_members
+    E, G, W = [], [], []
     for m in range(len(body.members)):
         own = body.member_states(m)
         E.append(left[own].T @ (body.E[own, own] @ V[own]))  # members share no states, E couples none of them
         G.append(body.G[:, :, own] @ V[own])
-    return np.array(E), np.array(G)
+        if body.W is not None:
+            W.append(body.W[:, own] @ V[own])
+    return np.array(E), np.array(G), np.array(W) if W else None
 
 
 def orthonormalise(X: np.ndarray, E: Matrix, V: np.ndarray | None = None, tolerance: float = 1e-12) -> np.ndarray:

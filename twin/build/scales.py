@@ -13,29 +13,11 @@ of the TCP alone, linear in position and in temperature.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from twin.machine.description import Machine, Scale
 from twin.machine.kinematics import direction, linear_axes
-
-
-@dataclass(frozen=True)
-class AddedScale:
-    """What one `[scales.NAME]` adds to the TCP displacement."""
-
-    axis: int  # of the linear ones
-    along: np.ndarray  # (3,) unit vector of the axis
-    body: int
-    states: np.ndarray  # (m,) of the body: nodes of the surface
-    mean: np.ndarray  # (m,) 1: the surface's mean temperature
-    expansion: float  # 1/K
-    fixed_at: float  # m, a position of the axis
-
-    def rows(self, position: float) -> np.ndarray:
-        """TCP displacement (3, m) [m/K] per T - T_ref of the states, at a position [m] of the axis."""
-        return np.outer(-self.expansion * (position - self.fixed_at) * self.along, self.mean)
+from twin.rom.scales import AddedScale
 
 
 def added_scale(machine: Machine, scale: Scale, body: int, states: np.ndarray, mean: np.ndarray) -> AddedScale:

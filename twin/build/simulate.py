@@ -51,7 +51,7 @@ def simulate(
     tcp_time: np.ndarray,
     tcp_positions: np.ndarray,
     start: float,
-    substeps: int = 4,
+    substeps: int = 1,
     noise: Noise = Noise(),
     progress: Progress = silent,
 ) -> Simulation:
@@ -98,7 +98,7 @@ def simulate_run(
     machine: Machine | Path,
     run: Run | Path,
     dt: float = 60.0,
-    substeps: int = 4,
+    substeps: int = 1,
     hours: float | None = None,
     tcp_every: float = 1800.0,
     noise: Noise = Noise(),
@@ -108,7 +108,7 @@ def simulate_run(
 
     machine, run: or where they lie; a machine to be meshed otherwise comes from `remesh`. TCP rows lie at the times
     and positions of the run's tcp.csv, else every `tcp_every` [s] at the logged axis positions. The machine starts at
-    the run's initial temperature, else at that of the air around it.
+    the run's initial temperature, else at that of the air around it. Where no temperature moves the tool, none.
     """
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     full = full_model(machine, progress)
@@ -120,7 +120,9 @@ def simulate_run(
     n_steps = None if hours is None else int(np.ceil(hours * 3600.0 / dt))
     drive = evaluate(load, run.loads.time, signal_values(run, load.signals), dt, n_steps)
     axes = full.thermal.pose_axes
-    tcp_time, positions = _tcp_rows(full, run, drive, max(1, round(tcp_every / dt)))
+    tcp_time, positions = np.zeros(0), np.zeros((0, len(axes)))
+    if full.thermal.moves:
+        tcp_time, positions = _tcp_rows(full, run, drive, max(1, round(tcp_every / dt)))
     inside = tcp_time <= drive.time[-1]
     start = run.initial_temperature
     if start is None:
@@ -142,7 +144,11 @@ def simulate_run(
         zone=run.zone,
         sampling=run.sampling,
         provenance=f"twin simulate: full model of '{machine.machine.name}', noise seed {noise.seed}",
-        synthetic=("temperatures", "tcp", *(("loads",) if "loads" in run.synthetic else ())),
+        synthetic=(
+            "temperatures",
+            *(("tcp",) if len(result.tcp_time) else ()),
+            *(("loads",) if "loads" in run.synthetic else ()),
+        ),
         initial_temperature=start,
     )
     return simulated, float(result.balance_error.max(initial=0.0))

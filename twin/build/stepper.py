@@ -16,8 +16,8 @@ what was solved and stays exact, and it is stable as |theta - held| < held.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -30,8 +30,12 @@ from twin.rom.contact_matrix import ContactPlaces, contact_entries, dense
 from twin.rom.drive import Drive
 from twin.rom.following import FOLLOW, FilmPlan
 from twin.rom.model import MachineModel
-from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, step_loads
-from twin.rom.tableau import IMPLICIT_EULER, Tableau, stages
+from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, source_powers, step_loads
+from twin.rom.tableau import SDIRK2_6, Feedback, Tableau, stages
+
+# States of all bodies up to which one product with the inverse of the whole machine takes less time than a solve per
+# body and what joins them: a step of 22 states spends its time in Python, not in arithmetic.
+SMALL = 100
 
 
 def contact_matrix(model: MachineModel, drive: Drive, step: int) -> np.ndarray:
@@ -49,11 +53,16 @@ class _Factored:
     X: np.ndarray  # (n, n_ports_b) S^-1 P
     Q: np.ndarray  # (n_ports_b, n_ports_b)
 
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """S^-1 (n, n) of a dense body."""
+        return self.solve(np.eye(len(self.X)))
+
 
 class CoupledStepper:
     """Steps a MachineModel whose bodies are sparse (full) or dense (rich); keeps the last factors per body."""
 
-    def __init__(self, model: MachineModel, keep: int = 2, follow: float = FOLLOW, tableau: Tableau = IMPLICIT_EULER):
+    def __init__(self, model: MachineModel, keep: int = 2, follow: float = FOLLOW, tableau: Tableau = SDIRK2_6):
         self.model, self._tableau = model, tableau
         self._cache: tuple[list[_Factored], ...] = tuple([] for _ in model.bodies)  # latest last
         self._keep, self._follow = keep, follow
@@ -62,6 +71,7 @@ class CoupledStepper:
         n_films, n_theta = len(model.load_model.films), len(model.load_model.theta_names)
         self._film_rows = tuple(body.film_rows for body in model.bodies)
         self._dense = tuple(None if scipy.sparse.issparse(b.E) else DenseTerms(b, n_films) for b in model.bodies)
+        self._small = all(self._dense) and ends[-1] <= SMALL
         # area and first moment of height of the films
         self._area, self._moment = np.zeros(n_theta), np.zeros(n_theta)
         for body in model.bodies:
@@ -93,13 +103,23 @@ class CoupledStepper:
 
     def loads(self, drive: Drive, step: int, x: list[np.ndarray]) -> StepLoads:
         """The loads of a step that starts at x."""
-        model, n = self.model, len(self.model.load_model.films)
-        theta, T_ref = drive.theta[step], model.reference_temperature
-        temperature = np.full(len(model.load_model.sources), T_ref)
+        T_ref = self.model.reference_temperature
+        told = self._told(drive, step)
+        return step_loads(np, self._plan, told, self.surfaces(x), self._following(drive, x), T_ref)
+
+    def _following(self, drive: Drive, x: list[np.ndarray]) -> np.ndarray:
+        """Temperatures (k,) [degC] of the sources that follow them."""
+        temperature = np.full(len(self.model.load_model.sources), self.model.reference_temperature)
         if drive.losses.index:
-            for body, xb in zip(model.bodies, x, strict=True):
-                temperature[list(body.sources)] += body.source_rows @ xb
-        told = StepDrive(
+            for body, xb in zip(self.model.bodies, x, strict=True):
+                if not set(drive.losses.index).isdisjoint(body.sources):
+                    temperature[list(body.sources)] += body.source_rows @ xb
+        return temperature[list(drive.losses.index)]
+
+    def _told(self, drive: Drive, step: int) -> StepDrive:
+        """What the log tells of a step."""
+        theta, n = drive.theta[step], len(self.model.load_model.films)
+        return StepDrive(
             convection=Tabulated(theta[:n], drive.films.index, drive.films.value[step]),
             joints=theta[n:],
             power=Tabulated(drive.power[step], drive.losses.index, drive.losses.value[step]),
@@ -107,7 +127,20 @@ class CoupledStepper:
             environment=drive.environment[step],
             radiation=float(drive.radiation),
         )
-        return step_loads(np, self._plan, told, self.surfaces(x), temperature[list(drive.losses.index)], T_ref)
+
+    def _feedback(self, drive: Drive, step: int, power: np.ndarray) -> Feedback | None:
+        """What sources that follow a temperature add to a forcing with powers (n_sources,) [W]; None without such."""
+        index = list(drive.losses.index)
+        if not index:
+            return None
+        told = self._told(drive, step).power
+
+        def feedback(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            now = source_powers(np, told, self._following(drive, self._parts(x)))
+            more = now - power
+            return np.concatenate([body.B @ more[list(body.sources)] for body in self.model.bodies]), now[index]
+
+        return feedback
 
     def _of_terms(self, films: np.ndarray) -> np.ndarray:
         """(n_theta,): numbers (n_films,) of films, and zero for joints."""
@@ -164,28 +197,26 @@ class CoupledStepper:
         return lambda x: np.sum([d * (a @ x) for d, a in zip(more, body.A, strict=True) if d != 0.0], axis=0)
 
     def across(self, factors: list[_Factored], gamma: np.ndarray) -> np.ndarray:
-        """1 + Q Gamma (n_ports, n_ports): what port temperatures solve with the bodies of these factors in contact."""
+        """Gamma (1 + Q Gamma)^-1 (n_ports, n_ports) W/K: heat that leaves the ports of bodies in contact, by the port
+        temperatures that they would have without. Inverted once, as all stages of a step share it.
+        """
         Q = np.zeros(gamma.shape)
         for body, f in zip(self.model.bodies, factors, strict=True):
             Q[np.ix_(body.ports, body.ports)] = f.Q
-        return np.asarray(np.eye(len(gamma)) + Q @ gamma)
+        return np.asarray(gamma @ np.linalg.inv(np.eye(len(gamma)) + Q @ gamma))
 
-    def solve(
-        self, rhs: list[np.ndarray], factors: list[_Factored], gamma: np.ndarray, across: np.ndarray
-    ) -> list[np.ndarray]:
+    def solve(self, rhs: list[np.ndarray], factors: list[_Factored], across: np.ndarray) -> list[np.ndarray]:
         """Solve (rate E + A + P Gamma P^T) x = rhs for all bodies, with rate and A of the factors; across: of both."""
-        return self.joined([f.solve(r) for f, r in zip(factors, rhs, strict=True)], factors, gamma, across)
+        return self.joined([f.solve(r) for f, r in zip(factors, rhs, strict=True)], factors, across)
 
-    def joined(
-        self, y: list[np.ndarray], factors: list[_Factored], gamma: np.ndarray, across: np.ndarray
-    ) -> list[np.ndarray]:
+    def joined(self, y: list[np.ndarray], factors: list[_Factored], across: np.ndarray) -> list[np.ndarray]:
         """The solutions with contacts, from those without, y: per body (n_b,)."""
-        if not len(gamma):
+        if not len(across):
             return y
-        t = np.zeros(len(gamma))
+        t = np.zeros(len(across))
         for body, yb in zip(self.model.bodies, y, strict=True):
             t[list(body.ports)] = body.port_rows @ yb
-        q = gamma @ np.linalg.solve(across, t)
+        q = across @ t
         return [yb - f.X @ q[list(body.ports)] for body, f, yb in zip(self.model.bodies, factors, y, strict=True)]
 
     def run(
@@ -204,16 +235,21 @@ class CoupledStepper:
             gamma = dense(np, self._contacts, contacts.at(step))
             forcing = np.concatenate(self.forcing(loads))
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
-            solve = partial(self._solve_twice, factors, gamma, self.across(factors, gamma), rest)
+            solve = partial(self._solve_twice, self._whole(factors, self.across(factors, gamma)), rest)
             capacity = partial(self._capacity, factors)
             after = before = np.concatenate(x)
             own, seen = np.zeros_like(before), np.zeros_like(before)  # means over the step
+            feedback, following = self._feedback(drive, step, loads.power), list(drive.losses.index)
+            power = loads.power.copy()
+            power[following] = 0.0
             for _ in range(substeps):
-                made = stages(tableau, solve, capacity, after, forcing)
-                for weight, (at, saw) in zip(tableau.weights, made, strict=True):
+                after, made = stages(tableau, solve, capacity, after, forcing, feedback)
+                for weight, (at, saw, powers) in zip(tableau.weights, made, strict=True):
                     own, seen = own + weight * at / substeps, seen + weight * saw / substeps
-                after = made[-1][0]
+                    if following:
+                        power[following] += weight * powers / substeps
             x = self._parts(after)
+            loads = replace(loads, power=power)
             yield step, x, self._heat(loads, factors, dt, *map(self._parts, (after - before, seen, own)))
 
     def _parts(self, x: np.ndarray) -> list[np.ndarray]:
@@ -225,22 +261,34 @@ class CoupledStepper:
         parts = zip(factors, self._parts(x), strict=True)
         return np.concatenate([factor.rate * self._stored(b, xb) for b, (factor, xb) in enumerate(parts)])
 
+    def _whole(self, factors: list[_Factored], across: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """The solution (N,) of all bodies in contact for a right-hand side (N,)."""
+        if not self._small:
+            return lambda right: np.concatenate(self.solve(self._parts(right), factors, across))
+        N = self._rows[-1].stop
+        inverse, X, Y = np.zeros((N, N)), np.zeros((N, len(across))), np.zeros((len(across), N))
+        for body, f, own in zip(self.model.bodies, factors, self._rows, strict=True):
+            ports = list(body.ports)
+            inverse[own, own] = f.inverse
+            X[own, ports], Y[ports, own] = f.X, body.port_rows @ f.inverse
+        inverse -= X @ (across @ Y)
+        return lambda right: inverse @ right
+
     def _solve_twice(
         self,
-        factors: list[_Factored],
-        gamma: np.ndarray,
-        across: np.ndarray,
+        whole: Callable[[np.ndarray], np.ndarray],
         rest: Sequence[Callable[[np.ndarray], np.ndarray] | None],
         right: np.ndarray,
         near: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """The solution (N,), and the state at which it took what the factors leave out: `near`, then what that gave."""
-        known, seen = self._parts(right), near
-        for _ in range(1 if all(r is None for r in rest) else 2):
+        if all(r is None for r in rest):
+            return whole(right), near
+        seen = near
+        for _ in range(2):
             seen = near
-            parts = zip(known, rest, self._parts(seen), strict=True)
-            rhs = [k if r is None else k - r(s) for k, r, s in parts]
-            near = np.concatenate(self.solve(rhs, factors, gamma, across))
+            parts = zip(rest, self._parts(seen), strict=True)
+            near = whole(right - np.concatenate([np.zeros_like(s) if r is None else r(s) for r, s in parts]))
         return near, seen
 
     def _stored(self, b: int, x: np.ndarray) -> np.ndarray:
@@ -287,7 +335,7 @@ class CoupledStepper:
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
             f = self.forcing(loads)
             rhs = [fb if r is None else fb - r(xb) for fb, r, xb in zip(f, rest, x, strict=True)]
-            return np.concatenate(self.solve(rhs, factors, gamma, self.across(factors, gamma)))
+            return np.concatenate(self.solve(rhs, factors, self.across(factors, gamma)))
 
         def size(flat: np.ndarray) -> float:
             stored = [abs(float(p @ self._stored(b, p))) for b, p in enumerate(self._parts(flat))]

@@ -13,9 +13,9 @@ from skfem import ElementTetP2, MeshTet1, MeshTet2
 from skfem.assembly import Dofs
 
 from twin.build.full_model import FullModel, SurfaceMesh
-from twin.build.lumped_structure import LumpedStructure
 from twin.build.mesh import BodyMesh, PartMesh, body_mesh
 from twin.build.structure import Structure
+from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.model import MachineModel
 
 

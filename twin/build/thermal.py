@@ -96,11 +96,12 @@ def part_matrices(part: PartMesh, material: Material) -> tuple[sp.csr_array, sp.
 def pose_grid(machine: Machine) -> tuple[np.ndarray, ...]:
     """Positions [m] per linear axis: the description's list, or so many over the stroke, ends included (5 by default).
 
-    A single one lies in the middle of the stroke.
+    A single one lies in the middle of the stroke; a machine of parts without a TCP has no other.
     """
     grid = []
+    still = not (machine.lumped or machine.has_tcp)
     for name in linear_axes(machine):
-        wanted, (low, high) = machine.poses.get(name, DEFAULT_POSES), machine.axes[name].stroke
+        wanted, (low, high) = 1 if still else machine.poses.get(name, DEFAULT_POSES), machine.axes[name].stroke
         if wanted == 1:
             grid.append(np.array([(low + high) / 2]))
         elif isinstance(wanted, int):
@@ -164,9 +165,10 @@ def _film_terms(body: BodyMesh, films: FilmSurfaces, load: LoadModel, height: np
 def _joint_terms(machine: Machine, body: BodyMesh, load: LoadModel) -> Iterator[Term]:
     own = {part.name for part in body.parts}
     for j, joint in enumerate(load.joints):
-        pair = machine.contacts[joint.name].surfaces
-        if pair is not None and split_surface(pair[0])[0] in own:
-            yield joint_term(len(load.films) + j, interface(body, *pair, where=f"contacts.{joint.name}").matrix)
+        contact = machine.contacts[joint.name]
+        if contact.surfaces is not None and split_surface(contact.surfaces[0])[0] in own:
+            joined = interface(body, *contact.surfaces, where=f"contacts.{joint.name}", gap=contact.gap)
+            yield joint_term(len(load.films) + j, joined.matrix)
 
 
 def _source_loads(machine: Machine, body: BodyMesh, load: LoadModel) -> dict[int, np.ndarray]:

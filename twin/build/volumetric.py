@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.build.lumped_structure import LumpedStructure
 from twin.build.structure import Structure
+from twin.rom.lumped_structure import LumpedStructure
 
 
 @dataclass(frozen=True)

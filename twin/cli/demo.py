@@ -49,7 +49,7 @@ def command(output: str) -> int:
         f"       {result}/result.h5, temperatures.csv, tcp.csv, summary.json: the numbers\n"
         f"       {result}/index.html: the pictures\n"
         f"next   change something and see what it does:\n"
-        f"       {program} run {artefact} {experiment} --dt '30 s' --substeps 2 -o {output}/finer\n"
+        f"       {program} run {artefact} {experiment} --dt '30 s' -o {output}/finer\n"
         f"       edit a conductance in {machine}/machine.toml, then: {program} check {machine}\n"
         f"       {program} simulate {machine} {experiment} --hours 1 -o {output}/truth    the full model\n"
         f"       notebooks/build_and_run.ipynb    the same story step by step"

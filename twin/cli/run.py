@@ -24,14 +24,14 @@ def _checkpoints() -> type[Any]:
 @click.argument("run", type=click.Path())
 @click.option("-o", "--output", required=True, type=click.Path(), help="folder for the results")
 @click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
-@click.option("--substeps", default=4, show_default=True, type=click.IntRange(1), help="implicit Euler steps per step")
+@click.option("--substeps", type=click.IntRange(1), help="of the integrator per step; default: as the certificate says")
 @click.option("--initial", help="temperature at the start, e.g. '20 degC', or a result.h5 to go on from  "
               "[default: the run's own, else of the air around it]")  # fmt: skip
 @click.option("--checkpoint", default=1440, show_default=True, type=click.IntRange(1), help="steps between checkpoints")
 @click.option("--resume", is_flag=True, help="go on after an interruption, with exactly the same numbers")
 @bundled(_checkpoints)
 def command(
-    artefact: str, run: str, output: str, dt: float, substeps: int, initial: str | None, options: Checkpoints
+    artefact: str, run: str, output: str, dt: float, substeps: int | None, initial: str | None, options: Checkpoints
 ) -> None:
     """Step the model of ARTEFACT through the loads of RUN.
 

@@ -30,7 +30,9 @@ def _options() -> type[Any]:
               help="mesh size for new meshes by the model's geometry.py, e.g. '80 mm' "
               "(needs the mesh extra)")  # fmt: skip
 @click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
-@click.option("--substeps", default=4, show_default=True, type=click.IntRange(1), help="implicit Euler steps per step")
+@click.option(
+    "--substeps", default=1, show_default=True, type=click.IntRange(1), help="time integrator's steps per step"
+)
 @click.option("--hours", type=click.FloatRange(0, min_open=True), help="stop after this time; the whole run by default")
 @click.option("--tcp-every", default="30 min", show_default=True, type=Quantity("s"),
               help="TCP rows, where the run has no tcp.csv")  # fmt: skip

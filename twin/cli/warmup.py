@@ -50,17 +50,19 @@ def text(result: str, told: dict[str, Any]) -> str:
         "  ".join([row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:], strict=True))])
         for row in rows
     ]
+    sensors = told["sensors"].values()
+    counted = f"{sum(e['settled'] for e in sensors)} of {len(sensors)} sensors settled within {told['tolerance_K']:g} K"
+    if not told["tcp_worst"]:
+        return "\n".join([f"{result}: the TCP never moves; {counted}", *(line.rstrip() for line in table)])
     if told["settled"]:
         verdict = f"TCP warm after {_minutes(told['time_s'])}"
     else:
         verdict = f"TCP not settled after {told['duration_s'] / 60:.0f} min"
     name, worst = max(told["tcp_worst"].items(), key=lambda item: abs(item[1]["end_rate_m_per_s"]))
-    sensors = told["sensors"].values()
     return "\n".join(
         [
             f"{result}: {verdict} (worst poses, within {1e6 * told['tolerance_m']:g} um for "
-            f"{told['horizon_s'] / 3600:g} h); {sum(e['settled'] for e in sensors)} of {len(sensors)} sensors settled "
-            f"within {told['tolerance_K']:g} K",
+            f"{told['horizon_s'] / 3600:g} h); {counted}",
             f"fastest drift at the end: {labels[name]}: {_drift(worst, 'm', 1e6, 'um')}",
             *(line.rstrip() for line in table),
         ]

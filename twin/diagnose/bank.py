@@ -134,7 +134,7 @@ def _integrated(
         for j, vector in changing:
             V[:, j] = vector[t]
         known = V[:, which] * S[t]
-        *_, (X, _) = stages(SDIRK2, partial(solve, t), lambda X: rate * X, X, known)
+        X, _ = stages(SDIRK2, partial(solve, t), lambda X: rate * X, X, known)
         T[t + 1] = C @ X
         if t + 1 in needed:
             kept[t + 1] = X

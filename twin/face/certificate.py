@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from twin.rom.certificate_table import table
+
 
 class Certificate(Mapping[str, Any]):
     """Figures of a certificate by name, as the artefact stores them (docs/artefact.md); K and m."""
@@ -35,7 +37,7 @@ class Certificate(Mapping[str, Any]):
 
     @property
     def displacement_error(self) -> float:
-        """m: the largest error of the TCP displacement at any pose, likewise."""
+        """m: the largest error of the TCP displacement at any pose or random position, likewise."""
         return float(self["max_displacement_error_in_case"])
 
     def __str__(self) -> str:
@@ -45,7 +47,7 @@ class Certificate(Mapping[str, Any]):
         return f"Certificate(passed={self.passed})"
 
     def lines(self, every_output: bool = False) -> list[str]:
-        """Summary lines, one per figure; with `every_output` also a line per sensor."""
+        """Summary lines, one per figure; with `every_output` also a table of all outputs."""
         error_T, span_T = (_largest(self[f"temperature_{k}"]) for k in ("error", "range"))
         error_u, span_u = (_largest(self[f"displacement_{k}"]) for k in ("error", "range"))
         text = [
@@ -55,29 +57,63 @@ class Certificate(Mapping[str, Any]):
             f"  sensors   {self.temperature_error:.4f} K in a {self['case_temperature']:g} K case "
             f"(limit {self['limit_temperature']:g} K); as drawn {error_T:.3f} K at ranges up to {span_T:.0f} K: "
             f"{self['worst_temperature']}",
-            f"  TCP       {1e6 * self.displacement_error:.3f} um in a {1e6 * self['case_displacement']:g} um case "
-            f"(limit {1e6 * self['limit_displacement']:g} um); as drawn {1e6 * error_u:.2f} um at ranges up to "
-            f"{1e6 * span_u:.0f} um: {self['worst_displacement']}",
-            f"  worst output relative to its own range: {100 * self['worst_relative']:.2f} % "
-            f"(limit {100 * self['limit_relative']:g} %)",
         ]
-        rich_T, rich_u = self["rich_temperature_error"], self["rich_displacement_error"]
-        if rich_T is not None and rich_u is not None:
-            full = self["full_scenarios"]
+        if span_u > 0.0:
             text.append(
-                f"  of which rich against full, on {len(full)}: {rich_T:.1e} K, {1e6 * rich_u:.1e} um "
-                f"({'; '.join(full)})"
+                f"  TCP       {1e6 * self.displacement_error:.3f} um in a {1e6 * self['case_displacement']:g} um case "
+                f"(limit {1e6 * self['limit_displacement']:g} um); as drawn {1e6 * error_u:.2f} um at ranges up to "
+                f"{1e6 * span_u:.0f} um: {self['worst_displacement']}"
             )
-        else:
+        text.append(
+            f"  relative to its own range {100 * self['worst_relative']:.2f} % "
+            f"(limit {100 * self['limit_relative']:g} %): {self.get('worst_relative_output') or 'any output'}"
+        )
+        text += self._parts()
+        if not self["full_scenarios"]:
             text.append("  the full model is not in this chain yet: twin verify puts it there")
         if every_output:
-            columns = ("sensors", "temperature_error_in_case", "temperature_error", "temperature_range")
-            text += [
-                f"    {name:<24} {case:.4f} K in the case; as drawn {error:.4f} K of {span:.1f} K"
-                for name, case, error, span in zip(*(self[c] for c in columns), strict=True)
-            ]
-        text.append("passed" if self.passed else "FAILED: an error is above its limit")
-        return text
+            text += table(self)
+        return [*text, "passed"] if self.passed else [*text, *(f"FAILED: {reason}" for reason in self.reasons())]
+
+    def _parts(self) -> list[str]:
+        """Where the error arises, largest figures in the case; artefacts of before 0.7 do not say."""
+        text = []
+        for part in self.get("parts", ()):
+            T, u = (_largest(part[f"{k}_error_in_case"]) for k in ("temperature", "displacement"))
+            of_tcp = f"  {1e6 * u:7.3f} um" if _largest(self["displacement_range"]) > 0.0 else ""
+            beside = "" if part["counts"] else ", not in the sums"
+            text.append(
+                f"    {part['name']:<11} {T:.4f} K{of_tcp}  {part['between']}, "
+                f"{len(part['scenarios'])} scenarios{beside}"
+            )
+        return ["  in the case, of it:", *text] if text else []
+
+    def reasons(self) -> list[str]:
+        """Why it has not passed: which limit of the description, by how much, and the remedy; empty where it has."""
+        T, u = self.temperature_error, self.displacement_error
+        compared = (
+            ("temperature", T, self["limit_temperature"], f"in the case; {self['worst_temperature']}"),
+            ("displacement", u, self["limit_displacement"], f"in the case; {self['worst_displacement']}"),
+            ("relative", self["worst_relative"], self["limit_relative"], self.get("worst_relative_output", "")),
+        )
+        return [
+            f"{100 * error / limit:.0f} % of limits.{name} ({output}): {self._remedy(name)}, or allow more in "
+            "[limits] of the description"
+            for name, error, limit, output in compared
+            if error > limit
+        ]
+
+    def _remedy(self, name: str) -> str:
+        """What makes the largest part of an error smaller."""
+        quantity = "displacement" if name == "displacement" else "temperature"
+        parts = [p for p in self.get("parts", ()) if p["counts"]]
+        worst = max(parts, key=lambda p: _largest(p[f"{quantity}_error_in_case"]), default={"name": "reduction"})
+        return {
+            "reduction": "build it with more --states",
+            "time step": "most of it is the time step: build it with more substeps (BuildOptions)",
+            "poses": "most of it lies between the poses of the grid: add poses in [workspace]",
+            "rich basis": "most of it is the rich basis: build it with more --samples",
+        }[worst["name"]]
 
 
 def _largest(table: Any) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -37,10 +37,12 @@ def correct(
 
     time: since the start of the run, by default its end. degree: of the polynomial, "2", or "x=4,y=2". form: all
     products of powers, or one factor per axis. zero_at: position of the only axis where the error is held at zero.
-    Raises TwinError for results of another model, times outside the run, and an output that is no correction.
+    Raises TwinError for models without a TCP, results of another model, times outside the run, and an output that is no
+    correction.
     """
     from twin.atomic import check_file
     from twin.face.model import read
+    from twin.face.still import refuse_still
     from twin.run.correction import check_zero, default_degrees, fit_correction, quality
     from twin.run.correction_axes import axis_jacobian
     from twin.run.correction_file import read_pose_errors, write_correction
@@ -50,7 +52,9 @@ def correct(
     check_file(Path(output))
     _check_output(Path(output))
     loaded = read(model).artefact
+    refuse_still(loaded.model)
     errors, at = read_pose_errors(Path(result), loaded.digest, wanted)
+    errors = replace(errors, model=loaded.model)
     if zero is not None:
         check_zero(zero, errors.axes, loaded.model.load_model.axes)
     degrees = _degrees(degree, errors.axes, default_degrees(errors))

@@ -98,7 +98,7 @@ class Model:
         output: str | Path | None = None,
         *,
         dt: Quantity = "60 s",
-        substeps: int = 4,
+        substeps: int | None = None,
         initial: Result | np.ndarray | Quantity | None = None,
         checkpoints: Checkpoints | None = None,
         progress: Progress | bool | None = None,
@@ -115,14 +115,16 @@ class Model:
         machine: Machine | str | Path | None = None,
         *,
         full: int = 2,
+        mesh: bool = False,
         options: BuildOptions | None = None,
         progress: Progress | bool | None = None,
     ) -> Model:
         """The model with a certificate over held-out scenarios that it has never seen.
 
         machine: its description, where it is not where the model was built. full: how many of the scenarios are also
-        stepped with the full model; 0: none, the certificate then says nothing about it.
-        Raises ArtefactError where the machine is gone, or another one.
+        stepped with the full model; 0: none, the certificate then says nothing about it. mesh: whether
+        it states the error of the mesh too, which takes up to some minutes.
+        Raises ArtefactError where the machine is gone, or another one, DescriptionError for `mesh` of a lumped one.
         """
         from twin.build.pipeline import BuildOptions as Options
         from twin.build.product import verified
@@ -130,9 +132,8 @@ class Model:
         from twin.progress import reporter
 
         path = machine.path if isinstance(machine, Machine) else machine
-        result = verified(
-            self.artefact, None if path is None else Path(path), options or Options(), full, reporter(progress)
-        )
+        where = None if path is None else Path(path)
+        result = verified(self.artefact, where, options or Options(), full, reporter(progress), mesh=mesh)
         return replace(self, artefact=replace(self.artefact, certificate=result.to_json()))
 
 

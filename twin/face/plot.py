@@ -72,9 +72,11 @@ class Plot:
         return surface_of(artefact, self._drawn, self._machine, hours)
 
     def _refuse_still(self) -> None:
-        if not self.result.model.artefact.model.moves:
-            remedy = "the description has no [tcp.expansion] and no [tcp.screws]"
-            raise TwinError("no temperature moves the tool", self.result.model.name, remedy)
+        from twin.pictures.placed import no_tcp
+
+        artefact = self.result.model.artefact
+        if not artefact.model.moves:
+            raise TwinError("no temperature moves the tool", self.result.model.name, no_tcp(artefact))
 
     @cached_property
     def _machine(self) -> Machine:

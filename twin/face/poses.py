@@ -59,13 +59,14 @@ def poses(
 ) -> Poses:
     """Which pose grid of a machine suffices for the loads of a run, measured at random poses with the full model.
 
-    Raises DescriptionError for a machine without linear axes.
+    Raises DescriptionError for a machine without linear axes, TwinError for one without a TCP.
     """
     import numpy as np
 
     from twin.build.pipeline import full_model
     from twin.build.pose_study import fields_of_run, study_grids
     from twin.build.volumetric import displacements, grid_points, volumetric_shares
+    from twin.face.still import refuse_still
 
     o, report = options or PoseOptions(), reporter(progress)
     allowed = positive("tolerance", o.tolerance, "m")
@@ -75,6 +76,7 @@ def poses(
     log = run_of(run)
     span = float(log.loads.time[-1] - log.loads.time[0])
     full = full_model(described, report)
+    refuse_still(full.thermal)
     structure = full.structure
     strokes = [described.axes[a].stroke for a in structure.axes]
     if not strokes:

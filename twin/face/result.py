@@ -44,7 +44,7 @@ class Result:
 
     @property
     def tcp_actual(self) -> xarray.DataArray:
-        """(time, component) m: the TCP error where the axes are, interpolated between the poses."""
+        """(time, component) m: the TCP error where the axes are (of old artefacts interpolated between the poses)."""
         dims = ("time", "component")
         return self._of(self.numbers.tcp_actual, dims, "tcp_actual", "m", "TCP error at the actual position")
 
@@ -97,18 +97,20 @@ class Result:
 
     def __str__(self) -> str:
         told = self.summary
-        worst = told["tcp"]["worst"]
-        place = ", ".join(f"{axis} {1e3 * value:.0f} mm" for axis, value in worst["pose_m"].items())
-        largest = (
-            f"largest TCP error d{worst['component']} {1e6 * worst['value_m']:.1f} um after "
-            f"{worst['time_s'] / 3600:.2f} h at {place or 'the only pose'}"
-            if self.model.artefact.model.moves
-            else "no temperature moves the tool"
-        )
+        largest = "no temperature moves the tool"
+        if told["tcp"] is not None:
+            worst = told["tcp"]["worst"]
+            place = ", ".join(f"{axis} {1e3 * value:.0f} mm" for axis, value in worst["pose_m"].items())
+            largest = (
+                f"largest TCP error d{worst['component']} {1e6 * worst['value_m']:.1f} um after "
+                f"{worst['time_s'] / 3600:.2f} h at {place or 'the only pose'}"
+            )
         lines = [
             f"{told['steps']} steps of {told['step_s']:g} s; {largest}; "
             f"heat balance closes to {told['heat']['max_balance_error']:.1e} of the throughput"
         ]
+        if not self.numbers.exact and len(self.numbers.poses) > 1:
+            lines.append("TCP error at the actual position: interpolated, for the artefact is older; build it again")
         raised = {name: flag for name, flag in told["flags"].items() if flag["steps"]}
         if raised:
             lines.append(f"outside what was certified in {told['flagged_steps']} of {told['steps']} steps:")

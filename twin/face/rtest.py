@@ -121,6 +121,7 @@ def _nearest(facts: list[dict[str, Any]], wanted: float, read: Readings, pause: 
 def _chain(text: str | None, model: Model | str | Path | None) -> Chain:
     from twin.calibrate.axis_errors.chain import EXAMPLE, chain_of, parse_chain
     from twin.face.model import read
+    from twin.face.still import refuse_still
 
     if text is not None:
         return parse_chain(text)
@@ -128,7 +129,9 @@ def _chain(text: str | None, model: Model | str | Path | None) -> Chain:
         raise TwinError(
             "which axes carry the tool is not known", "--chain", f"write --chain {EXAMPLE}, or --artefact A.h5"
         )
-    return chain_of(read(model).artefact)
+    artefact = read(model).artefact
+    refuse_still(artefact.model)
+    return chain_of(artefact)
 
 
 def _ranges(chain: Chain, read: Readings) -> dict[str, list[float]]:

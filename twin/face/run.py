@@ -34,16 +34,17 @@ def run(
     output: str | Path | None = None,
     *,
     dt: Quantity = "60 s",
-    substeps: int = 4,
+    substeps: int | None = None,
     initial: Result | np.ndarray | Quantity | None = None,
     checkpoints: Checkpoints | None = None,
     progress: Progress | bool | None = None,
 ) -> Result:
     """Step a model through the loads of a run; `model.run(RUN)` is the same.
 
-    output: folder for result.h5, temperatures.csv, tcp.csv and summary.json. dt: of a step, taken in so many implicit
-    Euler `substeps`. initial: temperature at the start ("20 degC"), or what to go on from: a result, its final state
-    (N,), or the path of a result.h5; by default the run's own, else that of the air around it.
+    output: folder for result.h5, temperatures.csv, tcp.csv and summary.json. dt: of a step, taken in so many `substeps`
+    of the integrator; by default as many as the model is certified with. initial: temperature at the start ("20 degC"),
+    or what to go on from: a result, its final state (N,), or the path of a result.h5; by default the run's own, else
+    that of the air around it.
     Raises LogError for missing signals and bad times, TwinError for results and checkpoints of another model.
 
     >>> import twin

@@ -25,7 +25,7 @@ class ScoreOptions:
     """How a score is taken."""
 
     dt: Quantity = "60 s"
-    substeps: int = 4
+    substeps: int | None = None
     restart: bool = False  # segments are tests of their own, each from its own initial state
     hold_interval: Quantity = "0 s"  # between the measurements that "hold last" may use; 0: all of them
     tcp_uncertainty: Quantity = "1 um"  # standard deviation where tcp.csv has none
@@ -97,7 +97,7 @@ def score(
     >>> model = twin.build("tests/machines/spindle", options=twin.BuildOptions(held_out=4))
     >>> truth = twin.simulate("tests/machines/spindle", "tests/machines/spindle/runs/warm_up", "out/truth")
     >>> score = twin.score(model, "out/truth")
-    >>> score.temperature_rms < 0.001  # K: nothing is reduced away here, and no noise was added
+    >>> score.temperature_rms < 0.01  # K: nothing is reduced away here; the simulation took steps half as long
     True
     """
     from twin.run.replay import replay  # noqa: F401  isort: skip  first: it prepares JAX before NumPy is loaded

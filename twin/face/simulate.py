@@ -21,7 +21,7 @@ class SimulateOptions:
 
     size: Quantity | None = None  # m: new meshes of this size by the model's geometry.py
     dt: Quantity = "60 s"
-    substeps: int = 4  # implicit Euler steps per step
+    substeps: int = 1  # steps of the second-order method per step
     hours: float | None = None  # stop after this time; the whole run by default
     tcp_every: Quantity = "30 min"  # TCP rows, where the run has no tcp.csv
     noise_temperature: Quantity = "0 K"  # standard deviation at sensors

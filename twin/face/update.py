@@ -101,7 +101,8 @@ def update(
 
     earlier: runs measured before, from which to learn how far the model may be off where no parameter explains it
     (method "state"). output: folder to write.
-    Raises LogError for runs without TCP measurements, TwinError for options that exclude each other.
+    Raises LogError for runs without TCP measurements, TwinError for models without a TCP and options that exclude each
+    other.
 
     >>> import twin
     >>> model = twin.build("tests/machines/spindle", options=twin.BuildOptions(held_out=4))
@@ -121,6 +122,7 @@ def update(
     from twin.calibrate.update.files import summary
     from twin.calibrate.update.tune import tune
     from twin.face.model import read
+    from twin.face.still import refuse_still
     from twin.run.results import refuse_run_folder
 
     options = options or UpdateOptions()
@@ -135,6 +137,7 @@ def update(
         refuse_run_folder(Path(output))
     loaded = read(model)
     artefact = loaded.artefact
+    refuse_still(artefact.model)
     tuned = tune(artefact, runs_of(before), settings, progress=report) if before else None
     settings = settings if tuned is None else tuned.options
     measured = run_of(run)

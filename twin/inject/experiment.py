@@ -15,7 +15,7 @@ from twin.machine.description import Machine
 from twin.machine.load import load_machine
 
 RUNS = ("diagnosis_1", "diagnosis_2", "diagnosis_sealed")  # the last is kept for judging
-STEP, STEPS, SUBSTEPS = 60.0, 720, 4  # s, of a run, of a step
+STEP, STEPS, SUBSTEPS = 60.0, 720, 1  # s, of a run, of a step
 HOUR = 3600.0  # s
 START = 22.0  # degC, of every run
 MEASURED_EVERY, PLACES, APART = 1800.0, 3, 60.0  # s, places of the TCP one after the other, s between them

@@ -36,11 +36,26 @@ def check_machine(machine: Machine) -> list[Problem]:
     problems: list[Problem] = []
     for name, material in machine.materials.items():
         problems += _material(name, material)
-    problems += lumped_oddities(machine) if machine.lumped else []
+    problems += lumped_oddities(machine) if machine.lumped else _without_tcp(machine)
     problems += _joints(machine)
     problems += _encoders(machine)
     problems += _unused(machine)
     return problems
+
+
+def _without_tcp(machine: Machine) -> Iterator[Problem]:
+    """What nothing reads in a machine of parts that describes no TCP."""
+    if machine.has_tcp:
+        return
+    unread = [f"supports.{name}" for name in machine.supports]
+    unread += [
+        f"contacts.{name}.stiffness" for name, c in machine.contacts.items() if "stiffness" in c.model_fields_set
+    ]
+    unread += [f"poses.{name}" for name in machine.poses]
+    if unread:
+        what = f"without a TCP nothing reads {', '.join(unread[:4])}" + (" ..." if len(unread) > 4 else "")
+        remedy = "describe [tcp.tool] and [tcp.work]; or leave it: temperatures are computed all the same"
+        yield Problem(what, "machine.toml: tcp", remedy, warning=True)
 
 
 def _encoders(machine: Machine) -> Iterator[Problem]:
@@ -73,7 +88,7 @@ def _material(name: str, material: Material) -> Iterator[Problem]:
     for key, (low, high, unit) in bands.items():
         value = getattr(material, key)
         if key not in material.model_fields_set:
-            continue  # of a lumped machine
+            continue  # what only a TCP needs
         if low <= value <= high:
             continue
         where = f"machine.toml: materials.{name}.{key}"

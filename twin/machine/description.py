@@ -71,9 +71,10 @@ class Material(Entry):
     conductivity: Conductivity = Field(gt=0)
     density: Density = Field(gt=0)
     heat_capacity: HeatCapacity = Field(gt=0)
-    youngs_modulus: Pressure = Field(default_factory=_not_given, gt=0)  # of nodes and bars not needed
-    poisson_ratio: float = Field(default_factory=_not_given, gt=-1, lt=0.5)  # likewise
-    expansion: Expansion
+    # needed of parts where the machine has a TCP; nodes and bars need an expansion at most, as screws
+    youngs_modulus: Pressure = Field(default_factory=_not_given, gt=0)
+    poisson_ratio: float = Field(default_factory=_not_given, gt=-1, lt=0.5)
+    expansion: Expansion = Field(default_factory=_not_given)
 
 
 class Box(Entry):
@@ -163,7 +164,8 @@ class JointLaw(Entry):
 
 
 class Contact(Entry):
-    """fixed: two surfaces glued, meshes need not match. moving: pads (carriages, nuts) on rails or screws.
+    """fixed: two surfaces glued, meshes need not match; or across a gap, which passes heat and no force. moving: pads
+    (carriages, nuts) on rails or screws.
 
     Of a lumped machine, `surfaces` are nodes or ends of bars, and a pair is (bar, node).
     """
@@ -178,9 +180,16 @@ class Contact(Entry):
     area: Area | None = Field(None, gt=0)  # lumped machines: of the joint, or of each pad
     total: Conductance | None = Field(None, gt=0)  # lumped machines: of the joint or each pad, instead of both
     joint: JointLaw | None = None  # fixed: instead of `conductance`
+    # fixed: the surfaces face each other, up to this far apart, and pass heat alone: an air gap, a shim
+    gap: Length | None = Field(None, gt=0)
     switch: str | None = None  # signal 0 .. 1: a clamp, a preload, an oil film
     switched: float | None = Field(None, gt=0)  # factor of the conductance where the switch is 1, in shares between
     stiffness: StiffnessOfPair = StiffnessOfPair()  # moving; fixed joints are glued
+
+    @property
+    def glues(self) -> bool:
+        """Whether it joins two surfaces that lie on each other, which then move as one."""
+        return self.kind == "fixed" and self.gap is None
 
 
 class Tank(Entry):
@@ -340,6 +349,11 @@ class Machine(Entry):
     def lumped(self) -> bool:
         """Whether it consists of nodes and bars."""
         return bool(self.nodes or self.bars)
+
+    @property
+    def has_tcp(self) -> bool:
+        """Whether a TCP is described; one that is described wrongly (None) is, too."""
+        return self.tcp is None or bool(self.tcp.model_fields_set)
 
     @property
     def members(self) -> tuple[str, ...]:

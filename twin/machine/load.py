@@ -119,7 +119,8 @@ def _with_missing_sections(found: dict[Keys, Problem], data: dict[str, Any]) -> 
     """Those of a machine of meshed parts besides, and all in the order of the description; a lumped one needs none."""
     if any(isinstance(data.get(key), dict) and data[key] for key in ("nodes", "bars")):
         return found
-    every = found | {(key,): missing_section(key) for key in _OF_PARTS if key not in data or data[key] == {}}
+    needed = _OF_PARTS if data.get("tcp") in (None, {}) else (*_OF_PARTS, "supports")
+    every = found | {(key,): missing_section(key) for key in needed if key not in data or data[key] == {}}
     place = {section: i for i, section in enumerate(Machine.model_fields)}
     return dict(sorted(every.items(), key=lambda item: place.get(item[0][0] if item[0] else "", -1)))
 
@@ -134,7 +135,7 @@ def _sound(data: dict[str, Any], unknown: list[Keys], broken: list[Keys]) -> dic
     return sound
 
 
-_OF_PARTS = ("materials", "parts", "tcp", "supports")  # sections that only lumped machines can do without
+_OF_PARTS = ("materials", "parts")  # sections that only lumped machines can do without
 
 
 def _meant(keys: Keys, data: dict[str, Any]) -> str | None:

@@ -124,7 +124,11 @@ def _contacts(machine: Machine) -> Iterator[Problem]:
         where = f"contacts.{name}"
         yield from (_fixed if contact.kind == "fixed" else _moving)(contact, where, machine)
         yield from _strength(contact, where)
-        foreign = {"stiffness": "a lumped machine does not bend", "segments": "the bar's elements are its segments"}
+        foreign = {
+            "stiffness": "a lumped machine does not bend",
+            "segments": "the bar's elements are its segments",
+            "gap": "nodes have no distance, their conductance says all",
+        }
         for key, why in foreign.items():
             if key in contact.model_fields_set:
                 yield Problem(f"'{key}' in a contact of a lumped machine", f"{where}.{key}", f"remove it: {why}")
@@ -280,6 +284,10 @@ def _tcp(machine: Machine) -> Iterator[Problem]:
         if not found and not astray and len(nuts) != 1:
             remedy = "give one moving contact with the one pair of screw and nut"
             yield Problem(f"{len(nuts) or 'no'} nuts run on screw '{name}'", where, remedy)
+        material = machine.bars[name].material if machine.bars.get(name) is not None else ""
+        if (entry := machine.materials.get(material)) is not None and "expansion" not in entry.model_fields_set:
+            remedy = f"screw '{name}' is made of it: write expansion = \"11.5e-6 1/K\""
+            yield Problem("missing key 'expansion'", f"materials.{material}.expansion", remedy)
 
 
 def bodies_without_film(machine: Machine, bodies: Iterable[tuple[str, ...]]) -> Iterator[Problem]:

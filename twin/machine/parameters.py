@@ -100,7 +100,7 @@ def _materials(machine: Machine) -> Iterator[_Declared]:
         if members := [*parts, *nodes, *bars]:
             capacity, unit = material.heat_capacity, "J/(kg*K)"
             yield _scale(f"{path}.heat_capacity", "capacity", members, capacity, unit, HEAT_CAPACITY, NARROW)
-        growing = [*parts, *(bar for bar in bars if bar in machine.tcp.screws)]
+        growing = [*(parts if machine.has_tcp else ()), *(bar for bar in bars if bar in machine.tcp.screws)]
         if growing and name not in mixed:
             alpha = material.expansion
             yield _scale(f"{path}.expansion", "expansion", growing, alpha, "1/K", EXPANSION, EXPANSION_BOUND)

@@ -18,6 +18,7 @@ from twin.machine import description, wiring
 from twin.machine.added import added_problems
 from twin.machine.bodies import bodies_of
 from twin.machine.description import BOX_SURFACES, Machine
+from twin.machine.displaced import elastic_constants, held_by_a_gap
 from twin.machine.encoders import encoder_problems, scale_problems
 from twin.machine.kinematics import linear_axes, rail_moves
 from twin.machine.lumped_references import (
@@ -70,7 +71,7 @@ def _parts(machine: Machine) -> Iterator[Problem]:
     if not machine.parts:
         remedy = "add at least one [parts.NAME] with a material and a mesh or a box, or [nodes.NAME] with a capacity"
         yield Problem("no parts", "parts", remedy)
-    missing: set[tuple[str, str]] = set()
+    yield from elastic_constants(machine)
     for name, part in machine.parts.items():
         if part is None:
             continue
@@ -78,12 +79,6 @@ def _parts(machine: Machine) -> Iterator[Problem]:
         if part.material not in machine.materials:
             remedy = did_you_mean(part.material, machine.materials, "materials")
             yield Problem(f"unknown material '{part.material}'", f"{where}.material", remedy)
-        elif (material := machine.materials[part.material]) is not None:
-            for key in ("youngs_modulus", "poisson_ratio"):
-                if key not in material.model_fields_set and (part.material, key) not in missing:
-                    missing.add((part.material, key))
-                    remedy = 'parts bend: write youngs_modulus = "120 GPa" and poisson_ratio = 0.26, for example'
-                    yield Problem(f"missing key '{key}'", f"materials.{part.material}.{key}", remedy)
         if (part.mesh is None) == (part.box is None):
             yield Problem("give either a mesh or a box", where, 'set mesh = "file.msh" or box = {...}, not both')
         elif part.mesh is not None and not (machine.folder / part.mesh).is_file():
@@ -176,6 +171,9 @@ def _moving(entry: description.Contact, where: str, machine: Machine) -> Iterato
     if entry.axis not in linear:
         what = f"'{entry.axis}' is not a linear axis" if entry.axis else "a moving contact without an axis"
         yield Problem(what, f"{where}.axis", did_you_mean(entry.axis or "", linear, "linear axes"))
+    if entry.gap is not None:
+        remedy = "remove it: pads lie on their rails; or kind = 'fixed'"
+        yield Problem("'gap' in a moving contact", f"{where}.gap", remedy)
     if "surfaces" in entry.model_fields_set:
         yield Problem(
             "'surfaces' in a moving contact",
@@ -196,6 +194,9 @@ def _moving(entry: description.Contact, where: str, machine: Machine) -> Iterato
 def _added(machine: Machine) -> Iterator[Problem]:
     judge = heated_place if machine.lumped else _surface
     yield from added_problems(machine, lambda place, where: judge(place, where, machine))
+    for name in machine.scales if not (machine.lumped or machine.has_tcp) else ():
+        remedy = "describe [tcp.tool] and [tcp.work], or remove it"
+        yield Problem("a scale moves the TCP, and there is none", f"scales.{name}", remedy)
 
 
 def _laws(machine: Machine) -> Iterator[Problem]:
@@ -271,7 +272,7 @@ def _tcp(machine: Machine) -> Iterator[Problem]:
 
 
 def _supports(machine: Machine) -> Iterator[Problem]:
-    if not machine.supports:
+    if not machine.supports and machine.has_tcp:
         yield Problem("no supports", "supports", "the machine must stand on something: add a [supports.NAME]")
     for name, support in machine.supports.items():
         if support is not None:
@@ -305,6 +306,7 @@ def _poses(machine: Machine) -> Iterator[Problem]:
 
 def _motion(machine: Machine) -> Iterator[Problem]:
     """Does every axis carry exactly one side of its contacts? Asked only of a description without other mistakes."""
+    yield from held_by_a_gap(machine)
     for contact in machine.contacts.values():
         for rail, pad in contact.pairs:
             try:

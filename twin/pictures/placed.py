@@ -21,6 +21,12 @@ def described(artefact: Artefact) -> Machine:
     return Machine.model_validate(tomllib.loads(artefact.description))
 
 
+def no_tcp(artefact: Artefact) -> str:
+    """What a description lacks where no temperature moves the tool."""
+    keys = "[tcp.expansion] and no [tcp.screws]" if described(artefact).lumped else "[tcp.tool] and no [tcp.work]"
+    return f"the description has no {keys}"
+
+
 def placed_surface(machine: Machine, fields: Sequence[SurfaceField], positions: Mapping[str, float]) -> SurfaceMesh:
     """All bodies' surfaces with every linear axis at its position [m]; points in the order of `fields`."""
     points = [f.nodes + displacement(machine, f.body, dict(positions)) for f in fields]

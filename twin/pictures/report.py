@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from twin.atomic import atomic_path
 from twin.machine.description import Machine
-from twin.pictures.placed import described, placed_surface, poses_in_space
+from twin.pictures.placed import described, no_tcp, placed_surface, poses_in_space
 from twin.pictures.raster import Camera
 from twin.pictures.result import Drawn, read_result
 from twin.pictures.surface import surface_figure
@@ -20,6 +20,7 @@ from twin.pictures.temperatures import temperature_figure
 from twin.pictures.workspace import workspace_figure
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
+from twin.rom.certificate_table import table
 
 _SHARES = (1 / 12, 1 / 3, 1 / 2, 1.0)  # of a run: the four times of the surface picture
 
@@ -113,7 +114,7 @@ def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
         f"largest TCP displacement {1e6 * result.tcp[worst]:+.1f} µm in {'xyz'[worst[2]]} "
         f"after {result.hours[worst[0]]:.2f} h"
         if artefact.model.moves
-        else "no temperature moves the tool: the description has no [tcp.expansion] and no [tcp.screws]",
+        else f"no temperature moves the tool: {no_tcp(artefact)}",
         f"{int(result.outside.sum())} steps outside the certified box",
     ]
     if not artefact.fields:
@@ -124,10 +125,14 @@ def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
         f"<figcaption>{html.escape(caption)}</figcaption></figure>"
         for name, caption in captions.items()
     )
+    errors = html.escape("\n".join(table(artefact.certificate))) if artefact.certificate else "no certificate"
+    files = ["result.h5", "temperatures.csv", *(["tcp.csv"] if artefact.model.moves else []), "summary.json"]
+    links = ", ".join(f'<a href="{name}">{name}</a>' for name in files)
     title = html.escape(f"{artefact.model.name}: result")
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
 body {{ font: 15px/1.5 system-ui, sans-serif; color: #22262b; max-width: 1100px; margin: 2rem auto; padding: 0 1rem; }}
+pre {{ overflow-x: auto; font-size: 12px; }}
 figure {{ margin: 2rem 0; }} img {{ max-width: 100%; }} figcaption {{ color: #6a7078; }}
 </style></head><body>
 <h1>{title}</h1>
@@ -135,7 +140,11 @@ figure {{ margin: 2rem 0; }} img {{ max-width: 100%; }} figcaption {{ color: #6a
 {items}
 </ul>
 {pictures}
-<p>Numbers behind the pictures: <a href="result.h5">result.h5</a>, <a href="temperatures.csv">temperatures.csv</a>,
-<a href="tcp.csv">tcp.csv</a>, <a href="summary.json">summary.json</a>.</p>
+<h2>Errors of the model</h2>
+<p>Largest over the held-out scenarios of the certificate, K and um.</p>
+<pre>
+{errors}
+</pre>
+<p>Numbers behind the pictures: {links}.</p>
 </body></html>
 """

@@ -53,7 +53,8 @@ def _body(body: AffineBody, chosen: Sequence[tuple[Parameter, float]]) -> Affine
     capacity = _factors(chosen, "capacity")
     expansion = _factors([(p, v) for p, v in chosen if p.component < 0], "expansion")
     shift = {(t, p.component): v - p.nominal for p, v in chosen if p.component >= 0 for t in p.targets}
-    E, G, E_members, G_members = body.E, body.G, body.E_members, body.G_members
+    E, G, W = body.E, body.G, body.W
+    E_members, G_members, W_members = body.E_members, body.G_members, body.W_members
     for m, name in enumerate(body.members):
         factor, growth = capacity.get(name, 1.0), expansion.get(name, 1.0)
         more = {c: d for (target, c), d in shift.items() if target == name}
@@ -68,7 +69,17 @@ def _body(body: AffineBody, chosen: Sequence[tuple[Parameter, float]]) -> Affine
             E_members, G_members = E_members.copy(), G_members.copy()
             E_members[m] *= factor
             G_members[m] = own
-    return replace(body, E=E, G=G, energy=E.T @ body.left_one, E_members=E_members, G_members=G_members)
+        if W is not None:
+            read = growth * member_inputs(body, m)
+            for component, per_kelvin in more.items():  # of lumped machines: W begins with what moves the TCP itself
+                read[component] += per_kelvin * member_mean(body, m)
+            W = W + read - member_inputs(body, m)
+            if W_members is not None:
+                W_members = W_members.copy()
+                W_members[m] = read
+    return replace(
+        body, E=E, G=G, W=W, energy=E.T @ body.left_one, E_members=E_members, G_members=G_members, W_members=W_members
+    )
 
 
 def member_capacity(body: AffineBody, member: int) -> np.ndarray | sp.csr_array:
@@ -88,6 +99,17 @@ def member_expansion(body: AffineBody, member: int) -> np.ndarray:
     G = np.zeros_like(body.G)
     G[:, :, _own(body, member)] = body.G[:, :, _own(body, member)]
     return G
+
+
+def member_inputs(body: AffineBody, member: int) -> np.ndarray:
+    """The share of a member in W (p, n). Raises ValueError where the body has no W."""
+    if body.W is None:
+        raise ValueError(f"body '{body.name}' has no elastic inputs")
+    if body.W_members is not None:
+        return np.asarray(body.W_members[member])
+    W = np.zeros_like(body.W)
+    W[:, _own(body, member)] = body.W[:, _own(body, member)]
+    return W
 
 
 def member_mean(body: AffineBody, member: int) -> np.ndarray:

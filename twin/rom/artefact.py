@@ -18,6 +18,7 @@ from twin.rom.hdf5_file import put, put_attributes, scale, strings, writing
 from twin.rom.load_model import LoadModel
 from twin.rom.model import AffineBody, MachineModel
 from twin.rom.parameter import Parameter
+from twin.rom.structure_file import read_structure, write_structure
 
 FORMAT = "twin artefact"
 SCHEMA_VERSION = 2
@@ -41,8 +42,10 @@ _MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
     "energy": ("J/K", ("state",)),
     "E_members": ("J/K", ("member", "equation", "state")),
     "G_members": ("m/K", ("member", "pose", "component", "state")),
+    "W": ("m/K", ("elastic_input", "state")),
+    "W_members": ("m/K", ("member", "elastic_input", "state")),
 }
-_OPTIONAL = ("H", "B_out", "P_out", "E_members", "G_members")
+_OPTIONAL = ("H", "B_out", "P_out", "E_members", "G_members", "W", "W_members")
 _INDICES = {"theta": "theta", "sources": "source", "ports": "port", "sensors": "sensor"}  # into root coordinates
 
 
@@ -102,6 +105,8 @@ def write_artefact(
             "what calibration may correct (JSON)",
         )
         _write_coordinates(f, model)
+        if model.structure is not None:
+            write_structure(f.create_group("structure"), model.structure)
         bodies = f.create_group("bodies")
         for body in model.bodies:
             _write_body(bodies.create_group(body.name), body)
@@ -137,7 +142,9 @@ def _write_body(group: h5py.Group, body: AffineBody) -> None:
     scale(group, "state", np.arange(body.n), "", "modal coordinates [K]")
     scale(group, "equation", np.arange(body.n), "", "rows")
     if body.members:
-        scale(group, "member", body.members, "", "parts, or nodes and bars: shares of E and G")
+        scale(group, "member", body.members, "", "parts, or nodes and bars: shares of E, G and W")
+    if body.W is not None:
+        scale(group, "elastic_input", np.arange(len(body.W)), "", "what the structure reads of the temperatures")
     for name, root in _INDICES.items():
         scale(group, name, np.array(getattr(body, name), dtype=np.int64), "", f"index of each {root} in /{root}")
     values = {name: getattr(body, name) for name in _MATRICES} | {
@@ -254,6 +261,7 @@ def _read(f: h5py.File, path: Path) -> Artefact:
         pose_axes=axes,
         pose_grid=tuple(_dataset(f, f"pose_grid_{axis}")[...] for axis in axes),
         poses=_dataset(f, "pose_position")[...],
+        structure=read_structure(f["structure"], strings(_dataset(f, "body"))) if "structure" in f else None,
     )
     certificate = dict(json.loads(_dataset(f, "certificate/json").asstr()[()]))
     for name, dataset in _dataset(f, "certificate").items():
@@ -295,6 +303,7 @@ def _read_body(f: h5py.File, name: str, n_poses: int) -> AffineBody:
     members = strings(f[f"bodies/{name}/member"]) if f"bodies/{name}/member" in f else ()
     n = len(values["one"])
     sizes = {"equation": n, "state": n, "pose": n_poses, "component": 3, "member": len(members)}
+    sizes["elastic_input"] = len(values.get("W", ()))
     sizes |= {k: len(v) for k, v in indices.items()}
     for part, value in values.items():
         if value.shape != tuple(sizes[dim] for dim in _MATRICES[part][1]) or not np.all(np.isfinite(value)):
@@ -321,4 +330,6 @@ def _read_body(f: h5py.File, name: str, n_poses: int) -> AffineBody:
         members=members,
         E_members=values.get("E_members"),
         G_members=values.get("G_members"),
+        W=values.get("W"),
+        W_members=values.get("W_members"),
     )

@@ -9,7 +9,8 @@ the step, so energy is neither lost nor gained.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +53,22 @@ class Drive:
     def port_heat(self) -> np.ndarray:
         """(n, n_ports) W that all contact sources bring into each port."""
         return self.contact_heat.sum(axis=1)
+
+
+def split(drive: Drive, times: int) -> Drive:
+    """The drive in steps so many times as short, each with the loads of the step that it lies in."""
+    if times == 1:
+        return drive
+    share = np.arange(1, times + 1) / times
+    edges = drive.time[:-1, None] + np.diff(drive.time)[:, None] * share
+
+    def repeated(value: Any) -> Any:
+        if isinstance(value, Following):
+            return replace(value, value=value.value.repeat(times, axis=0), outside=value.outside.repeat(times, axis=0))
+        return value.repeat(times, axis=0) if isinstance(value, np.ndarray) else value
+
+    changed: dict[str, Any] = {f.name: repeated(getattr(drive, f.name)) for f in fields(drive)}
+    return replace(drive, **changed | {"time": np.concatenate([drive.time[:1], edges.ravel()])})
 
 
 def evaluate(

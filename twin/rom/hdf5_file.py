@@ -55,6 +55,8 @@ def put(
     for axis, dim in enumerate(dims):
         owner = group
         while dim not in owner:
+            if owner.name == "/":
+                raise KeyError(f"no dimension '{dim}' for {dataset.name}")
             owner = owner.parent
         dataset.dims[axis].attach_scale(owner[dim])
     return dataset

@@ -7,6 +7,7 @@ For every body (field temperatures relative to T_ref, x in K or in modal coordin
     T_port = P^T x          (area average of a port; P also distributes port heat: sum over nodes 1)
     T_sensor = C x
     w(pose) = G[pose] x     (this body's share of the TCP displacement, m)
+    w(position) = Z(position) W x     (the same at any axis position: `twin.rom.tcp`)
     T_source = B^T x        (area average of a source's surface)
 
 gamma_k [K/m] is the rise of the environment's temperature with height, T_amb,k its value at height zero.
@@ -23,7 +24,9 @@ from typing import Any
 
 import numpy as np
 
+from twin.rom.elastic_structure import ElasticStructure
 from twin.rom.load_model import LoadModel
+from twin.rom.lumped_structure import LumpedStructure
 
 Matrix = Any  # numpy array or scipy.sparse.csr_array; `rom` itself never needs to know which
 
@@ -56,6 +59,9 @@ class AffineBody:
     first: tuple[int, ...] = ()  # of the full model: the first state of each member; the reduced ones have instead
     E_members: np.ndarray | None = None  # (n_members, n, n) J/K
     G_members: np.ndarray | None = None  # (n_members, n_poses, 3, n) m/K
+    # Elastic inputs: what the structure of the machine reads of the temperatures; None in artefacts that lack it:
+    W: np.ndarray | None = None  # (p, n) m/K; rad/K of rotations, 1 of temperatures that scales and screws read
+    W_members: np.ndarray | None = None  # (n_members, p, n) shares of the members in W, of reduced models
 
     def member_states(self, member: int) -> slice:
         """Of the full model: which states are those of a member."""
@@ -105,6 +111,7 @@ class MachineModel:
     pose_axes: tuple[str, ...]  # axis names of the grid, e.g. ("x", "y", "z")
     pose_grid: tuple[np.ndarray, ...]  # per axis the grid positions [m]
     poses: np.ndarray  # (n_poses, n_axes) m, C order over pose_grid
+    structure: ElasticStructure | LumpedStructure | None = None  # acts on W of the bodies; None: G is all there is
 
     @property
     def n(self) -> int:

@@ -50,10 +50,16 @@ def pose_weights(
     """
     position = np.atleast_2d(np.asarray(position, dtype=float))
     weights = np.ones((len(position), 1))
+    for nodes, s in zip(grid, position.T, strict=True):
+        along = axis_weights(nodes, s, kind)
+        weights = (weights[:, :, None] * along[:, None, :]).reshape(len(position), weights.shape[1] * along.shape[1])
+    return weights, outside_grid(grid, position)
+
+
+def outside_grid(grid: Sequence[np.ndarray], position: np.ndarray) -> np.ndarray:
+    """(m,) bool: which positions (m, n_axes) [m] lie beyond the poses of a grid along any axis."""
     outside = np.zeros(len(position), dtype=bool)
     for nodes, s in zip(grid, position.T, strict=True):
         margin = 1e-9 * max(abs(nodes[0]), abs(nodes[-1]))
         outside |= (s < nodes[0] - margin) | (s > nodes[-1] + margin)
-        along = axis_weights(nodes, s, kind)
-        weights = (weights[:, :, None] * along[:, None, :]).reshape(len(position), weights.shape[1] * along.shape[1])
-    return weights, outside
+    return outside

@@ -16,7 +16,9 @@ import numpy as np
 
 from twin.errors import TwinError
 from twin.rom.load_model import AxisWiring
+from twin.rom.model import MachineModel
 from twin.rom.poses import pose_weights
+from twin.rom.tcp import by_body, is_exact, tcp_at
 from twin.run.correction_axes import offset_matrix, uncorrectable
 from twin.run.correction_polynomial import (
     Polynomial,
@@ -40,9 +42,16 @@ class PoseErrors:
     grid: tuple[np.ndarray, ...]  # m, positions per axis
     poses: np.ndarray  # (n_poses, n_axes) m, C order over the grid
     tcp: np.ndarray  # (n_poses, 3) m
+    model: MachineModel | None = None  # that they are of, with
+    state: np.ndarray | None = None  # (N,) its state at that time, where both are known
 
     def at(self, position: np.ndarray) -> np.ndarray:
-        """TCP error (m, 3) [m] at positions (m, n_axes) [m], interpolated between the poses as `twin run` does."""
+        """TCP error (m, 3) [m] at positions (m, n_axes) [m], as `twin run` computes it (`twin.rom.tcp`).
+
+        Interpolated between the poses where the model is not given or has no structure.
+        """
+        if self.model is not None and self.state is not None and is_exact(self.model):
+            return tcp_at(self.model, by_body(self.model, self.state), position)
         weights, _ = pose_weights(self.grid, position)
         return np.asarray(weights @ self.tcp)
 
@@ -88,7 +97,7 @@ class Quality:
     before: np.ndarray  # largest error at the poses without correction
     residual: np.ndarray  # largest misfit of the polynomial at the poses
     residual_rms: np.ndarray
-    between: np.ndarray  # largest misfit midway between the poses, against the interpolation of `twin run`
+    between: np.ndarray  # largest misfit midway between the poses, against what `twin run` computes there
     uncorrectable: np.ndarray  # largest error at the poses in directions that no axis moves in
     after: np.ndarray  # largest error at the poses with the offsets applied
     after_between: np.ndarray  # the same midway between the poses

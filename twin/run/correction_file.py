@@ -48,7 +48,8 @@ def read_pose_errors(path: Path, artefact: str, time: float | None = None) -> tu
                 raise TwinError(what, "--time", f"write a time within, for example --time '{last / 7200:g} h'")
             axes, poses = strings(f["pose_axis"]), f["pose_position"][...]
             grid = tuple(np.unique(p) for p in poses.T)
-            return PoseErrors(axes, grid, poses, f["tcp"][row]), float(times[row] - times[0])
+            errors = PoseErrors(axes, grid, poses, f["tcp"][row], state=f["states"][row])
+            return errors, float(times[row] - times[0])
     except (OSError, KeyError) as e:
         raise TwinError("not a result of `twin run`", str(path), remedy) from e
 

@@ -16,10 +16,10 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from twin.rom.tableau import Tableau, stages
+from twin.rom.tableau import Feedback, Tableau, stages
 
 Solve = Callable[[jax.Array, jax.Array], tuple[jax.Array, jax.Array]]
-Sums = tuple[jax.Array, jax.Array, jax.Array]
+Sums = tuple[jax.Array, jax.Array, jax.Array, jax.Array]
 
 
 def integrate(
@@ -29,20 +29,44 @@ def integrate(
     capacity: Callable[[jax.Array], jax.Array],
     z: jax.Array,
     forcing: jax.Array,
+    feedback: Feedback | None = None,
 ) -> Sums:
-    """The state (N,) after equal steps from z, as `twin.rom.tableau.stages` makes each of them; and two sums over the
-    steps of the stages' weighted states (N,): of their own, and of those that their solves have seen.
+    """The state (N,) after equal steps from z, as `twin.rom.tableau.stages` makes each of them; and three sums over the
+    steps of the stages' weighted values: their own states (N,), those that their solves have seen, and the powers (k,)
+    of the feedback (none: k = 0).
     """
+    weights, ahead = jnp.asarray(tableau.weights), jnp.asarray(tableau.ahead)
+
+    def told(state: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return (jnp.zeros_like(z), jnp.zeros(0)) if feedback is None else feedback(state)
+
+    def chain(_: int, sums: Sums) -> Sums:
+        """The stages in a loop, which compiles once for all of them."""
+
+        def stage(k: jax.Array, carry: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
+            earlier, before, after, own, seen, power = carry
+            more, powers = told(before + ahead[k] * (before - earlier))
+            at, saw = solve(capacity(before) + forcing + more, before)
+            w = weights[k]
+            after = after + w / tableau.diagonal * (at - before)
+            return before, at, after, own + w * at, seen + w * saw, power + w * powers
+
+        z, own, seen, power = sums
+        made = lax.fori_loop(0, len(weights), stage, (z, z, z, own, seen, power))
+        return made[2], made[3], made[4], made[5]
 
     def one(_: int, sums: Sums) -> Sums:
-        z, own, seen = sums
-        made = stages(tableau, solve, capacity, z, forcing)
-        for weight, (at, saw) in zip(tableau.weights, made, strict=True):
+        z, own, seen, power = sums
+        after, made = stages(tableau, solve, capacity, z, forcing, feedback)
+        for weight, (at, saw, powers) in zip(tableau.weights, made, strict=True):
             own, seen = own + weight * at, seen + weight * saw
-        return made[-1][0], own, seen
+            power = power if feedback is None else power + weight * powers
+        return after, own, seen, power
 
-    first = (z, jnp.zeros_like(z), jnp.zeros_like(z))
-    return one(0, first) if steps == 1 else lax.fori_loop(0, steps, one, first)
+    step = chain if tableau.chain else one
+    nothing = jax.eval_shape(told, z)[1]
+    first = (z, jnp.zeros_like(z), jnp.zeros_like(z), jnp.zeros(nothing.shape, nothing.dtype))
+    return step(0, first) if steps == 1 else lax.fori_loop(0, steps, step, first)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1))

@@ -16,7 +16,8 @@ from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.following_flags import following_flags
-from twin.rom.poses import Kind, pose_weights
+from twin.rom.poses import outside_grid
+from twin.rom.tcp import by_body, is_exact, tcp_at
 from twin.run.checkpoint import CheckpointFolder, Steps, chain
 from twin.run.results import Result
 from twin.run.stepping import Inputs, advance, inputs_of, observe
@@ -31,18 +32,17 @@ def replay(
     artefact: Artefact,
     run: Run,
     dt: float = 60.0,
-    substeps: int = 4,
+    substeps: int | None = None,
     initial: float | np.ndarray | None = None,
     checkpoints: CheckpointFolder | None = None,
     progress: Progress = silent,
-    interpolation: Kind = "lagrange",
 ) -> Result:
     """Step the artefact's model through the loads of a run.
 
-    dt [s] and substeps: implicit Euler with dt/substeps, outputs every dt. initial: temperature of the whole machine
-    [degC], or a state (N,) in artefact coordinates (`Result.state`, `twin.run.results.read_final_state`); by default
-    the run's own initial temperature, else the first mean of its surroundings. interpolation: between poses, for
-    the TCP error at the actual position.
+    dt [s] and substeps: outputs every dt, in so many steps of the integrator; None: as many as the certificate is for.
+    initial: temperature of the whole machine [degC], or a state (N,) in artefact coordinates (`Result.state`,
+    `twin.run.results.read_final_state`); by default the run's own initial temperature, else the first mean of its
+    surroundings.
 
     Raises LogError for missing signals and bad times, TwinError for checkpoints of another run.
     """
@@ -58,21 +58,22 @@ def replay(
     # a position that is not logged is at its default all the time
     first = [signals.get(axis.position, drive.position[:, k]) for k, axis in enumerate(model.load_model.axes)]
     position = np.array([values[np.argmax(np.isfinite(values))] for values in first])
-    return replay_drive(artefact, drive, position, substeps, initial, checkpoints, progress, interpolation)
+    return replay_drive(artefact, drive, position, substeps, initial, checkpoints, progress)
 
 
 def replay_drive(
     artefact: Artefact,
     drive: Drive,
     position: np.ndarray,
-    substeps: int,
+    substeps: int | None,
     initial: float | np.ndarray,
     checkpoints: CheckpointFolder | None = None,
     progress: Progress = silent,
-    interpolation: Kind = "lagrange",
 ) -> Result:
     """The same for loads that are evaluated already; position (n_axes,) [m] at the start. See `replay`."""
     model = artefact.model
+    if substeps is None:
+        substeps = int(artefact.certificate.get("substeps", 1))
     prepared = prepare(model)
     start = prepared.uniform(initial) if isinstance(initial, float | int) else prepared.from_artefact(initial)
     steps = integrate(
@@ -87,14 +88,16 @@ def replay_drive(
     air = measured_air(model.load_model, drive)[:, [i for _, i in model.ambient_sensors]]
     positions = np.concatenate([position[None], drive.position])
     axes = [a.name for a in model.load_model.axes]
-    weights, outside = pose_weights(
-        model.pose_grid, positions[:, [axes.index(a) for a in model.pose_axes]], interpolation
-    )
-    flags = {"position outside the pose grid, TCP error of its border": outside[1:] | outside[:-1]}
+    to_poses = positions[:, [axes.index(a) for a in model.pose_axes]]
+    outside = outside_grid(model.pose_grid, to_poses)
+    beyond = "position outside the pose grid" + ("" if is_exact(model) else ", TCP error of its border")
+    flags = {beyond: outside[1:] | outside[:-1]}
+    modal = prepared.to_artefact(states)
     certified = artefact.certificate.get("step")
     if certified is not None:
         # shorter steps excite faster modes than the certificate has seen
-        shortest = float(certified) / float(artefact.certificate.get("substeps", substeps))
+        its_own = float(certified) / float(artefact.certificate.get("substeps", substeps))
+        shortest = float(artefact.certificate.get("finest_step", its_own))
         flags[f"substep shorter than the certified {shortest:g} s"] = np.diff(drive.time) / substeps < 0.999 * shortest
         # laws that follow a temperature read it at the step's start: over hours they would swing to and fro
         longest = float(certified)
@@ -113,7 +116,7 @@ def replay_drive(
         tcp=tcp,
         axes=tuple(axes),
         position=positions,
-        tcp_actual=np.einsum("np,npc->nc", weights, tcp),
+        tcp_actual=tcp_at(model, by_body(model, modal), to_poses),
         sources=tuple(s.name for s in model.load_model.sources),
         power=steps.power,
         films=tuple(f.name for f in model.load_model.films),
@@ -124,9 +127,11 @@ def replay_drive(
         balance_error=np.abs(residual) / np.maximum(throughput, 1e-6 * prepared.heat_capacity),
         flags=np.column_stack([drive.flags, *flags.values()]),
         flag_names=(*drive.flag_names, *flags),
-        states=prepared.to_artefact(states),
+        states=modal,
         artefact=artefact.digest,
         substeps=substeps,
+        moves=model.moves,
+        exact=is_exact(model),
     )
 
 

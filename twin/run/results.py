@@ -32,7 +32,7 @@ class Result:
     tcp: np.ndarray  # (n + 1, n_poses, 3) m, TCP error at every pose
     axes: tuple[str, ...]
     position: np.ndarray  # (n + 1, n_axes) m
-    tcp_actual: np.ndarray  # (n + 1, 3) m, TCP error at the actual position, interpolated between the poses
+    tcp_actual: np.ndarray  # (n + 1, 3) m, TCP error at the actual position
     sources: tuple[str, ...]
     power: np.ndarray  # (n, n_sources) W
     films: tuple[str, ...]
@@ -46,6 +46,8 @@ class Result:
     states: np.ndarray  # (n + 1, N) artefact coordinates, bodies one after the other
     artefact: str  # sha256 of the model
     substeps: int
+    moves: bool = True  # False: the machine has no TCP, or no temperature moves it, and `tcp` is zero
+    exact: bool = True  # `tcp_actual` is that of the position; False: interpolated between the poses
 
     @property
     def state(self) -> np.ndarray:
@@ -54,10 +56,9 @@ class Result:
 
 
 def summary(result: Result) -> dict[str, Any]:
-    """Totals and extremes as JSON values; SI units in the names."""
+    """Totals and extremes as JSON values; SI units in the names. "tcp" is None where nothing moves it."""
     dt = np.diff(result.time)
     flow = result.film_heat * dt[:, None]
-    n, pose, component = np.unravel_index(np.argmax(np.abs(result.tcp)), result.tcp.shape)
     count = result.flags.sum(axis=0)
     return {
         "steps": len(dt),
@@ -77,20 +78,26 @@ def summary(result: Result) -> dict[str, Any]:
             name: {"min": float(column.min()), "max": float(column.max()), "final": float(column[-1])}
             for name, column in zip(result.sensors, result.temperature.T, strict=True)
         },
-        "tcp": {
-            "max_abs_m": np.abs(result.tcp).max(axis=(0, 1)).tolist(),
-            "max_abs_at_actual_position_m": np.abs(result.tcp_actual).max(axis=0).tolist(),
-            "worst": {
-                "component": "xyz"[component],
-                "value_m": float(result.tcp[n, pose, component]),
-                "time_s": float(result.time[n]),
-                "pose_m": dict(zip(result.pose_axes, result.poses[pose].tolist(), strict=True)),
-            },
-        },
+        "tcp": _tcp(result) if result.moves else None,
         "flagged_steps": int(result.flags.any(axis=1).sum()),
         "flags": {
             name: {"steps": int(k), "first_s": float(result.time[:-1][column][0]) if k else None}
             for name, k, column in zip(result.flag_names, count, result.flags.T, strict=True)
+        },
+    }
+
+
+def _tcp(result: Result) -> dict[str, Any]:
+    n, pose, component = np.unravel_index(np.argmax(np.abs(result.tcp)), result.tcp.shape)
+    return {
+        "max_abs_m": np.abs(result.tcp).max(axis=(0, 1)).tolist(),
+        "at_actual_position": "exact" if result.exact else "interpolated between the poses",
+        "max_abs_at_actual_position_m": np.abs(result.tcp_actual).max(axis=0).tolist(),
+        "worst": {
+            "component": "xyz"[component],
+            "value_m": float(result.tcp[n, pose, component]),
+            "time_s": float(result.time[n]),
+            "pose_m": dict(zip(result.pose_axes, result.poses[pose].tolist(), strict=True)),
         },
     }
 
@@ -104,6 +111,7 @@ def refuse_run_folder(folder: Path) -> None:
 def write_results(folder: Path, result: Result, facts: Mapping[str, Any]) -> dict[str, Any]:
     """Write all files of a result, each whole or not at all; returns the summary, led by `facts`.
 
+    Where nothing moves the TCP, no tcp.csv.
     Raises TwinError if a file cannot be written, and for run folders.
     """
     folder = Path(folder)
@@ -113,8 +121,11 @@ def write_results(folder: Path, result: Result, facts: Mapping[str, Any]) -> dic
     columns = dict(zip(result.sensors, result.temperature.T, strict=True))
     with atomic_path(folder / "temperatures.csv") as path:
         write_table(path, Table(result.time, columns, dict.fromkeys(columns, "degC")))
-    with atomic_path(folder / "tcp.csv") as path:
-        write_tcp(path, Tcp(result.time, result.axes, result.position, result.tcp_actual))
+    if result.moves:
+        with atomic_path(folder / "tcp.csv") as path:
+            write_tcp(path, Tcp(result.time, result.axes, result.position, result.tcp_actual))
+    else:
+        (folder / "tcp.csv").unlink(missing_ok=True)  # of an earlier result
     with atomic_path(folder / "summary.json") as path:
         path.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
     return told
@@ -133,7 +144,8 @@ def _write_hdf5(path: Path, result: Result) -> None:
         scale(f, "state", np.arange(result.states.shape[1]), "", "bodies one after the other")
         put(f, "temperature", result.temperature, "degC", ("time", "sensor"))
         put(f, "tcp", result.tcp, "m", ("time", "pose", "component"), "TCP error at all poses")
-        put(f, "tcp_actual", result.tcp_actual, "m", ("time", "component"), "TCP error at the actual position")
+        at_position = "TCP error at the actual position" + ("" if result.exact else ", interpolated between the poses")
+        put(f, "tcp_actual", result.tcp_actual, "m", ("time", "component"), at_position)
         put(f, "pose_position", result.poses, "m", ("pose", "pose_axis"))
         put(f, "position", result.position, "m", ("time", "axis"))
         put(f, "power", result.power, "W", ("step", "source"))

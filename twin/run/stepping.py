@@ -1,7 +1,7 @@
 """One time step of the reduced machine: a pure function of state and loads, in double precision.
 
 Coordinates with E = 1; several substeps with the same loads and one factor, each by the stages of a tableau
-(`twin.rom.tableau`; implicit Euler has one):
+(`twin.rom.tableau`):
 
     S Z = rate base + sum_k (theta_k M_k (T_out,k - T_ref) + H_k lift_k) + B q + P q_port
           - sum_k (theta_k - held_k) A_k Z
@@ -31,8 +31,8 @@ from twin.rom.contact_matrix import ContactEntries, contact_entries
 from twin.rom.drive import Drive
 from twin.rom.following import FOLLOW
 from twin.rom.load_model import LoadModel
-from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, step_loads
-from twin.rom.tableau import IMPLICIT_EULER, Tableau
+from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, source_powers, step_loads
+from twin.rom.tableau import SDIRK2_6, Feedback, Tableau
 from twin.run.block_factor import BlockFactor
 from twin.run.integrator import Sums, integrate
 from twin.run.matrix import by_factor, factor_of, terms_of
@@ -68,14 +68,14 @@ class StepHeat:
     film: Array  # (n_films,) W, mean over the step, positive into the machine
     gross: Array  # () W: all that films exchange, radiation and convection of one film each counted
     stored: Array  # () J
-    power: Array  # (n_sources,) W
+    power: Array  # (n_sources,) W, mean over the step
     theta: Array  # (n_theta,) W/(m^2 K), radiation included
     surface: Array  # (n_films,) degC: mean temperatures at the step's start, which theta follows
     winding: Array  # (n_following_losses,) degC: likewise of sources whose law follows the temperature of their surface
 
 
 def inputs_of(
-    load_model: LoadModel, drive: Drive, substeps: int, follow: float = FOLLOW, tableau: Tableau = IMPLICIT_EULER
+    load_model: LoadModel, drive: Drive, substeps: int, follow: float = FOLLOW, tableau: Tableau = SDIRK2_6
 ) -> Inputs:
     """The drive as stacked step inputs (n_steps, ...), with the steps marked in which rate or contacts change."""
     n_steps, contacts = drive.n_steps, contact_entries(load_model, drive)
@@ -133,6 +133,23 @@ def forcing_of(layout: Layout, system: System, loads: StepLoads) -> jax.Array:
     return jnp.asarray(films + system.B @ loads.power + jnp.concatenate(ports))
 
 
+def feedback_of(layout: Layout, system: System, inputs: Inputs, power: jax.Array) -> Feedback | None:
+    """What sources that follow the temperature of their surface add to a forcing with powers (n_sources,) [W].
+
+    None where no source does.
+    """
+    if not layout.following_losses:
+        return None
+    index = np.array(layout.following_losses, dtype=int)
+    told = Tabulated(jnp.asarray(inputs.power), layout.following_losses, jnp.asarray(inputs.power_table))
+
+    def feedback(z: jax.Array) -> tuple[jax.Array, jax.Array]:
+        now = source_powers(jnp, told, system.reference_temperature + system.source_rows @ z)[index]
+        return jnp.asarray(system.B[:, index] @ (now - power[index])), now
+
+    return feedback
+
+
 def kept_or_new(
     layout: Layout, system: System, state: State, inputs: Inputs, theta: jax.Array
 ) -> tuple[BlockFactor, jax.Array]:
@@ -156,6 +173,7 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
     more = loads.theta - held
     far = jnp.any(jnp.abs(more) > inputs.follow / 2 * held)  # nearer, one pass is as good as the step itself
     forcing = forcing_of(layout, system, loads)
+    feedback = feedback_of(layout, system, inputs, jnp.asarray(loads.power))
 
     def substeps(rest: tuple[jax.Array, ...]) -> Sums:
         def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -165,10 +183,11 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
             again = lambda: (by_factor(layout, factor, rest, right, after), after)  # noqa: E731
             return lax.cond(far, again, lambda: (after, near))
 
-        return integrate(inputs.tableau, inputs.substeps, solve, lambda z: jnp.asarray(inputs.rate * z), start, forcing)
+        capacity = lambda z: jnp.asarray(inputs.rate * z)  # noqa: E731
+        return integrate(inputs.tableau, inputs.substeps, solve, capacity, start, forcing, feedback)
 
     # sum_k (theta_k - held_k) A_k costs a pass over all A_k: once per step, and not at all where theta is held exactly
-    z, new, old = lax.cond(
+    z, new, old, following = lax.cond(
         jnp.any(more != 0.0),
         lambda: substeps(tuple(terms_of(layout, system, b, more) for b in range(len(layout.sizes)))),
         lambda: substeps(()),
@@ -177,7 +196,10 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
     film = film - (held[:n] * (system.film_rows @ new) + more[:n] * (system.film_rows @ old)) / inputs.substeps
     radiated = system.safe_area * loads.radiated
     gross = jnp.abs(film - radiated).sum() + jnp.abs(radiated).sum()
-    heat = StepHeat(film, gross, system.energy @ (z - start), loads.power, loads.theta, loads.surface, loads.winding)
+    power = jnp.asarray(loads.power)
+    if feedback is not None:
+        power = power.at[np.array(layout.following_losses, dtype=int)].set(following / inputs.substeps)
+    heat = StepHeat(film, gross, system.energy @ (z - start), power, loads.theta, loads.surface, loads.winding)
     return State(z, factor, held), (z, heat)
 
 

@@ -63,7 +63,7 @@ class WarmUp:
     def time(self) -> float | None:
         """When the last of them has, [s]; None if one has not."""
         times = [s.time for _, s in self.worst.values()]
-        return None if any(t is None for t in times) else max(t for t in times if t is not None)
+        return None if any(t is None for t in times) else max((t for t in times if t is not None), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def settling(
 def warm_up(
     history: History, tolerance: float, temperature_tolerance: float, horizon: float = HORIZON, window: float = WINDOW
 ) -> WarmUp:
-    """The warm-up of every TCP component and sensor.
+    """The warm-up of every TCP component and sensor; of no component where the TCP never moves.
 
     tolerance [m], temperature_tolerance [K], horizon and window [s]. Raises ValueError for less than two samples.
     """
@@ -141,13 +141,14 @@ def warm_up(
     def of(values: np.ndarray, band: float) -> Settling:
         return settling(time, values, band, window, horizon)
 
+    moving = "xyz" if history.tcp.any() else ""
     change = np.abs(history.tcp - history.tcp[-1]).max(axis=0)  # (n_poses, 3)
     worst = change.argmax(axis=0)
     return WarmUp(
         duration=duration,
         window=window,
-        actual={name: of(history.tcp_actual[:, c], tolerance) for c, name in enumerate("xyz")},
-        worst={name: (int(worst[c]), of(history.tcp[:, worst[c], c], tolerance)) for c, name in enumerate("xyz")},
+        actual={name: of(history.tcp_actual[:, c], tolerance) for c, name in enumerate(moving)},
+        worst={name: (int(worst[c]), of(history.tcp[:, worst[c], c], tolerance)) for c, name in enumerate(moving)},
         sensors={name: of(history.temperature[:, s], temperature_tolerance) for s, name in enumerate(history.sensors)},
     )
 

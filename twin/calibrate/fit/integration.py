@@ -24,7 +24,7 @@ from twin.rom.contact_matrix import ContactEntries, ContactPlaces, entries_by_co
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 from twin.run.integrator import integrate, solved
-from twin.run.stepping import Inputs, inputs_of, loads_of
+from twin.run.stepping import Inputs, feedback_of, inputs_of, loads_of
 from twin.run.system import Array, Layout, System
 
 
@@ -127,7 +127,8 @@ def _step(
     # contact sources bring their heat through ports
     contact = jnp.tensordot(scaled.source[np.array(places.sources, dtype=int)], loads.contact_heat, 1)
     forcing = system.M @ (drive.theta[:n] * drive.rise) + system.H @ drive.lift + system.B @ drive.power + contact
-    return integrate(inputs.tableau, inputs.substeps, solve, capacity, z, jnp.asarray(forcing))[0]
+    feedback = feedback_of(layout, system, inputs, jnp.asarray(drive.power))
+    return integrate(inputs.tableau, inputs.substeps, solve, capacity, z, jnp.asarray(forcing), feedback)[0]
 
 
 def _with(inputs: Inputs, layout: Layout, scaled: Factors) -> Inputs:

@@ -12,7 +12,7 @@ class Options:
     """How runs are stepped and compared."""
 
     dt: float = 60.0  # s
-    substeps: int = 4
+    substeps: int = 1
     bin_length: float = BIN  # s, of temperature means
     temperature_sigma: float = 0.1  # K, noise of a single temperature sample
     tcp_sigma: float = 1e-6  # m, where tcp.csv has no sigma

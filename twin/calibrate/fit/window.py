@@ -80,7 +80,7 @@ def merged(model: MachineModel, V: np.ndarray) -> MachineModel:
         E_members=np.array(E_members) if E_members else None,
         G_members=np.array(G_members) if G_members else None,
     )
-    return replace(model, bodies=(whole,))
+    return replace(model, bodies=(whole,), structure=None)  # its TCP rows are those at the poses
 
 
 def window_basis(

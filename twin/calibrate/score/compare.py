@@ -12,7 +12,7 @@ import numpy as np
 from twin.errors import LogError
 from twin.logs.run import Run, Tcp
 from twin.rom.artefact import Artefact
-from twin.rom.poses import Kind, pose_weights
+from twin.rom.tcp import by_body, tcp_at
 from twin.run.results import Result
 
 TCP = ("dx", "dy", "dz")
@@ -42,17 +42,17 @@ class LeftOut:
     temperature_rows: int  # rows of temperatures.csv outside the simulated time
     tcp_rows: int  # rows of tcp.csv outside it
     tcp_incomplete: int  # rows of tcp.csv inside it without a position or without any deviation
-    tcp_outside_grid: int  # rows of tcp.csv beyond the poses: compared with the nearest point of the grid
+    tcp_outside_grid: int  # rows of tcp.csv beyond the poses: where the certificate does not reach
 
 
-def channels(artefact: Artefact, run: Run, result: Result, interpolation: Kind = "lagrange") -> tuple[Channel, ...]:
+def channels(artefact: Artefact, run: Run, result: Result) -> tuple[Channel, ...]:
     """Temperatures [degC] in the order of the run's columns, then dx, dy, dz [m] of a machine whose TCP moves; a
     channel without any value is left out.
 
-    Temperatures are interpolated linearly in time; TCP errors too, and between the poses at the measured positions
-    (`twin.rom.poses`). An axis without a column in tcp.csv stands where the loads say. Where `run.tcp_reference` is
-    "first", deviations count from the first row of tcp.csv, so the computed error at that row is subtracted and the
-    row itself is no comparison. `left_out` tells what is not among the channels.
+    Temperatures are interpolated linearly in time; TCP errors too, at the measured positions (`twin.rom.tcp`). An axis
+    without a column in tcp.csv stands where the loads say. Where `run.tcp_reference` is "first", deviations count from
+    the first row of tcp.csv, so the computed error at that row is subtracted and the row itself is no comparison.
+    `left_out` tells what is not among the channels.
 
     Raises LogError where the first row is the reference and has no computed value.
     """
@@ -72,7 +72,7 @@ def channels(artefact: Artefact, run: Run, result: Result, interpolation: Kind =
         tcp = run.tcp
         position = tcp_positions(tcp, result)
         usable = _inside(tcp.time, result) & np.isfinite(position).all(axis=1)
-        simulated = simulated_tcp(artefact, result, tcp.time, position, interpolation)
+        simulated = simulated_tcp(artefact, result, tcp.time, position)
         if run.tcp_reference == "first":
             if not usable[0]:
                 raise LogError(
@@ -122,21 +122,22 @@ def tcp_positions(tcp: Tcp, result: Result) -> np.ndarray:
     return tcp.position[:, [tcp.axes.index(a) for a in result.pose_axes]]
 
 
-def simulated_tcp(
-    artefact: Artefact, result: Result, time: np.ndarray, position: np.ndarray, interpolation: Kind = "lagrange"
-) -> np.ndarray:
-    """TCP error (n, 3) m at times (n,) s and positions (n, n_pose_axes) m; NaN outside the simulated time."""
+def simulated_tcp(artefact: Artefact, result: Result, time: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """TCP error (n, 3) m at times (n,) s and positions (n, n_pose_axes) m; NaN outside the simulated time.
+
+    `result` is a replay of this artefact: states are interpolated linearly in time, and the artefact says what they do
+    to the tool at each position.
+    """
     inside = _inside(time, result) & np.isfinite(position).all(axis=1)
     values = np.full((len(time), 3), np.nan)
     if not inside.any():
         return values
-    weights, _ = pose_weights(artefact.model.pose_grid, position[inside], interpolation)
     at = np.clip(np.searchsorted(result.time, time[inside], side="right") - 1, 0, max(len(result.time) - 2, 0))
     after = np.minimum(at + 1, len(result.time) - 1)
     length = result.time[after] - result.time[at]
     share = np.where(length > 0.0, (time[inside] - result.time[at]) / np.where(length > 0.0, length, 1.0), 0.0)
-    before = np.einsum("np,npc->nc", weights, result.tcp[at])
-    values[inside] = before + share[:, None] * (np.einsum("np,npc->nc", weights, result.tcp[after]) - before)
+    states = result.states[at] + share[:, None] * (result.states[after] - result.states[at])
+    values[inside] = tcp_at(artefact.model, by_body(artefact.model, states), position[inside])
     return values
 
 

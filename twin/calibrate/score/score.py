@@ -31,7 +31,7 @@ class Settings:
     """How a score is taken."""
 
     dt: float = 60.0  # s, of the replay
-    substeps: int = 4
+    substeps: int | None = None
     restart: bool = False  # every segment is a test of its own, with its own initial state
     tcp_sigma: float = 1e-6  # m, of a measured deviation where the log does not say
     temperature_sigma: float = 0.1  # K, of a measured temperature

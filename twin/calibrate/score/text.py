@@ -116,7 +116,7 @@ def _notes(score: Score) -> list[str]:
                 (lost.temperature_rows, "rows of temperatures.csv outside the simulated time"),
                 (lost.tcp_rows, "rows of tcp.csv outside the simulated time"),
                 (lost.tcp_incomplete, "rows of tcp.csv without position or deviation"),
-                (lost.tcp_outside_grid, "rows of tcp.csv beyond the poses, compared with their border"),
+                (lost.tcp_outside_grid, "rows of tcp.csv beyond the poses"),
                 (told.outside_segments, "rows of tcp.csv in no segment"),
                 (told.flagged_steps, f"of {told.steps} steps outside what was certified"),
             )

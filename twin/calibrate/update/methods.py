@@ -32,7 +32,7 @@ class Options:
 
     method: Method = "state"
     dt: float = 60.0  # s
-    substeps: int = 4
+    substeps: int = 1
     slew: float = SLEW  # m/s; the method of the paper has none
     tcp_noise: float = 1e-6  # m, of measurements without a sigma
     sensor_noise: float = 0.1  # K

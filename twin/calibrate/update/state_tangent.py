@@ -29,7 +29,7 @@ from twin.rom.parameter import Parameter
 from twin.run.block_factor import BlockFactor
 from twin.run.integrator import integrate, solved
 from twin.run.matrix import by_factor, terms_of
-from twin.run.stepping import Inputs, State, forcing_of, inputs_of, kept_or_new, loads_of, without_factor
+from twin.run.stepping import Inputs, State, feedback_of, forcing_of, inputs_of, kept_or_new, loads_of, without_factor
 from twin.run.system import Array, Layout, System
 
 KINDS = ("source", "film", "joint", "environment")  # of parameters that the tangent knows
@@ -158,7 +158,9 @@ def tangent_step(
             return x, x
 
         forcing = forcing_of(layout, system, seen)
-        z, *_ = integrate(inputs.tableau, inputs.substeps, solve, lambda x: jnp.asarray(inputs.rate * x), z, forcing)
+        feedback = feedback_of(layout, system, inputs, jnp.asarray(seen.power))
+        capacity = lambda x: jnp.asarray(inputs.rate * x)  # noqa: E731
+        z, *_ = integrate(inputs.tableau, inputs.substeps, solve, capacity, z, forcing, feedback)
         return z, (factor, held)
 
     z, derivative, (factor, held) = jax.linearize(after, state.z, u, has_aux=True)

@@ -98,8 +98,8 @@ def _made(experiment: Experiment) -> Reduced:
     plans = [plan(run, full.thermal.pose_axes) for run in experiment.runs]
     positions = np.vstack([where for _, where in plans])
     rows = full.structure.pose_rows(positions)
-    bodies = tuple(replace(b, G=G, F=None) for b, G in zip(full.thermal.bodies, rows, strict=True))
-    full = replace(full, thermal=replace(full.thermal, bodies=bodies, poses=positions))
+    bodies = tuple(replace(b, G=G, F=None, W=None) for b, G in zip(full.thermal.bodies, rows, strict=True))
+    full = replace(full, thermal=replace(full.thermal, bodies=bodies, poses=positions, structure=None))
     model = with_places(full, places)
     low, high = theta_bounds(model.load_model)
     n_films = len(full.thermal.load_model.films)

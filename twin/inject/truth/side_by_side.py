@@ -61,13 +61,14 @@ class SideBySide(CoupledStepper):
             for body, f, known, seen in parts:
                 more = theta[list(body.theta)] - f.theta[:, None]
                 y.append(f.solve(known - sum((d * (a @ seen) for d, a in zip(more, body.A, strict=True)), 0.0 * seen)))
-            for r, gamma in enumerate(gammas):
-                alone = self.joined([yb[:, r] for yb in y], factors, gamma, across[r])
+            for r in range(len(gammas)):
+                alone = self.joined([yb[:, r] for yb in y], factors, across[r])
                 for yb, state in zip(y, alone, strict=True):
                     yb[:, r] = state
             return np.concatenate(y), near
 
-        return self._parts(stages(SDIRK2, solve, partial(self._capacity, factors), np.concatenate(x), forcing)[-1][0])
+        after, _ = stages(SDIRK2, solve, partial(self._capacity, factors), np.concatenate(x), forcing)
+        return self._parts(after)
 
     def _common(self, b: int, loads: Sequence[StepLoads], rate: float) -> Any:
         """A factor of body b with the coefficients of all drives WITHIN its own."""

@@ -1,0 +1,108 @@
+"""Reduction order on a parametric steel profile: transfer function error per state, over all frequencies and films."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse.linalg
+
+from benchmarks.steel_profile_model import profile
+from twin.build.body_matrix import system_matrix
+from twin.build.compress import Tolerances, balanced, galerkin
+from twin.build.project import project
+from twin.build.rich_basis import RichOptions, rich_basis
+from twin.build.scenario import theta_bounds
+from twin.rom.model import AffineBody, MachineModel
+
+# A tight basis: to the decay of the finest element (2 mm: 7e-6 m2/s / h^2 is 2 1/s) and well beyond.
+TIGHT = RichOptions(samples=24, shift_high=100.0, tolerance=3e-5)
+OMEGA = np.r_[0.0, np.logspace(-6, 2, 33)]  # rad/s
+UNIT = Tolerances(1.0, 1.0)
+STATES = (20, 28, 40, 56)
+TRAINING, HELD_OUT = 8, 20
+
+
+def transfer(body: AffineBody, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """H(i omega) (n_omega, 6, 7): temperature differences per kelvin of each outer temperature."""
+    S, B = system_matrix(body, theta, 0.0), body.M * theta[list(body.theta)]
+    if not isinstance(S, np.ndarray):
+        sparse = [scipy.sparse.linalg.splu((S + 1j * w * body.E).tocsc()).solve(B.astype(complex)) for w in omega]
+        return np.array([body.C @ X for X in sparse])
+    if body.symmetric:  # E = 1
+        rate, U = np.linalg.eigh(S)
+        return (body.C @ U / (rate + 1j * omega[:, None])[:, None]) @ (U.T @ B)
+    return np.array([body.C @ np.linalg.solve(S + 1j * w * body.E, B) for w in omega])
+
+
+def largest(H: np.ndarray) -> float:
+    """The largest singular value over all frequencies."""
+    return float(np.linalg.norm(H, 2, axis=(1, 2)).max())
+
+
+def drawn(low: np.ndarray, high: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return [low * (high / low) ** rng.random(len(low)) for _ in range(count)]
+
+
+def responses(body: AffineBody, thetas: list[np.ndarray]) -> np.ndarray:
+    """Snapshots (n, m) of the states for every input over frequency: a root of the mean controllability Gramian."""
+    columns = []
+    for theta in thetas:
+        rate, U = np.linalg.eigh(system_matrix(body, theta, 0.0))
+        B = U.T @ (body.M * theta[list(body.theta)])
+        for w in np.logspace(-6, 2, 20):
+            Z = U @ (B / (rate + 1j * w)[:, None]) * np.sqrt(w)  # d omega = omega d(log omega)
+            columns += [Z.real, Z.imag]
+    return np.column_stack(columns)
+
+
+def hankel(body: AffineBody, theta: np.ndarray) -> np.ndarray:
+    """Hankel singular values at one theta: no model of r states is off by less than value r (counted from 0) there.
+
+    Adamjan, Arov, Krein 1971; Glover, Int. J. Control 39, 1984. Symmetric body: both Gramians by its eigenvectors.
+    """
+    rate, U = np.linalg.eigh(system_matrix(body, theta, 0.0))
+    roots = []
+    for X in (U.T @ (body.M * theta[list(body.theta)]), U.T @ body.C.T):
+        value, W = np.linalg.eigh((X @ X.T) / (rate[:, None] + rate[None, :]))
+        roots.append(W * np.sqrt(np.maximum(value, 0.0)))
+    return np.linalg.svd(roots[1].T @ roots[0], compute_uv=False)
+
+
+def errors(refinements: int) -> tuple[int, int, dict[tuple[str, int], float]]:
+    """Nodes, rich states, and the worst relative error over held-out films by (method, states).
+
+    Beside the methods: ``rich``, and ``bound``: below which no linear model of so many states is at all of the films.
+    """
+    machine = profile(refinements)
+    full, (low, high) = machine.bodies[0], theta_bounds(machine.load_model)
+    rich_body = project(full, rich_basis(full, low, high, TIGHT))
+    rich: MachineModel = replace(machine, bodies=(rich_body,))
+    snapshots = [responses(rich_body, drawn(low, high, TRAINING, 5))]
+    films = drawn(low, high, HELD_OUT, 99)
+    exact = [transfer(full, theta, OMEGA) for theta in films]
+
+    def worst(body: AffineBody) -> float:
+        return max(largest(transfer(body, t, OMEGA) - H) / largest(H) for t, H in zip(films, exact, strict=True))
+
+    methods: dict[str, Callable[..., MachineModel]] = {"galerkin": galerkin, "balanced": balanced}
+    found = {("rich", rich_body.n): worst(rich_body)}
+    values = [hankel(rich_body, t) / largest(H) for t, H in zip(films, exact, strict=True)]
+    for states in STATES:
+        for name, method in methods.items():
+            found[name, states] = worst(method(rich, snapshots, states, UNIT).bodies[0])
+        found["bound", states] = max(float(v[states]) for v in values)
+    return full.n, rich_body.n, found
+
+
+def main() -> None:
+    for refinements in (2, 3):
+        n, rich, found = errors(refinements)
+        print(f"   {n} nodes; {rich} rich states, off by {found['rich', rich]:.1e}")
+        print("   states   galerkin   balanced   no model below")
+        for states in STATES:
+            row = (found[name, states] for name in ("galerkin", "balanced", "bound"))
+            print(f"   {states:6d}   " + "   ".join(f"{value:8.1e}" for value in row))

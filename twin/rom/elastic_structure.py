@@ -1,0 +1,134 @@
+"""The elastic machine as its ports see it: flexible bodies on springs, solved at any axis position.
+
+Springs act on gaps g = J w of port displacements w; with w = h + F p + R a of each body, h the displacements by heat of
+the supported body's ports (W x in `twin.rom.model`), p = -J^T f the forces on them and a the rigid motion:
+
+    (k^-1 + J F J^T) f - J R a = J h          compatibility, k the spring stiffnesses
+                      R^T J^T f = 0           equilibrium of every body
+    TCP displacement  = t w
+
+Only J (which segments face which pad, levers) and t (levers of the tool centre point) depend on the position, so a pose
+costs one dense system of the size of the springs. Static condensation: see `twin.build.flexibility`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import block_diag, cho_factor, cho_solve
+
+from twin.errors import ModelError
+from twin.rom.elastic_ports import cross_matrix
+from twin.rom.springs import Positions, SpringSystem
+
+FREE = 1e-9  # rigid-body stiffness (scaled to lengths) below this share of the largest is a mechanism
+
+
+class Mechanism(ModelError):
+    """A body moves freely, alone or together with others."""
+
+    def __init__(self, what: str, remedy: str, bodies: tuple[str, ...]):
+        super().__init__(what, "the structure is a mechanism", remedy)
+        self.bodies = bodies  # the one that moves most first
+
+
+@dataclass(frozen=True)
+class PortFlexibility:
+    """A body seen from its p elastic ports."""
+
+    name: str
+    F: np.ndarray  # (p, p) m/N (or rad/(N m) ...): port displacement of the supported body per port force
+    R: np.ndarray  # (p, 6) port displacement per translation [m] and rotation about the machine origin [rad]
+
+
+@dataclass(frozen=True)
+class ElasticStructure:
+    """The machine condensed to its elastic ports."""
+
+    bodies: tuple[PortFlexibility, ...]
+    system: SpringSystem
+    middles: np.ndarray  # (n_bodies, 3) m: mean of each body's nodes, in mesh coordinates
+    size: float  # m: largest distance of a node from its body's middle
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Linear axes, in the order of positions."""
+        return self.system.axes
+
+    def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
+        """Z_b (3, n_ports_b) per body: the TCP displacement is sum_b Z_b h_b at this pose, plus `scale_rows`.
+
+        Raises Mechanism where a body can move freely.
+        """
+        J, t = self.system.gap_rows(positions), self.system.tcp_rows(positions)
+        # the system is symmetric: solved for the rows of the TCP
+        f, _ = self._solve(J, -J @ (self._flexibility @ t.T), (t @ self._motions).T)
+        return tuple(np.split(t + f.T @ J, self.system.offsets[1:-1], axis=1))
+
+    def refuse_mechanism(self, positions: Positions) -> None:
+        """Raises Mechanism where a body can move freely, as `rows` does; displacements are not solved for."""
+        J = self.system.gap_rows(positions)
+        B = J @ self._motions
+        if not len(B):
+            self._refuse_mechanism(np.zeros((B.shape[1],) * 2))
+        self._refuse_mechanism(B.T @ cho_solve(self._yielding(J), B))
+
+    @cached_property
+    def _flexibility(self) -> np.ndarray:
+        """(P, P) of all ports: block diagonal."""
+        return np.asarray(block_diag(*(body.F for body in self.bodies)))
+
+    @cached_property
+    def _motions(self) -> np.ndarray:
+        """(P, 6 n_bodies) port displacements of rigid motions of the bodies about their middles: modes of like size."""
+        return np.asarray(block_diag(*(body.R @ self._about_origin(i) for i, body in enumerate(self.bodies))))
+
+    def _about_origin(self, body: int) -> np.ndarray:
+        """(6, 6): rigid motion about a body's middle, rotations times `size`, to motion about the machine origin."""
+        T = np.eye(6)
+        T[:3, 3:] = cross_matrix(self.middles[body]) / self.size
+        T[3:, 3:] /= self.size
+        return T
+
+    def _solve(self, J: np.ndarray, gap: np.ndarray, resultant: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Spring forces f and rigid motions a of S f - B a = gap, -B^T f = resultant, with S = 1/k + J F J^T, B = J R.
+
+        Raises Mechanism where B^T S^-1 B, the stiffness of the springs and bodies against rigid motion, is singular.
+        """
+        B = J @ self._motions
+        if not len(B):
+            self._refuse_mechanism(np.zeros((B.shape[1],) * 2))
+        factor = self._yielding(J)
+        stiffness = B.T @ cho_solve(factor, B)
+        self._refuse_mechanism(stiffness)
+        a = np.linalg.solve(stiffness, -resultant - B.T @ cho_solve(factor, gap))
+        return cho_solve(factor, gap + B @ a), a
+
+    def _yielding(self, J: np.ndarray) -> tuple[np.ndarray, bool]:
+        """S = 1/k + J F J^T, factored."""
+        used = np.flatnonzero(J.any(axis=0))  # a pad faces two segments of its rail, not all
+        S = np.diag(1.0 / self.system.stiffness) + J[:, used] @ self._flexibility[np.ix_(used, used)] @ J[:, used].T
+        factor: tuple[np.ndarray, bool] = cho_factor(S)
+        return factor
+
+    def _refuse_mechanism(self, stiffness: np.ndarray) -> None:
+        eigenvalues, vectors = np.linalg.eigh(stiffness)
+        free = vectors[:, eigenvalues <= FREE * max(eigenvalues[-1], np.finfo(float).tiny)]
+        if not free.shape[1]:
+            return
+        freedom = free @ free.T  # projector on the free motions
+        worst = int(np.argmax(np.diag(freedom)))
+        motion = np.linalg.norm(freedom[:, worst].reshape(-1, 6), axis=1)
+        along = np.linalg.norm(freedom[worst])
+        together = [b.name for b, m in zip(self.bodies, motion, strict=True) if m > 0.1 * along]
+        name = self.bodies[worst // 6].name
+        others = [n for n in together if n != name]
+        kind, axis = ("moves freely along" if worst % 6 < 3 else "turns freely about"), "xyz"[worst % 3]
+        raise Mechanism(
+            f"body '{name}' {kind} {axis}" + (f", together with {', '.join(others)}" if others else ""),
+            f"{free.shape[1]} free motion(s): give stiffness in that direction to a moving contact of the body "
+            "(axial for its screw; normal, lateral for its guides) or to a support",
+            (name, *others),
+        )

@@ -1,0 +1,95 @@
+"""How the temperatures of a lumped machine move its tool: given rows per kelvin, and screws that grow with the nut.
+
+The TCP displacement is tool minus work side. A screw is held by its fixed bearing; the nut, at distance xi from it,
+moves by the growth of the screw between the two,
+
+    d(xi) = int alpha (T - T_ref) dx,
+
+away from the bearing, and takes along the side of the machine that it holds. For temperatures that are linear between
+element borders the integral is exact, so the row is piecewise quadratic in the position of the axis. Paper 001, eq
+(16.2), is a polynomial of this function along one screw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.rom.scales import AddedScale
+from twin.rom.springs import Positions
+
+
+@dataclass(frozen=True)
+class Screw:
+    """A bar that positions an axis."""
+
+    body: int  # index of its body
+    first: int  # of its states in the body
+    borders: np.ndarray  # (n,) m from its start
+    direction: np.ndarray  # (3,) unit vector from start to end, times -1 where the nut holds the work side
+    expansion: float  # 1/K
+    from_end: bool  # the fixed bearing is at the bar's end
+    axis: int
+    nut: float  # m from the bar's start at axis position zero
+    per_position: float  # +1 or -1: how the nut moves along the bar with the axis
+
+    def row(self, position: float) -> np.ndarray:
+        """TCP displacement (3, n) [m/K] per T - T_ref of the bar's states at an axis position [m]."""
+        nut = float(np.clip(self.nut + self.per_position * position, self.borders[0], self.borders[-1]))
+        start, end = (nut, self.borders[-1]) if self.from_end else (self.borders[0], nut)
+        sign = -1.0 if self.from_end else 1.0
+        return np.outer(sign * self.expansion * self.direction, integral(self.borders, start, end))
+
+
+@dataclass(frozen=True)
+class LumpedStructure:
+    """TCP rows of a lumped machine at any axis positions; what `twin.build.structure.Structure` is for meshes."""
+
+    axes: tuple[str, ...]  # linear, in the order of positions
+    constant: tuple[np.ndarray, ...]  # per body (3, n_b) m/K
+    screws: tuple[Screw, ...]
+    scales: tuple[AddedScale, ...] = ()
+
+    @property
+    def moves(self) -> bool:
+        """Whether any temperature moves the tool."""
+        return bool(self.screws or self.scales) or any(rows.any() for rows in self.constant)
+
+    def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
+        """(3, n_b) [m/K] per body. Raises ValueError for unknown axes or a wrong number of positions."""
+        given = self._vector(positions)
+        result = [rows.copy() for rows in self.constant]
+        for screw in self.screws:
+            states = slice(screw.first, screw.first + len(screw.borders))
+            result[screw.body][:, states] += screw.row(given[screw.axis])
+        for scale in self.scales:
+            result[scale.body][:, scale.states] += scale.rows(given[scale.axis])
+        return tuple(result)
+
+    def pose_rows(self, poses: np.ndarray) -> tuple[np.ndarray, ...]:
+        """G per body (n_poses, 3, n_b) [m/K] at poses (n_poses, n_axes) [m]."""
+        return tuple(np.array(rows) for rows in zip(*(self.rows(p) for p in poses), strict=True))
+
+    def displacement(self, positions: Positions, fields: Sequence[np.ndarray]) -> np.ndarray:
+        """TCP displacement (3,) [m], tool minus work side; fields: T - T_ref (n_b,) [K] per body."""
+        return np.sum([rows @ T for rows, T in zip(self.rows(positions), fields, strict=True)], axis=0)
+
+    def _vector(self, positions: Positions) -> list[float]:
+        """Positions [m] in the order of `axes`; those not named are zero."""
+        named = dict(positions) if isinstance(positions, Mapping) else dict(zip(self.axes, positions, strict=True))
+        if unknown := set(named) - set(self.axes):
+            raise ValueError(f"no linear axes {sorted(unknown)}; there are {list(self.axes)}")
+        return [float(named.get(axis, 0.0)) for axis in self.axes]
+
+
+def integral(nodes: np.ndarray, start: float, end: float) -> np.ndarray:
+    """Weights (n,) [m] of values at nodes (n,) [m] in the integral of their linear interpolant from start to end."""
+    low, high = np.clip(start, nodes[:-1], nodes[1:]), np.clip(end, nodes[:-1], nodes[1:])
+    length = high - low
+    right = length * ((low + high) / 2 - nodes[:-1]) / np.diff(nodes)
+    weights = np.zeros(len(nodes))
+    weights[1:] += right
+    weights[:-1] += length - right
+    return weights

@@ -1,0 +1,114 @@
+"""The TCP displacement at any axis position: by the elastic structure where the model has it, else between poses.
+
+    w(position) = sum over bodies of Z_b(position) W_b x_b,        G_b(position) = Z_b(position) W_b
+
+W_b x_b are the elastic inputs of a body (`twin.rom.model`): a pose costs one dense system of the size of the springs,
+whatever the number of states, so positions are computed exactly where they are asked for, each once. G has kinks
+wherever a pad passes a station of its rail: interpolation between the poses of a grid converges slowly, and is left for
+artefacts without a structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.rom.lumped_structure import LumpedStructure
+from twin.rom.model import MachineModel
+from twin.rom.poses import pose_weights
+
+
+def is_exact(model: MachineModel) -> bool:
+    """Whether the model knows its TCP displacement at every position, not at the poses of its grid alone."""
+    return model.structure is not None and all(body.W is not None for body in model.bodies)
+
+
+def elastic_rows(model: MachineModel, positions: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Z_b (m, 3, p_b) per body at positions (m, n_axes) [m], axes in the order of `pose_axes`.
+
+    Raises ValueError for a model without structure, or another number of axes.
+    """
+    structure = model.structure
+    if structure is None:
+        raise ValueError("the model has no elastic structure")
+    if isinstance(structure, LumpedStructure):
+        each = [structure.rows(p) for p in positions]
+        sizes = [rows.shape[1] for rows in structure.constant]
+        return tuple(np.array([rows[b] for rows in each]).reshape(-1, 3, n) for b, n in enumerate(sizes))
+    Z = [np.zeros((len(positions), 3, len(inputs(model, b)))) for b in range(len(model.bodies))]
+    for i, position in enumerate(positions):
+        for all_rows, ports in zip(Z, structure.rows(position), strict=True):
+            all_rows[i, :, : ports.shape[1]] = ports  # what scales read follows the ports
+        for b, at, growth in structure.system.scale_rows(position):
+            Z[b][i][:, at] += growth
+    return tuple(Z)
+
+
+def tcp_rows(model: MachineModel, positions: np.ndarray) -> tuple[np.ndarray, ...]:
+    """G_b (m, 3, n_b) [m/K] per body at positions (m, n_axes) [m]: the TCP displacement is sum_b G_b x_b.
+
+    Exact where the model has a structure (`is_exact`), interpolated between the poses of its grid otherwise, there with
+    the values of the nearest point of the grid for positions outside it. For full and reduced models.
+    """
+    different, which = _distinct(positions)
+    if not is_exact(model):
+        weights, _ = pose_weights(model.pose_grid, different)
+        return tuple(np.tensordot(weights, body.G, 1)[which] for body in model.bodies)
+    rows = elastic_rows(model, different)
+    return tuple((Z @ inputs(model, b))[which] for b, Z in enumerate(rows))
+
+
+def tcp_at(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray) -> np.ndarray:
+    """TCP displacements (m, 3) [m] of states x_b (m, n_b) or (n_b,) per body at positions (m, n_axes) [m].
+
+    One state per position, or one for all. `by_body` makes them of whole states. Exact or interpolated as `tcp_rows`.
+    """
+    different, which = _distinct(positions)
+    exact = is_exact(model)
+    if exact:
+        rows = elastic_rows(model, different)
+    else:
+        weights, _ = pose_weights(model.pose_grid, different)
+    w = np.zeros((len(which), 3))
+    for b, (body, states) in enumerate(zip(model.bodies, x, strict=True)):
+        if exact:
+            read = states @ inputs(model, b).T
+            w += np.einsum("mcp,p->mc" if read.ndim == 1 else "mcp,mp->mc", rows[b][which], read)
+        else:
+            at_poses = np.tensordot(states, body.G, (-1, 2))
+            w += np.einsum("mp,pc->mc" if at_poses.ndim == 2 else "mp,mpc->mc", weights[which], at_poses)
+    return w
+
+
+def tcp_over(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray) -> np.ndarray:
+    """TCP displacements (k, m, 3) [m] of k states x_b (k, n_b) per body, each at all positions (m, n_axes) [m]."""
+    if not is_exact(model):
+        weights, _ = pose_weights(model.pose_grid, positions)
+        at_poses = sum(np.tensordot(states, body.G, (1, 2)) for body, states in zip(model.bodies, x, strict=True))
+        return np.einsum("mp,kpc->kmc", weights, at_poses)
+    rows = elastic_rows(model, positions)
+    parts = [np.tensordot(states @ inputs(model, b).T, rows[b], (1, 2)) for b, states in enumerate(x)]
+    return np.asarray(np.sum(parts, axis=0))
+
+
+def by_body(model: MachineModel, states: np.ndarray) -> list[np.ndarray]:
+    """States (..., N) of the machine as (..., n_b) per body."""
+    return np.split(states, np.cumsum([body.n for body in model.bodies])[:-1], axis=-1)
+
+
+def inputs(model: MachineModel, body: int) -> np.ndarray:
+    """W (p_b, n_b) of a body. Raises ValueError where it has none."""
+    W = model.bodies[body].W
+    if W is None:
+        raise ValueError(f"body '{model.bodies[body].name}' has no elastic inputs")
+    return W
+
+
+def _distinct(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The different ones (k, n_axes) of positions (m, n_axes), and which of them each is (m,)."""
+    positions = np.asarray(positions, dtype=float)
+    if not positions.shape[1]:
+        return positions[:1], np.zeros(len(positions), dtype=int)
+    different, which = np.unique(positions, axis=0, return_inverse=True)
+    return different, which.reshape(-1)
