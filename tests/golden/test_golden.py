@@ -29,12 +29,14 @@ def _of(values: dict[str, Any], stage: str) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name.startswith(f"{stage}.")}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stage", STAGES)
 def test_every_number_of_a_stage_is_the_stored_one(now: dict[str, Any], stage: str) -> None:
     wrong = differences(_of(GOLDEN, stage), _of(now, stage), TOLERANCE)
     assert not wrong, "\n" + "\n".join(wrong)
 
 
+@pytest.mark.long
 def test_no_stage_is_new(now: dict[str, Any]) -> None:
     assert {".".join(name.split(".")[:2]) for name in now} == set(STAGES)
 

@@ -16,7 +16,7 @@ import numpy as np
 from twin.cli.main import run as command
 
 SLIDE = Path(__file__).parents[1] / "machines" / "slide" / "machine.toml"
-HOURS, RUNS = 4, 2
+HOURS, RUNS, SAMPLING = 4, 2, 120.0
 NOISE = ("--noise-temperature", "0.05 K", "--noise-tcp", "0.5 um", "--tcp-every", "15 min")
 SENSORS = {
     "rail": ("rail_1", (0.3, -0.1, 0.13)),
@@ -70,13 +70,13 @@ def loads(folder: Path, seed: int) -> Path:
     """A run folder of loads alone: strokes, currents and pauses that are drawn, air that swings."""
     folder.mkdir()
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 3600.0 * HOURS + 1.0, 60.0)
+    time = np.arange(0.0, 3600.0 * HOURS + 1.0, SAMPLING)
 
     def switched(top: float, length: int) -> np.ndarray:
         return top * np.repeat(rng.random(len(time) // length + 1), length)[: len(time)]
 
-    speed = switched(20.0, 41) * (switched(1.0, 67) > 0.3)
-    current = switched(9.0, 53) * (switched(1.0, 83) > 0.25)
+    speed = switched(20.0, 20) * (switched(1.0, 33) > 0.3)
+    current = switched(9.0, 26) * (switched(1.0, 41) > 0.25)
     position = 150.0 * np.sin(time / 700.0) * (speed > 0.0)
     air = 20.0 + 1.5 * np.sin(2.0 * np.pi * time / (6.0 * 3600.0) + seed)
     header = "time [s],x_position [mm],x_speed [m/min],x_motor_current [A],shop_air [degC]"
@@ -84,7 +84,8 @@ def loads(folder: Path, seed: int) -> Path:
     lines = [header, *(",".join(f"{v:.6g}" for v in row) for row in rows)]
     (folder / "loads.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / "run.toml").write_text(
-        'sampling = "60 s"\nprovenance = "made for a test"\nsynthetic = ["loads"]\ninitial_temperature = "20 degC"\n',
+        f'sampling = "{SAMPLING:g} s"\nprovenance = "made for a test"\nsynthetic = ["loads"]\n'
+        'initial_temperature = "20 degC"\n',
         encoding="utf-8",
     )
     return folder

@@ -1,4 +1,4 @@
-"""The slide machine built once, through the command line, for all system tests."""
+"""The slide machine built once through the command line, for the long system tests."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SLIDE = Path(__file__).parents[1] / "machines" / "slide"
 
 
 @pytest.fixture(scope="session")
-def slide_artefact(tmp_path_factory):
+def built_artefact(tmp_path_factory):
     path = tmp_path_factory.mktemp("slide") / "slide.h5"
     assert run(["build", str(SLIDE / "machine.toml"), "-o", str(path), "--states", "150"]) == 0
     return path

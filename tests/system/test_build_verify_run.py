@@ -26,9 +26,9 @@ from twin.run.replay import replay_drive
 
 
 @pytest.mark.long
-def test_verify_passes_and_stores_the_certificate(slide_artefact, tmp_path):
+def test_verify_passes_and_stores_the_certificate(built_artefact, tmp_path):
     path = tmp_path / "slide.h5"
-    shutil.copy(slide_artefact, path)
+    shutil.copy(built_artefact, path)
     assert [p["name"] for p in read_artefact(path).certificate["parts"]] == ["reduction", "time step", "poses"]
     assert run(["verify", str(path)]) == 0
     stored = read_artefact(path).certificate
@@ -116,13 +116,13 @@ def test_runtime_equals_the_offline_stepper_on_the_same_model(slide_artefact):
 
 
 @pytest.mark.long
-def test_simulated_truth_and_reduced_run_agree(slide_artefact, tmp_path):
+def test_simulated_truth_and_reduced_run_agree(built_artefact, tmp_path):
     truth, out = tmp_path / "truth", tmp_path / "out"
     loads = SLIDE / "runs" / "short"
     assert run(["simulate", str(SLIDE), str(loads), "-o", str(truth), "--tcp-every", "5 min"]) == 0
     simulated = read_run(truth)
     assert set(simulated.synthetic) >= {"temperatures", "tcp"}
-    assert run(["run", str(slide_artefact), str(truth), "-o", str(out)]) == 0
+    assert run(["run", str(built_artefact), str(truth), "-o", str(out)]) == 0
     with h5py.File(out / "result.h5") as f:
         names = [n.decode() if isinstance(n, bytes) else n for n in f["sensor"][:]]
         for name, column in simulated.temperatures.columns.items():
@@ -150,15 +150,15 @@ def test_noise_is_added_as_asked_and_repeats(tmp_path):
 
 
 @pytest.mark.long
-def test_equal_input_gives_an_equal_file(slide_artefact, tmp_path, monkeypatch):
+def test_equal_input_gives_an_equal_file(built_artefact, tmp_path, monkeypatch):
     monkeypatch.setenv("TWIN_CACHE", str(tmp_path / "cache"))  # nothing of the first build may help the second
     again = tmp_path / "again.h5"
     assert run(["build", str(SLIDE / "machine.toml"), "-o", str(again), "--states", "150"]) == 0
-    with h5py.File(slide_artefact) as f:
+    with h5py.File(built_artefact) as f:
         first = f.attrs["created"]
     with h5py.File(again) as f:
         second = f.attrs["created"]
-    a, b = (p.read_bytes().replace(t, b"x" * len(t)) for p, t in ((slide_artefact, first), (again, second)))
+    a, b = (p.read_bytes().replace(t, b"x" * len(t)) for p, t in ((built_artefact, first), (again, second)))
     assert a == b
 
 

@@ -37,6 +37,10 @@ from twin.rom.tableau import SDIRK2_6, Feedback, Tableau, stages
 # body and what joins them: a step of 22 states spends its time in Python, not in arithmetic.
 SMALL = 100
 
+# Share of the heat that leaves a body without films through its contacts: what `steady_state` keeps in the body for a
+# turn, so that it can be solved for alone. Small, for few turns; not tiny, as rounding grows with its inverse.
+KEPT = 1e-3
+
 
 def contact_matrix(model: MachineModel, drive: Drive, step: int) -> np.ndarray:
     """Gamma (n_ports, n_ports) W/K of one step: q_port = -Gamma T_port."""
@@ -323,17 +327,24 @@ class CoupledStepper:
 
         A fixed point of loads and state, to `tolerance` [K] (root mean square over the heat capacity), by Anderson
         acceleration (Walker, Ni, SIAM J. Numer. Anal. 49, 2011): plain iteration diverges where a loss falls or
-        radiation rises steeply with temperature. Raises ModelError where none is found.
+        radiation rises steeply with temperature. A body that loses heat through contacts only has no steady state of
+        its own: it is solved for with the rate of KEPT, which the fixed point takes out again. Raises ModelError where
+        none is found.
         """
         gamma = contact_matrix(self.model, drive, step)
+        rates = [self._rate_of_rest(b, gamma) for b in range(len(self.model.bodies))]
         capacity = sum(float(b.one @ b.energy) for b in self.model.bodies)
 
         def turn(flat: np.ndarray) -> np.ndarray:
             x = self._parts(flat)
             loads = self.loads(drive, step, x)
-            factors = self.factors(loads.theta, 0.0, min(self._follow, FOLLOW))
+            follow = min(self._follow, FOLLOW)
+            factors = [self._factor(b, loads.theta, rate, follow) for b, rate in enumerate(rates)]
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
-            f = self.forcing(loads)
+            f = [
+                fb + rate * self._stored(b, x[b])
+                for b, (fb, rate) in enumerate(zip(self.forcing(loads), rates, strict=True))
+            ]
             rhs = [fb if r is None else fb - r(xb) for fb, r, xb in zip(f, rest, x, strict=True)]
             return np.concatenate(self.solve(rhs, factors, self.across(factors, gamma)))
 
@@ -343,6 +354,13 @@ class CoupledStepper:
 
         start = float(drive.environment[step, 0]) if drive.environment.shape[1] else self.model.reference_temperature
         return self._parts(fixed_point(turn, np.concatenate(self.uniform(start)), size, tolerance, most))
+
+    def _rate_of_rest(self, b: int, gamma: np.ndarray) -> float:
+        """1/s: zero for a body with films, KEPT of what its contacts take over its heat capacity for one without."""
+        body = self.model.bodies[b]
+        if self._area[list(body.theta)].any():
+            return 0.0
+        return KEPT * float(gamma[list(body.ports), list(body.ports)].sum() / (body.one @ body.energy))
 
     def uniform(self, temperature: float) -> list[np.ndarray]:
         """The state of a machine at one temperature [degC]."""

@@ -18,15 +18,23 @@ import click
 @click.option("--states", default=500, show_default=True, help="reduced states of the whole machine")
 @click.option("--samples", default=16, show_default=True, type=click.IntRange(2), help="points of the rich basis")
 @click.option("--training", default=90, show_default=True, type=click.IntRange(1), help="training scenarios")
-def command(machine: str, output: str, method: str, states: int, samples: int, training: int) -> int:
+@click.option(
+    "--substeps",
+    type=click.IntRange(1),
+    help="of the time integrator per step [default: as few of 1, 2, 4 as keep its error below half of the limits]",
+)
+def command(
+    machine: str, output: str, method: str, states: int, samples: int, training: int, substeps: int | None
+) -> int:
     """Reduce MACHINE to a compact artefact and certify it against the rich model on held-out scenarios."""
     from twin.build.pipeline import BuildOptions
     from twin.build.rich_basis import RichOptions
     from twin.face.build import build
     from twin.progress import bar
 
-    options = BuildOptions(method, states, RichOptions(samples=samples), training)  # type: ignore[arg-type]
+    rich = RichOptions(samples=samples)
+    options = BuildOptions(method, states, rich, training, substeps=substeps)  # type: ignore[arg-type]
     certificate = build(machine, output, options, bar).certificate
-    hint = f"twin verify {output}" if certificate.passed else "more --states, or larger [limits] in the description"
+    hint = f"twin verify {output}" if certificate.passed else "the remedy named after FAILED, then build again"
     click.echo("\n".join([f"wrote {output}", *certificate.lines(), f"next: {hint}"]))
     return 0 if certificate.passed else 1

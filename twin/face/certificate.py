@@ -110,8 +110,8 @@ class Certificate(Mapping[str, Any]):
         worst = max(parts, key=lambda p: _largest(p[f"{quantity}_error_in_case"]), default={"name": "reduction"})
         return {
             "reduction": "build it with more --states",
-            "time step": "most of it is the time step: build it with more substeps (BuildOptions)",
-            "poses": "most of it lies between the poses of the grid: add poses in [workspace]",
+            "time step": "most of it is the time step: build it with more --substeps",
+            "poses": "most of it lies between the poses of the grid: add poses in [poses]",
             "rich basis": "most of it is the rich basis: build it with more --samples",
         }[worst["name"]]
 
