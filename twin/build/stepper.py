@@ -8,9 +8,9 @@ Y = S^-1 P and Q = P^T Y, the port temperatures solve (1 + Q Gamma) t = P^T S^-1
 Assembling and factorising the coupled matrix at every position was rejected: 720 steps would be 720 factorisations.
 
 Coefficients that follow surface temperature and speed change in every step. A factor is kept while they stay within
-FOLLOW of those it was made with; the rest, (theta - held) A_k x, goes to the right side, first with the state before
-and once more with the state so found. What is left of it is of second order in the deviation, the heat balance counts
-what was solved and stays exact, and it is stable as |theta - held| < held.
+FOLLOW of those it was made with; the rest, (theta - held) A_k x, goes to the right side with the state before, and
+once more with the state so found where it is more than half of what is allowed: what is left is of second order in the
+deviation. The heat balance counts what was solved and stays exact, and it is stable as |theta - held| < held.
 """
 
 from __future__ import annotations
@@ -239,7 +239,8 @@ class CoupledStepper:
             gamma = dense(np, self._contacts, contacts.at(step))
             forcing = np.concatenate(self.forcing(loads))
             rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
-            solve = partial(self._solve_twice, self._whole(factors, self.across(factors, gamma)), rest)
+            passes = 2 if self._far(loads.theta, factors) else 1
+            solve = partial(self._solve, self._whole(factors, self.across(factors, gamma)), rest, passes)
             capacity = partial(self._capacity, factors)
             after = before = np.concatenate(x)
             own, seen = np.zeros_like(before), np.zeros_like(before)  # means over the step
@@ -278,18 +279,26 @@ class CoupledStepper:
         inverse -= X @ (across @ Y)
         return lambda right: inverse @ right
 
-    def _solve_twice(
+    def _far(self, theta: np.ndarray, factors: list[_Factored]) -> bool:
+        """Whether coefficients are so far from those of the factors that one pass would be worse than the step itself;
+        as `twin.run.stepping` judges it."""
+        pairs = ((theta[list(body.theta)], f.theta) for body, f in zip(self.model.bodies, factors, strict=True))
+        return any(bool(np.any(np.abs(own - held) > self._follow / 2 * held)) for own, held in pairs)
+
+    def _solve(
         self,
         whole: Callable[[np.ndarray], np.ndarray],
         rest: Sequence[Callable[[np.ndarray], np.ndarray] | None],
+        passes: int,
         right: np.ndarray,
         near: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The solution (N,), and the state at which it took what the factors leave out: `near`, then what that gave."""
+        """The solution (N,), and the state at which it took what the factors leave out: `near`, then, in a second pass,
+        what that gave."""
         if all(r is None for r in rest):
             return whole(right), near
         seen = near
-        for _ in range(2):
+        for _ in range(passes):
             seen = near
             parts = zip(rest, self._parts(seen), strict=True)
             near = whole(right - np.concatenate([np.zeros_like(s) if r is None else r(s) for r, s in parts]))
