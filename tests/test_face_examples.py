@@ -11,8 +11,8 @@ import pytest
 import twin
 
 ROOT = Path(__file__).parents[1]
-BRIEF = ("load", "check", "build", "run", "simulate", "rtest", "hide")
-LONG = ("read", "score", "update", "calibrate", "diagnose")
+BRIEF = ("load", "check", "simulate", "rtest", "hide")
+LONG = ("build", "run", "read", "score", "update", "calibrate", "diagnose")
 
 
 @pytest.fixture

@@ -97,6 +97,7 @@ def test_a_fit_stops_where_told_and_stays_within_bounds(parameters):
     np.testing.assert_array_equal(stopped.x, seen[1].x)
 
 
+@pytest.mark.long
 def test_an_unknown_initial_temperature_is_found(parameters):
     """A machine that stood in the sun: the housing is 2 K warmer at the start, and the run does not say so."""
     a = lumped_case.artefact()
@@ -119,6 +120,7 @@ def test_an_unknown_initial_temperature_is_found(parameters):
     assert found.sigma[k] < 0.2
 
 
+@pytest.mark.long
 def test_two_runs_share_the_machine_but_not_their_start(parameters):
     _, values = planted(parameters, 3)
     runs = [replace(lumped_case.truth(values, s, name=f"day_{s}"), initial_temperature=None) for s in (1, 2)]

@@ -70,6 +70,7 @@ def test_derivatives_are_those_of_differences(case):
             assert np.abs(got - difference).max() < 2e-3 * scale, made.names[k]
 
 
+@pytest.mark.long
 def test_derivatives_are_exact_where_laws_are_smooth():
     """Constant films: outputs are analytic in the parameters, and differences agree to their rounding."""
     a = lumped_case.artefact()

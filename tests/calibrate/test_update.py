@@ -89,6 +89,7 @@ def share(measured, predicted):
     return 1.0 - np.linalg.norm(measured - predicted) / np.linalg.norm(measured)
 
 
+@pytest.mark.long
 def test_tangent_is_the_derivative_of_the_runtime(artefact):
     """Against central differences of whole runs with other parameter values."""
     model, run = artefact.model, Run(loads(), initial_temperature=20.0)
@@ -137,6 +138,7 @@ def test_state_filter_makes_up_for_parameters_off_by_30_percent(lived, truth):
     np.testing.assert_allclose(known, final, atol=0.25)
 
 
+@pytest.mark.long
 def test_it_learns_what_it_was_told_about(lived, artefact):
     """The motor is the largest source and has a sensor beside it: planted times 0.7 or 1.3, found within 10 %."""
     _, live, _ = lived("state")

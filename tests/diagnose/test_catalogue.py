@@ -75,6 +75,7 @@ def test_the_example_is_an_entry(lamp, capsys):
     assert "Lamp over the machine" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_the_example_finds_its_lamp(lamp):
     """Hidden in first-order responses, looked for among all hypotheses of heat, with free parameters."""
     study, elements, D = small_case.study(), small_case.elements(), small_case.responses()

@@ -43,6 +43,7 @@ def test_edges_are_the_ends_within_a_run():
     assert edges_of(study, replace(both, batch=replace(both.batch, family="not_thermal"))) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("edge", [Edge("start", 0), Edge("end", 0)])
 def test_the_derivative_by_an_edge_is_that_of_outputs(edge):
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
@@ -72,6 +73,7 @@ def sunny(*centres: float) -> Hypothesis:
     return Hypothesis(batch, 0, when, 0.0, (100.0, 60.0), 1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("edge", [Edge("centre", 1), Edge("length")])
 def test_the_derivative_by_a_bell_is_that_of_outputs(edge):
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)

@@ -10,6 +10,7 @@ from twin.diagnose.accepted import parameter_of
 from twin.diagnose.hotter import hotter
 
 
+@pytest.mark.long
 def test_the_described_machine_keeps_its_detector():
     detector = small_case.made_detector()
     assert hotter(detector, np.zeros(len(detector.study.probed.parameters))) is detector

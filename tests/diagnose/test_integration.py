@@ -34,6 +34,7 @@ def units(kinds, study):
     return [Unit(kind, place, -1, tuple(gates)) for kind, place in kinds]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("spread", [0.0, 0.6])
 def test_without_slots_it_is_the_integration_of_a_calibration(spread):
     """Steps of a minute, one matrix each, beside implicit Euler of a second and a half, at any parameters."""
@@ -100,6 +101,7 @@ def test_derivatives_by_parameters_and_amplitudes():
             assert np.abs(J[:, k] - difference).max() < 3e-3 * scale, k
 
 
+@pytest.mark.long
 def test_derivatives_by_amplitudes_alone_are_the_same():
     study = small_case.study()
     x = np.zeros(len(study.probed.parameters))

@@ -238,6 +238,7 @@ def odd() -> Diagnosis:
     )
 
 
+@pytest.mark.long
 def test_odd_names_and_missing_values_neither_break_the_page_nor_leave_it(tmp_path):
     d = odd()
     write_report(d, tmp_path)

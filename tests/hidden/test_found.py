@@ -32,6 +32,10 @@ AGAIN = (  # of families and kinds that other trials of continuous integration h
     "drawn_loss_law", "drawn_joint", "drawn_zone", "drawn_scale_expansion", "drawn_misplaced_source",
     "drawn_initial_state", "drawn_sensor", "drawn_measurement", "drawn_not_thermal",
 )  # fmt: skip
+# Families that `make test-all` alone looks at in this machine: a minute or two each.
+SELDOM = (
+    "drawn_film_gain", "drawn_sun", "drawn_coolant", "drawn_capacity", "drawn_expansion", "drawn_slip",
+)  # fmt: skip
 # Not said as it should be: `make test-all` shows it, with the long ones.
 MISSED = ("coolant", "film_gain", "initial_state", "drawn_signal")
 SLOW = pytest.mark.slow
@@ -42,7 +46,7 @@ pytestmark = pytest.mark.long
 def _marked(names: Iterable[str]) -> list[Any]:
     return [
         pytest.param(name, marks=[SLOW, pytest.mark.xfail(strict=True)] if name in MISSED else
-                     [SLOW] if name in (*LONG, *ROUGH, *AGAIN) else [])
+                     [SLOW] if name in (*LONG, *ROUGH, *AGAIN, *SELDOM) else [])
         for name in names
     ]  # fmt: skip
 

@@ -107,6 +107,7 @@ def rise(model: MachineModel, change: float) -> np.ndarray:
     return sensor_temperatures(model, last) - 20.0
 
 
+@pytest.mark.long
 def test_three_kelvin_and_fifteen(machine, thermal):
     """Paper 002 extrapolates 3 K to 15 K and finds "linear behaviour": exact for constant films, a tautology
     (E-002-14); free convection and radiation warm the machine faster at 15 K."""

@@ -19,6 +19,7 @@ def folder(slide_result, tmp_path):
     return shutil.copytree(slide_result, tmp_path / "out")
 
 
+@pytest.mark.long
 def test_report_draws_every_picture_and_a_page_that_shows_them(slide_artefact, folder, capsys):
     assert run(["report", str(slide_artefact), str(folder)]) == 0
     printed = capsys.readouterr().out

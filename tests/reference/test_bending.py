@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.reference import described as d
 from tests.reference.models import Steps, run_both
@@ -28,6 +29,7 @@ def curvature(lower: tuple[float, float], upper: tuple[float, float], thickness:
     return (lower[1] - upper[1]) * share / sum(thickness)
 
 
+@pytest.mark.long
 def test_bimetal_strip(tmp_path: Path):
     # patches a thickness or more away from the free ends, whose stresses Timoshenko leaves out
     length, width, lower, upper, film, air = 0.2, 0.01, 0.003, 0.002, 2.0, 50.0

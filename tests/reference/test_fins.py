@@ -58,6 +58,7 @@ def of_sensors(both: Both) -> tuple[np.ndarray, np.ndarray]:
     return tuple(np.array([m.temperature[f"s{i}"][-1] for i in range(len(AT))]) for m in (both.full, both.reduced))
 
 
+@pytest.mark.long
 def test_radiating_fin(tmp_path: Path):
     def flux(T: np.ndarray) -> np.ndarray:
         return STEFAN_BOLTZMANN * ((T + ZERO_CELSIUS) ** 4 - (AIR + ZERO_CELSIUS) ** 4)

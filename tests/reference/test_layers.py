@@ -72,6 +72,7 @@ def test_slab_heated_through_a_film(tmp_path: Path):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_two_bodies_with_contact_resistance(tmp_path: Path):
     a, b = Layer(0.05, 160.0, 2700.0 * 900.0), Layer(0.08, 45.0, 7850.0 * 470.0)
     left, contact, right = 1000.0, 2000.0, 200.0

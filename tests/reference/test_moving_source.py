@@ -145,6 +145,7 @@ def test_nut_moves_once_along_a_bar(tmp_path: Path):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_nut_moves_to_and_fro(tmp_path: Path):
     turns = 720
     x = np.where(np.arange(turns + 1) % 2, 0.45, 0.15)

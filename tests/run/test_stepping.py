@@ -63,7 +63,7 @@ def test_system_matrix_equals_the_dense_one(model):
     np.testing.assert_allclose(prepared.to_artefact(S @ z), expected, rtol=1e-11, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("substeps", [1, 4])
+@pytest.mark.parametrize("substeps", [1, pytest.param(4, marks=pytest.mark.long)])
 def test_steps_equal_plain_numpy(model, substeps):
     prepared, dense = prepare(model), Dense(model, DRIVE)
     start = prepared.uniform(23.0)
@@ -94,6 +94,7 @@ def test_first_order_against_the_exact_exponential():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_four_substeps_with_one_factor_are_three_to_four_times_closer():
     """Four for smooth loads; less here, where pads that move from step to step excite fast modes."""
     drive = evaluate(MODEL.load_model, TIME, SIGNALS, 60.0)
@@ -161,6 +162,7 @@ def test_the_factor_is_renewed_when_the_matrix_changes(what):
     assert changed.tolist() == [0, 30, 31]
 
 
+@pytest.mark.long
 def test_bodies_in_any_order_and_without_contacts():
     """Elimination and contacts do not depend on the order of bodies; a machine may have one body only."""
     swapped = replace(MODEL, bodies=tuple(MODEL.bodies[i] for i in (2, 0, 3, 1)))

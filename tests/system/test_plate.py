@@ -97,6 +97,7 @@ def test_temperatures_are_within_20_mk_of_the_converged_ones_everywhere(tmp_path
         result.plot.tcp()
 
 
+@pytest.mark.long
 def test_run_writes_no_displacements(result, artefact, tmp_path, capsys):
     assert {p.name for p in result.iterdir()} >= {"result.h5", "temperatures.csv", "summary.json"}
     assert not (result / "tcp.csv").exists()
