@@ -13,7 +13,7 @@ import pytest
 
 from tests.build.two_bodies import model
 from twin.build import workers
-from twin.build.certificate import compare
+from twin.build.comparison import compare
 from twin.build.scenario import draw
 from twin.build.workers import each
 from twin.errors import ModelError
@@ -63,6 +63,25 @@ def test_a_comparison_is_the_same_to_the_last_bit_in_two_processes(monkeypatch):
         told.append([np.asarray(v).tobytes() for v in vars(result).values()])
         assert result.temperature_error.max() > 1e-3
     assert told[0] == told[1]
+
+
+class _Caching:
+    """Changes itself while it works, as a cached property does."""
+
+    def read(self, name: str) -> str:
+        if name not in vars(self):
+            for k in range(2000):
+                vars(self)[f"{name}_{k}"] = k
+        return vars(self).setdefault(name, name)
+
+
+def _read(shared: _Caching, name: str) -> str:
+    return shared.read(name)
+
+
+def test_what_is_shared_may_be_cached_into_while_helpers_start(two):
+    names = [f"n{i}" for i in range(200)]
+    assert each(_read, _Caching(), names, long=0.0) == names
 
 
 def test_short_work_stays_here(two):

@@ -7,13 +7,13 @@ the command line: `twin hide`, then `twin simulate`. Faults of a log are hidden 
 
 from __future__ import annotations
 
-import re
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from twin.cli.main import run as command
+from twin.inject.machines.text_edits import spread_values, with_divisions
 
 SLIDE = Path(__file__).parents[1] / "machines" / "slide" / "machine.toml"
 HOURS, RUNS, SAMPLING = 4, 2, 120.0
@@ -47,16 +47,7 @@ def described() -> str:
 
 def other(seed: int) -> str:
     """machine.toml of the real machine: a finer mesh, parameters drawn."""
-    text, rng = described(), np.random.default_rng(seed)
-    for old, new in FINER.items():
-        text = text.replace(f"divisions = {old}", f"divisions = {new}")
-    for name, spread in SPREAD.items():
-        text = re.sub(
-            rf'(\b{name} = ")([\d.]+)',
-            lambda m, spread=spread: f"{m[1]}{float(m[2]) * np.exp(spread * rng.standard_normal()):.6g}",  # type: ignore[misc]
-            text,
-        )
-    return text
+    return spread_values(with_divisions(described(), FINER), SPREAD, np.random.default_rng(seed))
 
 
 def folder_of(text: str, folder: Path) -> Path:

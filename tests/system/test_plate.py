@@ -60,6 +60,15 @@ def test_check_finds_nothing_wrong(capsys):
     assert capsys.readouterr().out.count("no problems found") == 2
 
 
+def test_a_machine_of_which_nothing_is_read_is_refused(tmp_path, capsys):
+    text = (PLATE / "machine.toml").read_text(encoding="utf-8")
+    (tmp_path / "machine.toml").write_text(text[: text.index("[sensors.bottom]")], encoding="utf-8")
+    for command in (["check", str(tmp_path)], ["build", str(tmp_path), "-o", str(tmp_path / "a.h5")]):
+        assert run(command) == 2
+        assert "nothing is watched" in "".join(capsys.readouterr())
+    assert [p.name for p in tmp_path.iterdir()] == ["machine.toml"]
+
+
 @pytest.mark.long
 def test_verify_speaks_of_temperatures_alone(artefact, tmp_path, capsys):
     path = Path(shutil.copy(artefact, tmp_path))

@@ -37,3 +37,5 @@ def test_verify_states_the_mesh_error_of_every_output_and_judges_without_it(
     for k in range(3):
         assert float(lines[3 + k].split()[-3]) == pytest.approx(1e6 * mesh["displacement_error_in_case"][k], abs=6e-4)
     assert "not in the sums" in printed
+    assert run(["verify", str(artefact)]) == 0  # without --mesh: the mesh has not changed
+    assert mesh in read_artefact(artefact).certificate["parts"]

@@ -49,7 +49,7 @@ def rich_model(
                 tolerance = options.tolerance
                 rich = _projected(body, responses, tolerance)
                 while tolerance > FINEST and (
-                    rich.n < FREE or rich_error(body, rich, low, high, machine.limits) > SHARE
+                    rich.n < FREE or not rich_error(body, rich, low, high, machine.limits) <= SHARE
                 ):
                     tolerance /= 2.0
                     rich = _projected(body, responses, tolerance)

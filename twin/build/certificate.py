@@ -6,13 +6,14 @@ against rich, and with N = 5 for the time step; rich against full, added from a 
 check without a probability. It is no bound: the rigorous energy-norm residual bound overestimates by 45 to 65,000 here
 and would be ignored. Outside the box every result is flagged.
 
-Errors add up: |compact in steps - full in fine steps| <= |compact in steps - compact in fine steps| + |compact - rich|
-+ |rich - full|, the last two in the runtime's steps.
+Errors add up, about: |compact in steps - full in fine steps| ~ |compact in steps - compact in fine steps| + |compact -
+rich| + |rich - full|, the last two in the runtime's steps. The first is that of the modes that the compact model has,
+against a reference in finite steps: it is enlarged by what halving these changes (`in_finer_steps`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -84,6 +85,8 @@ class Certificate:
     worst_relative_output: str  # "dy at x 100 mm", the one that it is of
     worst_temperature: str  # "sensor T07 in seed 3: ...", as drawn
     worst_displacement: str
+    worst_temperature_in_case: str  # "sensor T07": where the sum of the parts is largest in the case
+    worst_displacement_in_case: str  # "dx at x 100 mm"
     parts: tuple[PartError, ...]
 
     @property
@@ -175,6 +178,8 @@ def certify(
         worst_relative_output=_worst_output(model, places, *shares),
         worst_temperature=_worst_sensor(model, compact),
         worst_displacement=_worst_pose(model, places, compact),
+        worst_temperature_in_case=f"sensor {model.sensors[int(T_case.argmax())]}" if T_case.size else "no sensors",
+        worst_displacement_in_case=_tcp_row(model, places[int(u_case.argmax()) // 3], int(u_case.argmax()) % 3),
         parts=tuple(made),
     )
 
@@ -183,6 +188,18 @@ def with_part(known: Certificate, part: Part, limits: Limits) -> Certificate:
     """The certificate with one more part that does not count; in the place of one of the same name."""
     others = tuple(p for p in known.parts if p.name != part.name)
     return replace(known, parts=(*others, _part_error(part, limits, len(known.displacement_error))))
+
+
+def known_parts(stored: Mapping[str, Any], name: str) -> tuple[PartError, ...]:
+    """The parts of a name in the figures of a stored certificate."""
+    return tuple(
+        PartError(
+            part["name"], part["between"], bool(part["counts"]), tuple(part["scenarios"]),
+            tuple(map(float, part["temperature_error_in_case"])),
+            _rows(np.asarray([part["displacement_error_in_case"]]))[0],
+        )
+        for part in stored.get("parts", ()) if part["name"] == name
+    )  # fmt: skip
 
 
 def _part_error(part: Part, limits: Limits, n_poses: int) -> PartError:

@@ -7,7 +7,7 @@ models in equal steps differ by what their equations leave out; one model in two
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,7 +22,8 @@ from twin.rom.poses import pose_weights
 from twin.rom.tcp import elastic_rows, inputs, is_exact
 
 TINY = 1e-12  # K or m: an output that does not move at all has no relative error
-# Steps of the reference within one: of a method of second order a quarter of the step leaves a sixteenth of its error.
+# Steps of the reference within one: of a method of second order a quarter of the step leaves a sixteenth of its error,
+# where the step resolves what moves. `step_halved` says how much it leaves.
 FINER = 4
 
 
@@ -71,6 +72,11 @@ class Comparison:
             * (limits.at_displacement_range / np.maximum(self.displacement_case, TINY))[:, None, None]
         )
         return T.max(axis=0), u.max(axis=0)
+
+    def times(self, factor: float) -> Comparison:
+        """The comparison with all errors so many times as large."""
+        T, u = factor * self.temperature_error, factor * self.displacement_error
+        return replace(self, temperature_error=T, displacement_error=u)
 
     def range_in_case(self, limits: Limits) -> tuple[np.ndarray, np.ndarray]:
         """Ranges of sensors (n_sensors,) K and TCP rows (n_places, 3) m where all scenarios together are the case."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from twin import __version__
 from twin.build.cache import machine_hash
-from twin.build.certificate import Certificate, with_part
+from twin.build.certificate import MESH, Certificate, known_parts, with_part
 from twin.build.import_closure import closure_hash
 from twin.build.mesh_error import SCENARIOS, mesh_part, refuse_lumped
 from twin.build.pipeline import (
@@ -60,7 +60,7 @@ def build_artefact(
         "twin": __version__,
         **{f"package_{name}": importlib.metadata.version(name) for name in PACKAGES},
         "command": f"twin build --method {options.method} --states {options.states} --samples {options.rich.samples} "
-        f"--training {options.training}",
+        f"--training {options.training}" + (f" --substeps {options.substeps}" if options.substeps else ""),
         "full_states": str(full.thermal.n),
         "rich_states": str(rich.n),
         "options_hash": hashlib.sha256(repr(options).encode()).hexdigest(),
@@ -130,8 +130,8 @@ def verified(
     result = certificate(
         machine, rich, artefact.model, of_full, options, VERIFY_SEED, full_scenarios, progress=progress
     )
-    if not mesh:
-        return result
+    if not mesh:  # the mesh is what it was when it was asked for
+        return replace(result, parts=(*result.parts, *known_parts(artefact.certificate, MESH)))
     chosen = chosen_for_full(rich.load_model, held_out(rich, options, VERIFY_SEED), SCENARIOS)
     positions = np.array(result.positions).reshape(len(result.positions), len(rich.pose_axes))
     part = mesh_part(machine, full, chosen, result.substeps, positions, progress)

@@ -93,14 +93,16 @@ class _Work(Generic[T, R]):
 
     def call_helpers(self, left: int) -> None:
         """As many as there are cores and pieces of work besides this process and its next piece."""
+        # pickled before the threads start: what the pieces of this thread cache in `shared` would change it meanwhile
+        opening = pickle.dumps((self._function.__module__, self._function.__qualname__, self._shared), protocol=5)
         self.helpers.extend(_Helper() for _ in range(min(workers(), left) - 1))
-        self._threads.extend(threading.Thread(target=self._serve, args=(h,), daemon=True) for h in self.helpers)
+        self._threads.extend(threading.Thread(target=self._serve, args=(h, opening), daemon=True) for h in self.helpers)
         for thread in self._threads:
             thread.start()
 
-    def _serve(self, helper: _Helper) -> None:
+    def _serve(self, helper: _Helper, opening: bytes) -> None:
         try:
-            helper.send((self._function.__module__, self._function.__qualname__, self._shared))
+            helper.begin(opening)
             while (i := self.take()) is not None:
                 self.results[i] = helper.ask(self._items[i])
                 self._finished.append(i)
@@ -132,6 +134,11 @@ class _Helper:
             stdout=subprocess.PIPE,
             env=os.environ | one | {"PYTHONPATH": path},
         )
+
+    def begin(self, opening: bytes) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(opening)
+        self._process.stdin.flush()
 
     def send(self, message: Any) -> None:
         assert self._process.stdin is not None

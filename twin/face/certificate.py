@@ -82,8 +82,10 @@ class Certificate(Mapping[str, Any]):
             T, u = (_largest(part[f"{k}_error_in_case"]) for k in ("temperature", "displacement"))
             of_tcp = f"  {1e6 * u:7.3f} um" if _largest(self["displacement_range"]) > 0.0 else ""
             beside = "" if part["counts"] else ", not in the sums"
+            halved = self.get("step_halved", 0.0) if part["name"] == "time step" else 0.0
+            more = f" (halving these changes it by {100 * halved:.0f} %, counted)" if halved else ""
             text.append(
-                f"    {part['name']:<11} {T:.4f} K{of_tcp}  {part['between']}, "
+                f"    {part['name']:<11} {T:.4f} K{of_tcp}  {part['between']}{more}, "
                 f"{len(part['scenarios'])} scenarios{beside}"
             )
         return ["  in the case, of it:", *text] if text else []
@@ -92,8 +94,8 @@ class Certificate(Mapping[str, Any]):
         """Why it has not passed: which limit of the description, by how much, and the remedy; empty where it has."""
         T, u = self.temperature_error, self.displacement_error
         compared = (
-            ("temperature", T, self["limit_temperature"], f"in the case; {self['worst_temperature']}"),
-            ("displacement", u, self["limit_displacement"], f"in the case; {self['worst_displacement']}"),
+            ("temperature", T, self["limit_temperature"], self._in_case("temperature")),
+            ("displacement", u, self["limit_displacement"], self._in_case("displacement")),
             ("relative", self["worst_relative"], self["limit_relative"], self.get("worst_relative_output", "")),
         )
         return [
@@ -103,15 +105,20 @@ class Certificate(Mapping[str, Any]):
             if error > limit
         ]
 
+    def _in_case(self, quantity: str) -> str:
+        """The output with the largest error in the case; artefacts of before 0.7 know it as drawn alone."""
+        return f"in the case; {self.get(f'worst_{quantity}_in_case') or self[f'worst_{quantity}']}"
+
     def _remedy(self, name: str) -> str:
         """What makes the largest part of an error smaller."""
-        quantity = "displacement" if name == "displacement" else "temperature"
+        output = name if name != "relative" else self.get("worst_relative_output", "")
+        quantity = "displacement" if output.startswith("d") else "temperature"
         parts = [p for p in self.get("parts", ()) if p["counts"]]
         worst = max(parts, key=lambda p: _largest(p[f"{quantity}_error_in_case"]), default={"name": "reduction"})
         return {
             "reduction": "build it with more --states",
             "time step": "most of it is the time step: build it with more --substeps",
-            "poses": "most of it lies between the poses of the grid: add poses in [poses]",
+            "poses": "most of it lies between the poses of the grid: more [poses], or build it with more --states",
             "rich basis": "most of it is the rich basis: build it with more --samples",
         }[worst["name"]]
 

@@ -42,7 +42,7 @@ _NAMED = (
 def reference_problems(machine: Machine) -> list[Problem]:
     """All problems that need more than one entry, or more than its type, to be seen."""
     problems = [*_names(machine)]
-    of_meshes = (_parts, _axes, _contacts, _laws, _films, _sensors, _tcp, _supports, misplaced, _added)
+    of_meshes = (_parts, _axes, _contacts, _laws, _films, _sensors, _watched, _tcp, _supports, misplaced, _added)
     for check in (*((lumped_problems, _axes, _laws, _sensors, _added) if machine.lumped else of_meshes), _poses):
         problems += check(machine)
     whole = not any(entry is None for section in _NAMED for entry in getattr(machine, section).values())
@@ -269,6 +269,13 @@ def _tcp(machine: Machine) -> Iterator[Problem]:
         yield Problem(
             "a point on the work side", "tcp.work.point", "remove it: the work side is read at the tool centre point"
         )
+
+
+def _watched(machine: Machine) -> Iterator[Problem]:
+    """Without a sensor in the machine and without a TCP a certificate would pass over nothing."""
+    inside = [s for s in machine.sensors.values() if s is None or s.environment is None]
+    if machine.parts and not machine.has_tcp and not inside:
+        yield Problem("nothing is watched", "sensors", "add a [sensors.NAME] in a part, or [tcp.tool] and [tcp.work]")
 
 
 def _supports(machine: Machine) -> Iterator[Problem]:

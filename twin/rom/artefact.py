@@ -19,6 +19,7 @@ from twin.rom.load_model import LoadModel
 from twin.rom.model import AffineBody, MachineModel
 from twin.rom.parameter import Parameter
 from twin.rom.structure_file import read_structure, write_structure
+from twin.rom.tcp import refuse_other_structure
 
 FORMAT = "twin artefact"
 SCHEMA_VERSION = 2
@@ -110,7 +111,7 @@ def write_artefact(
         bodies = f.create_group("bodies")
         for body in model.bodies:
             _write_body(bodies.create_group(body.name), body)
-        _write_certificate(f.create_group("certificate"), dict(certificate or {}), model)
+        _write_certificate(f.create_group("certificate"), dict(certificate or {}))
         put_attributes(f.create_group("provenance"), dict(sorted((provenance or {}).items())))
         pictures = f.create_group("fields")
         sizes = {body.name: body.n for body in model.bodies}
@@ -168,16 +169,24 @@ def _numbers(value: object) -> np.ndarray | None:
     return table.astype(float) if table.dtype.kind in "fi" else None
 
 
-def _write_certificate(group: h5py.Group, certificate: dict[str, Any], model: MachineModel) -> None:
+# Tables of a certificate by the scales that artefacts have anyway; others get their own.
+_CERTIFIED: dict[str, tuple[str, ...]] = dict.fromkeys(
+    ("temperature_error", "temperature_range", "temperature_error_in_case", "temperature_range_in_case"), ("sensor",)
+) | dict.fromkeys(
+    ("displacement_error", "displacement_range", "displacement_error_in_case", "displacement_range_in_case"),
+    ("pose", "component"),
+)
+
+
+def _write_certificate(group: h5py.Group, certificate: dict[str, Any]) -> None:
     tables = {name: _numbers(value) for name, value in sorted(certificate.items())}
     rest = {name: value for name, value in certificate.items() if tables[name] is None}
     put(group, "json", json.dumps(rest, sort_keys=True), "")
-    known = {(len(model.sensors),): ("sensor",), (len(model.poses), 3): ("pose", "component")}
     for name, table in tables.items():
         if table is None:
             continue
-        unit = "K" if "temperature" in name else "m" if "displacement" in name else ""
-        dims = known.get(table.shape)
+        unit = "K" if "temperature" in name else "m" if "displacement" in name or name == "positions" else ""
+        dims = _CERTIFIED.get(name)
         if dims is None:
             dims = tuple(f"{name}_{axis}" for axis in range(table.ndim))
             for dim, size in zip(dims, table.shape, strict=True):
@@ -263,6 +272,7 @@ def _read(f: h5py.File, path: Path) -> Artefact:
         poses=_dataset(f, "pose_position")[...],
         structure=read_structure(f["structure"], strings(_dataset(f, "body"))) if "structure" in f else None,
     )
+    refuse_other_structure(model)
     certificate = dict(json.loads(_dataset(f, "certificate/json").asstr()[()]))
     for name, dataset in _dataset(f, "certificate").items():
         if name != "json" and not dataset.is_scale:

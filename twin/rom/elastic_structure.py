@@ -129,6 +129,7 @@ class ElasticStructure:
         raise Mechanism(
             f"body '{name}' {kind} {axis}" + (f", together with {', '.join(others)}" if others else ""),
             f"{free.shape[1]} free motion(s): give stiffness in that direction to a moving contact of the body "
-            "(axial for its screw; normal, lateral for its guides) or to a support",
+            "(axial for its screw; normal, lateral for its guides) or to a support; what turns needs one off the line "
+            "of the others",
             (name, *others),
         )

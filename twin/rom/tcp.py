@@ -14,14 +14,34 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twin.errors import ModelError
 from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.model import MachineModel
 from twin.rom.poses import pose_weights
+
+SAME = 1e-6  # of the largest TCP row: what rounding may change; measured 1e-10
 
 
 def is_exact(model: MachineModel) -> bool:
     """Whether the model knows its TCP displacement at every position, not at the poses of its grid alone."""
     return model.structure is not None and all(body.W is not None for body in model.bodies)
+
+
+def refuse_other_structure(model: MachineModel) -> None:
+    """Raises KeyError where the structure does not give the TCP rows that the model has at the first pose of its grid:
+    something in it is damaged."""
+    if not is_exact(model) or not len(model.poses):
+        return
+    try:
+        rows = [Z[0] @ inputs(model, b) for b, Z in enumerate(elastic_rows(model, model.poses[:1]))]
+    except (ModelError, ValueError, LookupError, ArithmeticError, np.linalg.LinAlgError) as e:
+        raise KeyError(f"'structure' cannot be solved: {e}") from e
+    size = max(float(np.abs(body.G).max(initial=0.0)) for body in model.bodies)
+    if any(
+        not np.abs(own - body.G[0]).max(initial=0.0) <= SAME * size
+        for own, body in zip(rows, model.bodies, strict=True)
+    ):
+        raise KeyError("'structure' is not that of the TCP rows 'G'")
 
 
 def elastic_rows(model: MachineModel, positions: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -48,10 +68,10 @@ def elastic_rows(model: MachineModel, positions: np.ndarray) -> tuple[np.ndarray
 def tcp_rows(model: MachineModel, positions: np.ndarray) -> tuple[np.ndarray, ...]:
     """G_b (m, 3, n_b) [m/K] per body at positions (m, n_axes) [m]: the TCP displacement is sum_b G_b x_b.
 
-    Exact where the model has a structure (`is_exact`), interpolated between the poses of its grid otherwise, there with
-    the values of the nearest point of the grid for positions outside it. For full and reduced models.
+    Exact where the model has a structure (`is_exact`), interpolated between the poses of its grid otherwise; with the
+    values of the nearest point of the grid for positions outside it. For full and reduced models.
     """
-    different, which = _distinct(positions)
+    different, which = _distinct(_within_grid(model, positions))
     if not is_exact(model):
         weights, _ = pose_weights(model.pose_grid, different)
         return tuple(np.tensordot(weights, body.G, 1)[which] for body in model.bodies)
@@ -64,7 +84,7 @@ def tcp_at(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray) 
 
     One state per position, or one for all. `by_body` makes them of whole states. Exact or interpolated as `tcp_rows`.
     """
-    different, which = _distinct(positions)
+    different, which = _distinct(_within_grid(model, positions))
     exact = is_exact(model)
     if exact:
         rows = elastic_rows(model, different)
@@ -83,6 +103,7 @@ def tcp_at(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray) 
 
 def tcp_over(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray) -> np.ndarray:
     """TCP displacements (k, m, 3) [m] of k states x_b (k, n_b) per body, each at all positions (m, n_axes) [m]."""
+    positions = _within_grid(model, positions)
     if not is_exact(model):
         weights, _ = pose_weights(model.pose_grid, positions)
         at_poses = sum(np.tensordot(states, body.G, (1, 2)) for body, states in zip(model.bodies, x, strict=True))
@@ -103,6 +124,14 @@ def inputs(model: MachineModel, body: int) -> np.ndarray:
     if W is None:
         raise ValueError(f"body '{model.bodies[body].name}' has no elastic inputs")
     return W
+
+
+def _within_grid(model: MachineModel, positions: np.ndarray) -> np.ndarray:
+    """Positions (m, n_axes) [m], those outside the grid moved to its border: pads may have left their rails there."""
+    positions = np.asarray(positions, dtype=float)
+    if not positions.shape[1]:
+        return positions
+    return np.clip(positions, [nodes[0] for nodes in model.pose_grid], [nodes[-1] for nodes in model.pose_grid])
 
 
 def _distinct(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -90,8 +90,7 @@ def replay_drive(
     axes = [a.name for a in model.load_model.axes]
     to_poses = positions[:, [axes.index(a) for a in model.pose_axes]]
     outside = outside_grid(model.pose_grid, to_poses)
-    beyond = "position outside the pose grid" + ("" if is_exact(model) else ", TCP error of its border")
-    flags = {beyond: outside[1:] | outside[:-1]}
+    flags = {"position outside the pose grid, TCP error of its border": outside[1:] | outside[:-1]}
     modal = prepared.to_artefact(states)
     certified = artefact.certificate.get("step")
     if certified is not None:

@@ -171,7 +171,7 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
     loads = loads_of(layout, system, start, inputs)
     factor, held = kept_or_new(layout, system, state, inputs, loads.theta)
     more = loads.theta - held
-    far = jnp.any(jnp.abs(more) > inputs.follow / 2 * held)  # nearer, one pass is as good as the step itself
+    far = jnp.any(jnp.abs(more) > inputs.follow / 2 * held)  # nearer, one pass is enough; certified with it
     forcing = forcing_of(layout, system, loads)
     feedback = feedback_of(layout, system, inputs, jnp.asarray(loads.power))
 
