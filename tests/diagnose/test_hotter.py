@@ -16,6 +16,7 @@ def test_the_described_machine_keeps_its_detector():
     assert hotter(detector, np.zeros(len(detector.study.probed.parameters))) is detector
 
 
+@pytest.mark.long
 def test_channels_of_a_stronger_source_are_wrong_by_as_much_more_as_they_rise():
     detector = small_case.made_detector()
     study = detector.study
