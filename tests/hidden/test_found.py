@@ -127,7 +127,7 @@ def test_what_is_too_small_is_below_its_limit(settings):
     assert all(limit.smallest > hidden.size for limit in limits)
 
 
-# --- golden values: the diagnoses are the stored ones to the last digits
+# --- golden values: the diagnoses are the stored ones to TOLERANCE
 
 
 def compare(studied: str, found: Values) -> None:

@@ -14,7 +14,7 @@ SHORTEST = 40  # mm, of half a stroke
 
 
 @dataclass(frozen=True)
-class Glued:
+class FixedContact:
     """A fixed contact: two surfaces and a conductance [W/(m^2 K)]."""
 
     name: str
@@ -43,7 +43,7 @@ class LinearAxis:
     reach: int  # mm, half the stroke
     carried: str
     solids: tuple[Solid, ...]
-    glued: tuple[Glued, ...]
+    glued: tuple[FixedContact, ...]
     moving: tuple[Moving, ...]
     motor: str  # surface that its motor heats, "" without a screw
     bearing: str  # surface at the screw's bearing
@@ -134,7 +134,7 @@ def _ball_screw(rng: np.random.Generator, name: str, frame: Frame, base: Base, c
     ]
     glued = [
         _on(base.part, frame, bearing, float(one_of(rng, (3000, 5000)))),
-        Glued(f"{screw}_seat", (f"{bearing}.{frame.end(True)}", f"{screw}.{frame.end(False)}"), 3000.0),
+        FixedContact(f"{screw}_seat", (f"{bearing}.{frame.end(True)}", f"{screw}.{frame.end(False)}"), 3000.0),
         _under(carried, frame, pad, 5000.0),
     ]
     motor = f"{bearing}.{frame.end(False)}"
@@ -143,7 +143,7 @@ def _ball_screw(rng: np.random.Generator, name: str, frame: Frame, base: Base, c
         long = even(rng, 100, 150)
         solids.append(frame.solid(own, "motor", "motor", (-long, -36, 2), (long, 72, top - 6)))
         joint = float(one_of(rng, (500, 800, 1200)))
-        glued.append(Glued(own, (f"{bearing}.{frame.end(False)}", f"{own}.{frame.end(True)}"), joint))
+        glued.append(FixedContact(own, (f"{bearing}.{frame.end(False)}", f"{own}.{frame.end(True)}"), joint))
         motor = f"{own}.{frame.face(True)}"
     segments = int(rng.integers(8, 13))
     axial = rounded(rng.uniform(80, 180), 2)
@@ -154,11 +154,11 @@ def _ball_screw(rng: np.random.Generator, name: str, frame: Frame, base: Base, c
     return LinearAxis(name, frame.along, int(reach), carried, tuple(solids), tuple(glued), (moving,), motor, away)
 
 
-def _on(base: str, frame: Frame, part: str, conductance: float) -> Glued:
+def _on(base: str, frame: Frame, part: str, conductance: float) -> FixedContact:
     """A part that stands on the face."""
-    return Glued(part, (f"{base}.{frame.face(True)}", f"{part}.{frame.face(False)}"), conductance)
+    return FixedContact(part, (f"{base}.{frame.face(True)}", f"{part}.{frame.face(False)}"), conductance)
 
 
-def _under(carried: str, frame: Frame, part: str, conductance: float) -> Glued:
+def _under(carried: str, frame: Frame, part: str, conductance: float) -> FixedContact:
     """A part that is screwed to the side of the carried one that looks at the face."""
-    return Glued(part, (f"{carried}.{frame.face(False)}", f"{part}.{frame.face(True)}"), conductance)
+    return FixedContact(part, (f"{carried}.{frame.face(False)}", f"{part}.{frame.face(True)}"), conductance)

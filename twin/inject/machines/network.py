@@ -18,7 +18,7 @@ from twin.inject.machines.toml_text import Section, Table, toml_text
 STRUCTURE = ("bed", "column", "headstock", "arm", "frame")  # in the order of the flow of forces, from the ground
 UNITS = ("motor", "spindle_bearing", "gearbox", "hydraulics", "cover", "second_motor")  # small, at one of the structure
 SCREW = 500  # mm
-FILM_THICKNESS = 3.6e6  # J/(m^3 K), of iron and steel: capacity over it is a volume
+VOLUMETRIC_CAPACITY = 3.6e6  # J/(m^3 K), of iron and steel: capacity over it is a volume
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ def _nodes(rng: np.random.Generator, axis: bool) -> tuple[_Node, ...]:
 
 def _sized(rng: np.random.Generator, name: str, capacity: float, moves: bool = False) -> _Node:
     """With the area of a body of its volume whose walls are some 60 mm thick, less for small ones."""
-    wall = min(0.06, 0.4 * (capacity / FILM_THICKNESS) ** (1.0 / 3.0))
-    return _Node(name, capacity, rounded(capacity / FILM_THICKNESS / wall * rng.uniform(0.8, 1.3)), moves)
+    wall = min(0.06, 0.4 * (capacity / VOLUMETRIC_CAPACITY) ** (1.0 / 3.0))
+    return _Node(name, capacity, rounded(capacity / VOLUMETRIC_CAPACITY / wall * rng.uniform(0.8, 1.3)), moves)
 
 
 def _links(rng: np.random.Generator, nodes: Sequence[_Node], axis: bool) -> tuple[_Link, ...]:

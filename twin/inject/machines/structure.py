@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.inject.machines.boxes import Frame, Solid, Triple, with_divisions
 from twin.inject.machines.draws import even, one_of
-from twin.inject.machines.linear_axis import Base, Glued, LinearAxis, linear_axis
+from twin.inject.machines.linear_axis import Base, FixedContact, LinearAxis, linear_axis
 
 NODES = (700, 2300)  # of the mesh, quadratic elements: a full model is stepped through hours in seconds
 MAIN = 6  # parts besides feet, rails, carriages, screws, blocks and motors
@@ -40,7 +40,7 @@ class Structure:
 
     layout: str
     solids: tuple[Solid, ...]
-    glued: tuple[Glued, ...]
+    glued: tuple[FixedContact, ...]
     axes: tuple[LinearAxis, ...]
     tool: str  # surface
     point: Triple  # mm
@@ -60,10 +60,10 @@ class _Grown:
     """What stands so far, and where the next thing goes."""
 
     solids: tuple[Solid, ...]
-    glued: tuple[Glued, ...] = ()
+    glued: tuple[FixedContact, ...] = ()
     axes: tuple[LinearAxis, ...] = ()
 
-    def plus(self, solids: Sequence[Solid], glued: Sequence[Glued]) -> _Grown:
+    def plus(self, solids: Sequence[Solid], glued: Sequence[FixedContact]) -> _Grown:
         return replace(self, solids=(*self.solids, *solids), glued=(*self.glued, *glued))
 
     def moved_by(self, axis: LinearAxis) -> _Grown:
@@ -102,7 +102,7 @@ def _bed(rng: np.random.Generator, layout: Layout) -> tuple[_Grown, int]:
         for i, (x, y) in enumerate(corners)
     ]
     joint = float(one_of(rng, (1000, 2000, 3000)))
-    glued = [Glued(f.name, ("bed.z_min", f"{f.name}.z_max"), joint) for f in feet]
+    glued = [FixedContact(f.name, ("bed.z_min", f"{f.name}.z_max"), joint) for f in feet]
     return _Grown((bed, *feet), tuple(glued)), free
 
 
@@ -163,14 +163,14 @@ def _tool_side(rng: np.random.Generator, grown: _Grown, layout: Layout, free: in
         reach = free - over[1] + even(rng, 20, 60)
         made = Solid("head", "main", head, (x + 20, free - reach, low), (wide - 40, reach, tall))
         joint = float(one_of(rng, (2000, 4000)))
-        glued = [_standing(rng, "column"), Glued("head", ("column.y_min", "head.y_max"), joint)]
+        glued = [_standing(rng, "column"), FixedContact("head", ("column.y_min", "head.y_max"), joint)]
         grown = grown.plus([column, made], glued)
     middle = made.middle
     if grown.main() < MAIN and rng.random() < 0.5:
         size = (2 * (made.size[0] // 4), 2 * (min(made.size[1], 140) // 4) + 20, min(drop, 60))
         at = (middle[0] - size[0] // 2, middle[1] - size[1] // 2, made.origin[2] - size[2])
         spindle = Solid("spindle", "main", "steel", at, size)
-        grown = grown.plus([spindle], [Glued("spindle", ("head.z_min", "spindle.z_max"), 3000.0)])
+        grown = grown.plus([spindle], [FixedContact("spindle", ("head.z_min", "spindle.z_max"), 3000.0)])
         return grown, "spindle.z_min", (middle[0], middle[1], at[2] - 20), "spindle.y_min"
     return grown, "head.z_min", (middle[0], middle[1], made.origin[2] - 20), "head.y_min"
 
@@ -188,7 +188,7 @@ def _turning(rng: np.random.Generator, grown: _Grown) -> tuple[_Grown, str, Trip
         wide = min(slide.size[0], slide.size[1], 140)
         start = (middle[0] - wide // 2, middle[1] - wide // 2, z)
         turret = Solid("turret", "main", one_of(rng, ("steel", "cast_iron")), start, (wide, wide, tall))
-        grown = grown.plus([turret], [Glued("turret", (tool, "turret.z_min"), 3000.0)])
+        grown = grown.plus([turret], [FixedContact("turret", (tool, "turret.z_min"), 3000.0)])
         tool, z = "turret.x_max", z + tall // 2
     return grown, tool, (at[0] - 40, middle[1], z), "headstock.x_min"
 
@@ -205,10 +205,10 @@ def _work_side(rng: np.random.Generator, grown: _Grown, layout: Layout) -> tuple
         middle = base.middle if table else (base.middle[0], 110, 0)
         at = (middle[0] - size[0] // 2, middle[1] - size[1] // 2, base.end[2])
         fixture = Solid("fixture", "main", one_of(rng, ("steel", "aluminium")), at, size)
-        return grown.plus([fixture], [Glued("fixture", (surface, "fixture.z_min"), 3000.0)]), "fixture.z_max"
+        return grown.plus([fixture], [FixedContact("fixture", (surface, "fixture.z_min"), 3000.0)]), "fixture.z_max"
     return grown, surface
 
 
-def _standing(rng: np.random.Generator, part: str) -> Glued:
+def _standing(rng: np.random.Generator, part: str) -> FixedContact:
     """A part that is bolted to the bed's top."""
-    return Glued(part, ("bed.z_max", f"{part}.z_min"), float(one_of(rng, (1500, 3000, 5000))))
+    return FixedContact(part, ("bed.z_max", f"{part}.z_min"), float(one_of(rng, (1500, 3000, 5000))))
