@@ -43,9 +43,13 @@ check: $(READY) ## style, format, types, the import rules and the size of functi
 test: $(READY) ## every behaviour, with hidden effects of five families in a small machine (5 to 9 min)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
-.PHONY: test-hidden
-test-hidden: $(READY) ## the rest of what continuous integration runs: hidden effects in the five-axis machine, long tests
+.PHONY: test-long
+test-long: $(READY) ## the rest of what continuous integration runs (some 10 min)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "long and not slow" $(PYTEST_ARGS)
+
+.PHONY: test-hidden
+test-hidden: $(READY) ## effects hidden in the five-axis machine, and its stored diagnoses: after a change to what decides
+	$(BIN)/python -m pytest -m "trials and not slow" $(PYTEST_ARGS)
 
 .PHONY: test-all
 test-all: $(READY) ## every test, the slow ones too

@@ -22,11 +22,11 @@ from twin.inject.judge.match import effect, known_of, place_of, same_place
 KNOWN = known_of(EXPERIMENT)
 GOLDEN: dict[str, Any] = json.loads((Path(verdicts.__file__).parent / "verdicts.json").read_text(encoding="utf-8"))
 # Of each quantity's own scale. The same processor gives 1e-9; refits stop when they move little, which turns the last
-# digits of another processor's kernels into 1e-8 (seen in continuous integration).
+# digits of another processor's kernels into 1e-8 (seen elsewhere).
 TOLERANCE = 1e-6
-ROUGH = ("null_law",)  # right with all synthetic measurements, not with the few of CI
+ROUGH = ("null_law",)  # right with all synthetic measurements, not with few
 LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a null distribution of their own
-AGAIN = (  # of families and kinds that other trials of continuous integration have
+AGAIN = (  # of families and kinds that other trials have
     "pair", "effect_and_sensor", "below_limit", "forced_convection", "loss_law", "expansion", "capacity",
     "scale_expansion", "slip", "not_thermal", "measurement", "drawn_heat_source", "drawn_forced_convection",
     "drawn_loss_law", "drawn_joint", "drawn_zone", "drawn_scale_expansion", "drawn_misplaced_source",
@@ -40,7 +40,7 @@ SELDOM = (
 MISSED = ("coolant", "film_gain", "initial_state", "drawn_signal")
 SLOW = pytest.mark.slow
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.trials
 
 
 def _marked(names: Iterable[str]) -> list[Any]:
