@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.system.conftest import SLIDE
+from twin.build.body_matrix import system_matrix
 from twin.build.pipeline import full_model
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
 from twin.build.scenario import theta_bounds
-from twin.build.stepper import system_matrix
 from twin.machine.load import load_machine
 
 pytest.importorskip("pymor")

@@ -2,9 +2,9 @@
 
 "Scenario-certified": with N exchangeable held-out scenarios a new one exceeds the observed maximum of any one quantity
 with probability <= 1/(N + 1) (Vovk et al. 2005, conformal prediction); N = 19 gives 95 %. This holds for compact
-against rich, and with N = 5 for the time step; rich against full, added from a few scenarios chosen by cost, is a
-check without a probability. It is no bound: the rigorous energy-norm residual bound overestimates by 45 to 65,000 here
-and would be ignored. Outside the box every result is flagged.
+against rich, and for the time step in shorter scenarios; rich against full, added from a few scenarios chosen by cost,
+is a check without a probability. It is no bound: the rigorous energy-norm residual bound overestimates by 45 to 65,000
+here and would be ignored. Outside the box every result is flagged.
 
 Errors add up, about: |compact in steps - full in fine steps| ~ |compact in steps - compact in fine steps| + |compact -
 rich| + |rich - full|, the last two in the runtime's steps. The first is that of the modes that the compact model has,

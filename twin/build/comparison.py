@@ -186,13 +186,13 @@ def _compared(
     """Per pair the columns of `Comparison` after the labels."""
     ways, pairs, substeps = how
     steady = {reader: reader.steady(scenario) for reader in dict.fromkeys(reader for reader, _ in ways)}
-    made = []
-    for reader, finer in ways:
+    made = {}
+    for reader, finer in dict.fromkeys(ways):  # a machine that is kept whole is its own reduced model
         moving = reader.outputs(scenario, substeps, finer)
-        made.append([np.concatenate(both) for both in zip(moving, steady[reader], strict=True)])
+        made[reader, finer] = [np.concatenate(both) for both in zip(moving, steady[reader], strict=True)]
     result: list[tuple[np.ndarray, ...]] = []
     for a, b in pairs:
-        (T, u), (T_other, u_other) = made[a], made[b]
+        (T, u), (T_other, u_other) = made[ways[a]], made[ways[b]]
         errors = np.abs(T_other - T).max(axis=0), np.abs(u_other - u).max(axis=0)
         result.append((*errors, T.min(axis=0), T.max(axis=0), u.min(axis=0), u.max(axis=0)))
     return result

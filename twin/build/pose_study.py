@@ -31,7 +31,7 @@ def fields_of_run(
     """Times [s] and the full model's temperature fields T - T_ref (n_nodes_b,) [K] per body there, under a run's loads.
 
     `times` count from the start of the log and are rounded up to one of `steps` equal steps of the run. Long steps are
-    meant (10 min of 12 h): the loads enter as exact means over each step, and implicit Euler damps what is faster; the
+    meant (10 min of 12 h): the loads enter as exact means over each step, and the integrator damps what is faster; the
     shape of the field, by which a grid of poses is judged, hardly changes. Raises LogError for times outside the log.
     """
     span = float(run.loads.time[-1] - run.loads.time[0])
