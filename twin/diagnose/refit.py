@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,22 @@ ANEW = 5  # passes in which derivatives beyond all bounds are made anew
 RISES = 2  # passes in a row that make it worse, after which it runs away
 
 
+@dataclass(frozen=True)
+class _Pass:
+    """A pass, at the parameters and amplitudes that it began with."""
+
+    misfit: float
+    x: np.ndarray
+    amplitude: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+    F: np.ndarray
+    errors: np.ndarray
+    residual: np.ndarray
+    f: np.ndarray
+    there: np.ndarray
+
+
 def refit(
     detector: Detector, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]
 ) -> tuple[Fitted, list[Accepted]]:
@@ -62,6 +78,7 @@ def refit(
     x = x.copy()
     x[held] = 0.0
     misfit, rises = np.inf, 0
+    best: _Pass | None = None
     J = np.zeros((len(y), len(x)))
     for i in range(REFITS):
         there = shifted(study, x, gains, amplitude)
@@ -104,11 +121,16 @@ def refit(
         step = float((np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))).max(initial=0.0))
         left = white - D @ amplitude
         before, misfit = misfit, float(left @ projector(left))
+        if best is None or misfit < best.misfit:
+            best = _Pass(misfit, x, amplitude, J, D.copy(), F, errors, residual, f, there)
         x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
         # parameters that the data hardly determine drift on for long, and nothing gets better
         rises = rises + 1 if misfit > before + LESS else 0
         if (step < STILL and misfit > before - LESS) or rises == RISES:
             break
+    if best is not None and misfit > best.misfit + LESS:  # it has not arrived: what curves strongly swings about
+        x, amplitude, J, D, F = best.x, best.amplitude, best.J, best.D, best.F
+        errors, residual, f, there = best.errors, best.residual, best.f, best.there
     inverse = np.linalg.pinv(F)
     result, first = [], 0
     for a in accepted:
