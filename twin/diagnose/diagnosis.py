@@ -64,6 +64,8 @@ class Pull:
     pull: float  # posterior shift in prior standard deviations
     unit: str
     freed: bool = False  # of its tolerance: it is the size of a cause, not what calibration made of it
+    kelvin: float = 0.0  # K rms, by which the shift alone moves the sensor that it moves most, to first order
+    metres: float = 0.0  # m rms, likewise of the TCP
 
 
 @dataclass(frozen=True)

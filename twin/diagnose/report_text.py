@@ -9,6 +9,7 @@ import numpy as np
 
 from twin.diagnose.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival
 from twin.diagnose.report_numbers import interval_and_unit, number, quantity, size_words
+from twin.diagnose.report_recalibration import left_words, moved_words
 
 # What each family of the catalogue is, as the subject of "... at PLACE: SIZE".
 WHAT: dict[str, str] = {
@@ -146,7 +147,9 @@ def verdict_sentence(d: Diagnosis) -> str:
     if d.verdict == "nothing":
         limits = d.detection_limits
         seen = f"; {limit_words(limits[0])}, would have been seen at half of all places" if limits else ""
-        return f"Nothing is missing that these data could show: within their noise the description explains them{seen}."
+        told = [text for text in (moved_words(d), left_words(d)) if text]
+        fits = "" if told else ": within their noise the description explains them"
+        return " ".join([f"Nothing is missing that these data could show{fits}{seen}.", *map(_sentence, told)])
     if d.verdict == "unknown":
         return _sentence(_unknown_words(d) + (f"; named besides: {causes}" if causes else ""))
     if d.verdict == "out_of_tolerance":

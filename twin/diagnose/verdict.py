@@ -261,15 +261,31 @@ def unknown_of(found: Search) -> Unknown | None:
     return Unknown(part, surface, parts[part], detector.thresholds["unknown"], histories, tuple(correlated[:5]))
 
 
+def _moves(change: np.ndarray, study: Study) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) K and (n,) m: rms over its run of the sensor, and the TCP component, that a column (m, n) changes most."""
+    T, w, first = np.zeros(change.shape[1]), np.zeros(change.shape[1]), 0
+    for k in study.fitted:
+        planned = study.runs[k]
+        of_run = planned.split(change[first : first + planned.size])
+        first += planned.size
+        for most, values in zip((T, w), of_run, strict=True):
+            if values.size:
+                np.maximum(most, np.sqrt(np.mean(np.square(values), axis=0)).max(axis=0), out=most)
+    return T, w
+
+
 def pulls_of(found: Search) -> tuple[Pull, ...]:
     """How far the last fit moved every declared parameter, and the causes those whose place they take."""
     study = found.detector.study
     low, high = bounds(study)
     sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    x = np.clip(found.x, low, high)
+    moves = _moves(found.detector.fitter.surrogate.at(np.zeros(len(x)))[1] * x, study)
     pulls = [
-        Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit)
-        for p, c, s in zip(study.probed.parameters, np.clip(found.x, low, high), sigma, strict=True)
-    ]
+        Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit,
+             kelvin=float(T), metres=float(w))
+        for p, c, s, T, w in zip(study.probed.parameters, x, sigma, *moves, strict=True)
+    ]  # fmt: skip
     for a in found.accepted:
         change, spread = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
         if a.hypothesis.batch.kind in CONDUCTS:
