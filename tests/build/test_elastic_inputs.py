@@ -21,7 +21,7 @@ from twin.machine.parameters import parameters
 from twin.rom.apply import with_values
 from twin.rom.artefact import read_artefact, write_artefact
 from twin.rom.model import MachineModel
-from twin.rom.tcp import is_exact, tcp_at, tcp_over, tcp_rows
+from twin.rom.tcp import MOST, at_positions, is_exact, row_weights, tcp_at, tcp_over, tcp_rows
 
 SCALE = '[scales.x_glass]\naxis = "x"\nsurface = "bed.y_min"\nexpansion = "40e-6 1/K"\nfixed_at = "-50 mm"\n\n'
 TANK = '[tanks.oil]\nsurface = "bed.x_max"\ncapacity = "5 kJ/K"\nconductance = "10 W/K"\n\n'  # one more state
@@ -166,3 +166,31 @@ def test_a_machine_without_linear_axes_has_one_position():
     wanted = sum(body.W[:3] @ T for body, T in zip(still.bodies, x, strict=True))
     assert np.abs(wanted).max() > 1e-6
     np.testing.assert_allclose(tcp_at(still, x, np.zeros((4, 0))), np.tile(wanted, (4, 1)), rtol=1e-12)
+
+
+def test_a_model_with_the_rows_of_positions_is_exact_there(reduced, positions, states):
+    there = at_positions(reduced, np.vstack([positions, positions[:3]]))
+    assert there.scattered == len(np.unique(positions, axis=0))
+    assert len(there.poses) == len(reduced.poses) + there.scattered
+    weights, outside = row_weights(there, positions)
+    assert not outside.any()
+    assert np.count_nonzero(weights) == len(positions)
+    for k, (body, rows) in enumerate(zip(there.bodies, tcp_rows(reduced, positions), strict=True)):
+        np.testing.assert_allclose(np.tensordot(weights, body.G, 1), rows, atol=1e-18, err_msg=str(k))
+        np.testing.assert_allclose(body.G_members.sum(axis=0), body.G, atol=1e-18)
+
+    def read(model: MachineModel) -> np.ndarray:
+        own, _ = row_weights(model, positions)
+        return sum(np.einsum("mp,pcn,n->mc", own, b.G, x) for b, x in zip(model.bodies, states["reduced"], strict=True))
+
+    np.testing.assert_allclose(read(there), tcp_at(reduced, states["reduced"], positions), atol=1e-13)
+    assert np.abs(read(reduced) - read(there)).max() > 1e-8  # what interpolation would have left
+
+
+def test_other_positions_are_interpolated_and_without_a_structure_nothing_changes(reduced, positions):
+    there, other = at_positions(reduced, positions), positions[:20] * 0.99 + 1e-4
+    np.testing.assert_array_equal(row_weights(there, other)[0][:, : len(reduced.poses)], row_weights(reduced, other)[0])
+    bare = replace(reduced, structure=None)
+    assert at_positions(bare, positions) is bare
+    assert at_positions(reduced, np.zeros((0, 1))) is reduced
+    assert at_positions(reduced, np.linspace(-0.2, 0.2, MOST + 1)[:, None]) is reduced

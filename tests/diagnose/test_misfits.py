@@ -69,26 +69,25 @@ def test_one_window_may_leave_no_heat_but_a_strong_ones_misfits():
     assert not _leaking(detector, [always], {"elsewhere": amounts[-1]})
 
 
-@pytest.mark.parametrize("leave", [True, False])
-@pytest.mark.parametrize(("watts", "levels"), [(60.0, (0.0, 1.0, 0.3, 0.3)), (300.0, (0.0, 1.0, 0.3, 0.3))])
-def test_heat_that_goes_down_by_steps_is_no_window(watts, levels, leave, monkeypatch):
+@pytest.mark.parametrize(("watts", "leave"), [(60.0, True), (60.0, False), (300.0, False)])
+def test_heat_that_goes_down_by_steps_is_no_window(watts, leave, monkeypatch):
     """It is named as one only where windows may leave what they like."""
     if leave:
         monkeypatch.setattr(sys.modules[search.__module__], "_leaking", lambda *_: [])
-    found = search(small_case.made_detector(), measured("heat", "housing", watts, 3, levels))
+    found = search(small_case.made_detector(), measured("heat", "housing", watts, 3, (0.0, 1.0, 0.3, 0.3)))
     assert bool(found.accepted) == leave
     assert (verdict_of(found, FAMILIES)[0] == "unknown") != leave
 
 
 def test_a_second_cause_explains_more_than_the_first_ones_misfits(monkeypatch):
-    study, y = small_case.study(), measured("heat", "housing", 300.0, seed=3)
+    study, y = small_case.study(), measured("heat", "housing", 400.0, seed=3)
     first = 0
     for k in study.fitted:
         (b, s), _ = study.runs[k].shapes
         y[first : first + b * s].reshape(b, s)[:, 1] += study.runs[k].measured.bin_time * 3.0 / 14400.0
         first += study.runs[k].size
-    heat, sensor = search(small_case.made_detector(), y).accepted
-    assert (heat.hypothesis.family, sensor.hypothesis.family) == ("heat_source", "sensor")
+    both = search(small_case.made_detector(), y).accepted
+    assert {a.hypothesis.family for a in both} == {"heat_source", "sensor"}
 
     def families(times: float) -> list[str]:
         """Those named where the first cause is taken for so many times as strong."""

@@ -374,7 +374,7 @@ def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
     result = Result(replace(d, series=()), found, causes)
     write_extension(result, lumped_case.artefact(), small_case.machine(), (), tmp_path, build=False)
     written = tomllib.loads((tmp_path / "machine.toml").read_text("utf-8"))
-    assert written["sources"][path.split(".")[1]]["gain"] == pytest.approx(pull.value)
+    assert written["sources"][path.split(".")[1]]["gain"] == pytest.approx(pull.value, rel=1e-4)
 
 
 def test_a_pull_of_a_conductance_is_a_relative_change_and_may_lie_beyond_its_bounds():
@@ -395,11 +395,9 @@ def test_chance_is_told_of_what_was_held_against_synthetic_measurements_alone():
     assert "simulated data sets" in cause_evidence(d, d.causes[0])
     stuck = Cause("sensor", "sensors.a", "", np.nan, (np.nan, np.nan), "K", np.inf, 0.0, "stuck",
                   windows=(Window("run_1", 0.0, 9000.0),))  # fmt: skip
-    coarse = Cause("coarse_model", "artefact", "", 3.2, (3.2, 3.2), "1", 3.2, 1.0, "differs")
     calibrated = replace(STRAINED, statistic=9.0, history="by calibration")
     for cause, told in (
         (stuck, "stood still for 2.50 h"),
-        (coarse, "3.20 times the noise of one reading (root mean square)"),
         (STRAINED, "12.6 standard deviations of its fit from what was declared; 2.50 are needed"),
         (calibrated, "3.00 standard deviations of its tolerance from what was declared; 2.50 are needed"),
     ):

@@ -14,7 +14,7 @@ from twin.build.project import orthonormalise, project
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.channels_check import stuck_sensors
-from twin.diagnose.coarse import coarse_model
+from twin.diagnose.coarse import Coarse, too_coarse
 from twin.diagnose.detector import Detector
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.diagnosis import Cause, Verdict
@@ -38,6 +38,7 @@ class Said:
     verdict: Verdict
     causes: tuple[Cause, ...]
     part: str  # that unknown heat enters, "" if none
+    coarse: Coarse | None = None  # of the artefact
 
 
 @cache
@@ -66,11 +67,11 @@ def said(settings: Settings, name: str) -> Said:
     ]
     found = search(detector, measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
-    if states := STATES.get(name):
-        blamed = coarse_model(_few(detector, states), study, settings.temperature_sigma, settings.tcp_sigma)
-        verdict, causes = with_faults(verdict, causes, [] if blamed is None else [blamed], "named")
+    states, coarse = STATES.get(name), None
+    if states:
+        coarse = too_coarse(_few(detector, states), study, settings.temperature_sigma, settings.tcp_sigma)
     unknown = unknown_of(found)
-    return Said(verdict, causes, "" if unknown is None else unknown.part)
+    return Said(verdict, causes, "" if unknown is None else unknown.part, coarse)
 
 
 def _few(detector: Detector, states: int) -> MachineModel:

@@ -13,7 +13,7 @@ from tests.golden import verdicts
 from tests.golden.compare import differences
 from tests.golden.compute import Values
 from tests.hidden.found import OWN, QUICK, SETTINGS, Said, made_detector, said
-from tests.hidden.trials import DRAWN, EXPERIMENT, TRIALS, expected
+from tests.hidden.trials import DRAWN, EXPERIMENT, STATES, TRIALS, expected
 from twin.build.workers import each
 from twin.diagnose.diagnose import Settings
 from twin.diagnose.verdict import limits_at, limits_of
@@ -84,6 +84,7 @@ def test_what_was_hidden_is_said(everything, name):
     wanted, answer = expected(name), everything[name]
     named = [(c.family, c.place) for c in answer.causes]
     assert answer.verdict in wanted.verdicts, (answer.verdict, named, answer.part)
+    assert (answer.coarse is not None) == (name in STATES)
     if answer.verdict == "unknown":
         assert _same(answer.part, wanted.causes[0].place)
     if answer.verdict not in ("nothing", "unknown"):

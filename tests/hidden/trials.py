@@ -23,6 +23,7 @@ VERDICTS: dict[str, tuple[Verdict, ...]] = {  # that are right of a trial, where
     "null_0": ("nothing",),
     "null_law": ("nothing",),
     "below_limit": ("nothing",),
+    "coarse_model": ("nothing",),  # a note, no cause
     "outside": ("unknown",),
     "loss_law": ("named", "out_of_tolerance"),
     "pair": ("named", "ambiguous"),

@@ -139,7 +139,7 @@ FAMILIES: tuple[Family, ...] = (
     ),
     Family(
         16, "coarse_model", "Reduced model or time step too coarse",
-        "The artefact does not follow its own full model on this input.",
+        "The artefact does not follow its own full model on this input: a note, never a cause.",
         "none: more states, a shorter step", "the artefact differs from the full model; the full model fits",
         "the noise of one reading (rms)", "-", "the artefact's runtime against the larger model of the diagnosis",
         "reading", of.none,

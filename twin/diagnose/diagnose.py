@@ -14,7 +14,7 @@ from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
 from twin.diagnose.catalogue import FAMILIES, VERSION, Family
 from twin.diagnose.channels_check import stuck_sensors
-from twin.diagnose.coarse import coarse_model
+from twin.diagnose.coarse import too_coarse
 from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
 from twin.diagnose.gain import gains, predicted
@@ -157,8 +157,8 @@ def diagnose(
         x, covariance = settled(detector, measured_of(study), kept)
         shown = replace(found, accepted=kept, x=x, covariance=covariance)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
-    coarse = coarse_model(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma)
-    verdict, causes = with_faults(verdict, causes, () if coarse is None else (coarse,), alone="named")
+    if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
+        notes.append(coarse.note)
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED]
     extension = (

@@ -14,6 +14,7 @@ import numpy as np
 from twin.build.cache import arrays_hash, cached, machine_hash
 from twin.build.place_training import Shared, snapshots
 from twin.build.places import DISPLACED, Place, pruned
+from twin.calibrate.fit.measured import tcp_positions
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
 from twin.diagnose.integration import INNER, NestedLoads, loads_for
@@ -29,6 +30,7 @@ from twin.rom.load_model import LoadModel
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
 from twin.rom.sampling import Intervals, cut
+from twin.rom.tcp import at_positions
 from twin.run.system import Layout, System, prepare
 
 FINE = 60.0  # s, steps of loads and of the truth beside them
@@ -96,6 +98,7 @@ def make_probed_model(
 ) -> ProbedModel:
     """The probed model of a machine and the loads of runs, cached by both."""
     rich = rich_probed_model(machine, progress)
+    rich = replace(rich, rich=at_positions(rich.rich, tcp_positions(rich.rich, runs)))
     base = pruned(rich.rich)
     load = base.load_model
     names = run_names(runs)
@@ -124,7 +127,8 @@ def make_probed_model(
     if machine.lumped:
         V, reduction = np.eye(rich.rich.n), (0.0, 0.0)
     else:
-        inputs = (machine_hash(machine), known, tuple(starts), arrays_hash(_logged(load, runs)))
+        logged = (*_logged(load, runs), rich.rich.poses)
+        inputs = (machine_hash(machine), known, tuple(starts), arrays_hash(logged))
         V, reduction = cached("window", __name__, inputs, make)
     return _assembled(rich, V, parameters, runs, names, drives, starts, reduction)
 
@@ -138,7 +142,7 @@ def _logged(load: LoadModel, runs: Sequence[Run]) -> Iterator[np.ndarray]:
 
 
 def _rows(model: MachineModel) -> np.ndarray:
-    """Sensors (0.05 K) and the TCP at every pose (1 um) as rows over the states of all bodies."""
+    """Sensors (0.05 K) and the TCP at every pose, or position that was measured at (1 um), as rows over all states."""
     C, first = np.zeros((len(model.sensors), model.n)), 0
     for body in model.bodies:
         C[list(body.sensors), first : first + body.n] = body.C

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -41,6 +41,23 @@ ANEW = 5  # passes in which derivatives beyond all bounds are made anew
 RISES = 2  # passes in a row that make it worse, after which it runs away
 
 
+@dataclass(frozen=True)
+class _Pass:
+    """A pass, at the parameters and amplitudes that it began with."""
+
+    misfit: float
+    x: np.ndarray
+    amplitude: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+    F: np.ndarray
+    errors: np.ndarray
+    residual: np.ndarray
+    f: np.ndarray
+    there: np.ndarray
+    white: np.ndarray
+
+
 def refit(
     detector: Detector, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]
 ) -> tuple[Fitted, list[Accepted]]:
@@ -64,6 +81,7 @@ def refit(
     x = x.copy()
     x[held] = 0.0
     misfit, rises = np.inf, 0
+    best: _Pass | None = None
     J = np.zeros((len(y), len(x)))
     for i in range(REFITS):
         there = shifted(study, x, gains, amplitude)
@@ -106,11 +124,17 @@ def refit(
         step = float((np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))).max(initial=0.0))
         left = white - D @ amplitude
         before, misfit = misfit, float(left @ projector(left))
+        if best is None or misfit < best.misfit:
+            best = _Pass(misfit, x, amplitude, J, D.copy(), F, errors, residual, f, there, white)
         x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
         # parameters that the data hardly determine drift on for long, and nothing gets better
         rises = rises + 1 if misfit > before + LESS else 0
         if (step < STILL and misfit > before - LESS) or rises == RISES:
             break
+    if best is not None and misfit > best.misfit + LESS:  # it has not arrived: what curves strongly swings about
+        x, amplitude, J, D, F = best.x, best.amplitude, best.J, best.D, best.F
+        errors, residual, f, there = best.errors, best.residual, best.f, best.there
+        white, projector = best.white, fitter.projector(J, errors)
     inverse = np.linalg.pinv(F)
     ends = np.cumsum([0, *(len(a.amplitude) for a in accepted)]).tolist()
     alone = sizes(projector.N, D, white, _rows(study), ends[:-1])

@@ -253,11 +253,6 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
     if c.history == "stuck":  # seen before anything was fitted
         longest = max((w.end - w.start for w in c.windows), default=math.nan)
         return f"Its reading stood still for {number(longest / 3600.0)} h; no statistic is needed to see that."
-    if c.family == "coarse_model":
-        return (
-            f"On these loads the artefact differs by {number(c.statistic)} times the noise of one reading (root mean "
-            f"square) from a larger model of the same description; {number(c.threshold)} times is allowed."
-        )
     if c.threshold == d.thresholds.get(c.family, c.threshold):
         return evidence_sentence(d, c.family, c.statistic, c.threshold)
     # a declared number: both are squares of standard deviations, of the fit where it was freed of its tolerance

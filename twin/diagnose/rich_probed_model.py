@@ -45,10 +45,10 @@ def rich_probed_model(machine: Machine, progress: Progress = silent) -> RichProb
                 bases = [rich_basis(body, low, high, RICH, advance) for body in model.bodies]
         bodies, heights = [], []
         for body, V, h in zip(model.bodies, bases, height, strict=True):
-            small = project(replace(body, F=None, W=None), V)
+            small = project(replace(body, F=None), V)
             bodies.append(replace(small, E=np.eye(small.n)))
             heights.append(V.T @ h[:, :n_films])
-        return RichProbedModel(replace(model, bodies=tuple(bodies), structure=None), places, tuple(heights))
+        return RichProbedModel(replace(model, bodies=tuple(bodies)), places, tuple(heights))
 
     return cached("probed", __name__, (machine_hash(machine),), make)
 

@@ -266,13 +266,10 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
 
 
 def with_faults(
-    verdict: Verdict, causes: tuple[Cause, ...], faults: Sequence[Cause], alone: Verdict = "sensor"
-) -> tuple[Verdict, tuple[Cause, ...]]:  # fmt: skip
-    """The verdict with what was found without a search: sensors that stand still, or an artefact too coarse.
-
-    alone: the verdict where there is nothing else.
-    """
-    return alone if faults and verdict == "nothing" else verdict, (*faults, *causes)
+    verdict: Verdict, causes: tuple[Cause, ...], faults: Sequence[Cause]
+) -> tuple[Verdict, tuple[Cause, ...]]:
+    """The verdict with what was found without a search: sensors that stand still."""
+    return "sensor" if faults and verdict == "nothing" else verdict, (*faults, *causes)
 
 
 def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:

@@ -11,15 +11,18 @@ artefacts without a structure.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from twin.errors import ModelError
 from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.model import MachineModel
-from twin.rom.poses import pose_weights
+from twin.rom.poses import Kind, pose_weights
 
 SAME = 1e-6  # of the largest TCP row: far above rounding, far below what any spring or guide adds
+MOST = 1000  # different positions of which a model keeps all rows: some 10 MB each part, and a second or two
+THERE = 1e-9  # m, from a position that a row is known of
 
 
 def is_exact(model: MachineModel) -> bool:
@@ -77,6 +80,38 @@ def tcp_rows(model: MachineModel, positions: np.ndarray) -> tuple[np.ndarray, ..
         return tuple(np.tensordot(weights, body.G, 1)[which] for body in model.bodies)
     rows = elastic_rows(model, different)
     return tuple((Z @ inputs(model, b))[which] for b, Z in enumerate(rows))
+
+
+def at_positions(model: MachineModel, positions: np.ndarray) -> MachineModel:
+    """The model with the TCP rows of positions (m, n_axes) [m] within its grid besides those of its poses.
+
+    Its own where it has no structure or no axes, or where there are none or more than MOST different positions.
+    """
+    different, _ = _distinct(_within_grid(model, positions))
+    if not is_exact(model) or not model.pose_axes or not 0 < len(different) <= MOST:
+        return model
+    bodies = []
+    for b, (body, Z) in enumerate(zip(model.bodies, elastic_rows(model, different), strict=True)):
+        members = body.G_members
+        if members is not None and body.W_members is not None:
+            members = np.concatenate([members, np.einsum("pcw,mwn->mpcn", Z, body.W_members)], axis=1)
+        bodies.append(replace(body, G=np.concatenate([body.G, Z @ inputs(model, b)]), G_members=members))
+    poses = np.concatenate([model.poses, different])
+    return replace(model, bodies=tuple(bodies), poses=poses, scattered=len(different))
+
+
+def row_weights(model: MachineModel, positions: np.ndarray, kind: Kind = "lagrange") -> tuple[np.ndarray, np.ndarray]:
+    """Weights (m, n_poses) of the model's TCP rows at positions (m, n_axes) [m], and which lie outside its grid (m,).
+
+    One where a pose of its own is there (`at_positions`), interpolated between the poses of the grid elsewhere.
+    """
+    weights, outside = pose_weights(model.pose_grid, positions, kind)
+    if model.scattered and len(positions):
+        weights = np.hstack([weights, np.zeros((len(positions), model.scattered))])
+        apart = np.abs(positions[:, None, :] - model.poses[-model.scattered :]).max(axis=2)
+        there = apart.min(axis=1) < THERE
+        weights[there] = np.eye(weights.shape[1])[apart[there].argmin(axis=1) - model.scattered]
+    return weights, outside
 
 
 def tcp_at(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray) -> np.ndarray:

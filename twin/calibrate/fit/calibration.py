@@ -21,6 +21,7 @@ from twin.logs.run import Run
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 from twin.rom.parameter import Parameter
+from twin.rom.tcp import by_body, tcp_at
 
 AGREE = 0.5  # of an instrument's standard deviation: the window model may differ by this (rms) from the runtime
 ROUNDS = 3
@@ -125,16 +126,11 @@ def _agreement(artefact: Artefact, made: Problem, x: np.ndarray, parameters: Seq
         error = full - made.states(run, x) @ made.basis.T
         m = run.measured
         T = np.zeros((len(error), len(model.sensors)))
-        rows = np.zeros((len(m.tcp), 3))
-        first = 0
-        for body in model.bodies:
-            own = error[:, first : first + body.n]
+        for body, own in zip(model.bodies, by_body(model, error), strict=True):
             T[:, list(body.sensors)] += own @ body.C.T
-            at = own[m.tcp_step] + m.tcp_share[:, None] * (
-                own[np.minimum(m.tcp_step + 1, len(own) - 1)] - own[m.tcp_step]
-            )
-            rows += np.einsum("kp,pcn,kn->kc", m.pose, body.G, at)
-            first += body.n
+        after = np.minimum(m.tcp_step + 1, len(error) - 1)
+        at = error[m.tcp_step] + m.tcp_share[:, None] * (error[after] - error[m.tcp_step])
+        rows = tcp_at(model, by_body(model, at), m.position)
         of_sensor = np.sqrt(np.mean(T[:, m.column] ** 2, axis=0))
         of_tcp = np.sqrt(np.mean(rows**2, axis=0)) if len(rows) else np.zeros(3)
         sensor, tcp = floors(made, run)

@@ -129,6 +129,7 @@ def _run(
         temperature=np.zeros((len(bins), len(m.sensors))), count=np.ones((len(bins), len(m.sensors))),
         tcp_time=3600.0 * hours, tcp_step=(60 * hours - 1).astype(int).clip(0, n - 1), tcp_share=np.ones(k),
         pose=np.repeat(m.pose[:1], k, axis=0), tcp=np.zeros((k, 3)), tcp_sigma=None, from_first=False, skipped=(),
+        position=np.repeat(m.position[:1], k, axis=0),
     )  # fmt: skip
     rows = replace(
         first.rows,

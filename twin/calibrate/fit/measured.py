@@ -15,7 +15,8 @@ from twin.errors import LogError
 from twin.logs.run import Run, Table
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
-from twin.rom.poses import Kind, pose_weights
+from twin.rom.poses import Kind, outside_grid
+from twin.rom.tcp import row_weights
 
 BIN = 300.0  # s
 LEAST = 0.5  # share of a bin's samples that a sensor must have
@@ -38,10 +39,9 @@ class Measured:
     pose: np.ndarray  # (k, n_poses) weights of the poses
     tcp: np.ndarray  # (k, 3) m
     tcp_sigma: np.ndarray | None  # (k,) m, where the run tells
-
     from_first: bool  # deviations count from the first row
     skipped: tuple[str, ...]  # what the run holds and the fit does not use, in words
-    position: np.ndarray | None = None  # (k, n_pose_axes) m of the TCP rows
+    position: np.ndarray  # (k, n_pose_axes) m of the TCP rows
 
     def row_weight(self, sigma: float) -> np.ndarray:
         """(k,) how much better than `sigma` [m] each TCP row is measured; 1 where the run does not tell."""
@@ -53,6 +53,17 @@ class Measured:
     @property
     def n_temperature(self) -> int:
         return int(np.isfinite(self.temperature).sum())
+
+
+def tcp_positions(model: MachineModel, runs: Sequence[Run]) -> np.ndarray:
+    """(m, n_pose_axes) m: where the runs measured the TCP displacement, within the poses of the model's grid."""
+    found = [np.zeros((0, len(model.pose_axes)))]
+    for run in runs:
+        if run.tcp is not None and set(model.pose_axes) <= set(run.tcp.axes):
+            position = run.tcp.position[:, [run.tcp.axes.index(a) for a in model.pose_axes]]
+            position = position[np.isfinite(position).all(axis=1)]
+            found.append(position[~outside_grid(model.pose_grid, position)])
+    return np.concatenate(found)
 
 
 def measured(
@@ -161,7 +172,15 @@ def _tcp_rows(
     tcp = run.tcp
     if tcp is None:
         none = np.zeros(0)
-        return none.astype(int), none, np.zeros((0, len(model.poses))), np.zeros((0, 3)), None, none, np.zeros((0, 0))
+        return (
+            none.astype(int),
+            none,
+            np.zeros((0, len(model.poses))),
+            np.zeros((0, 3)),
+            None,
+            none,
+            np.zeros((0, len(model.pose_axes))),
+        )
     missing = [a for a in model.pose_axes if a not in tcp.axes]
     if missing:
         raise LogError(
@@ -174,7 +193,7 @@ def _tcp_rows(
     if not good.all():
         skipped.append(f"{int((~good).sum())} rows of tcp.csv outside the loads' time, or with an empty cell")
     position = position[good]
-    weights, outside = pose_weights(model.pose_grid, position, interpolation)
+    weights, outside = row_weights(model, position, interpolation)
     if outside.any():
         skipped.append(f"{int(outside.sum())} rows of tcp.csv outside the pose grid")
     inside = ~outside

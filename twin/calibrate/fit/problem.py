@@ -15,7 +15,7 @@ import numpy as np
 
 from twin.calibrate.fit.effects import Effects, Start, effects_of
 from twin.calibrate.fit.integration import Rows, WindowLoads, displacements, loads_for, temperatures, trajectory
-from twin.calibrate.fit.measured import Measured, measured
+from twin.calibrate.fit.measured import Measured, measured, tcp_positions
 from twin.calibrate.fit.options import Options
 from twin.calibrate.fit.training import History, basis_for, trained
 from twin.calibrate.fit.window import merged, require_galerkin
@@ -27,6 +27,7 @@ from twin.rom.contact_matrix import ContactPlaces
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
+from twin.rom.tcp import at_positions
 from twin.run.system import Layout, System, prepare
 
 
@@ -179,8 +180,8 @@ def problem(
 
     Raises LogError for runs without loads or measurements that fit, TwinError for parameters the artefact lacks.
     """
-    model = artefact.model
-    require_galerkin(model)
+    require_galerkin(artefact.model)
+    model = at_positions(artefact.model, tcp_positions(artefact.model, runs))
     load = model.load_model
     ready = []
     for run, name in zip(runs, run_names(runs), strict=True):
