@@ -9,6 +9,7 @@ import numpy as np
 
 from twin.diagnose.acted import CONDUCTS, Unit, slots_with, units_of
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.consistency import Size
 from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import bounds
 from twin.diagnose.readings import lagged, late, play
@@ -30,6 +31,7 @@ class Accepted:
     statistic: float
     threshold: float
     rivals: tuple[tuple[Hypothesis, float], ...]  # nearly as likely, with the cosine to this one
+    by_run: tuple[Size, ...] = ()  # the first amplitude in each fitted run alone, after the last refit
 
 
 def parameter_of(study: Study, name: str) -> int | None:

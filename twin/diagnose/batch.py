@@ -47,10 +47,17 @@ class Batch:
     sign: int = 0  # of the first amplitude; 0: either
     fixed: bool = False  # amplitudes are one
     smallest: float = 0.0  # first amplitude worth naming, in `unit`
+    largest: tuple[float, ...] = ()  # per place, beyond which physics has no such cause; empty: none known
 
     @property
     def q(self) -> int:
         return self.histories[0].weights.shape[0]
+
+    def possible(self, place: int, amplitude: float) -> bool:
+        """Whether a first amplitude at a place is of the sign and within the range that physics allows."""
+        return (self.sign == 0 or self.sign * amplitude > 0.0) and (
+            not self.largest or abs(amplitude) <= self.largest[place]
+        )
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,7 @@ FORM, NULLS = 60, 200
 MODES = 30
 OFFSET = 0.1  # K, prior of every sensor's constant error
 TCP_ZERO = 0.5e-6  # m, prior of every TCP component's constant error
+LATE = 60.0  # s, by which light parts and sensors respond earlier or later than their models: one step
 ALARM = 0.03
 FLOOR = 36.0  # of thresholds: some families never pass in synthetic measurements, and would at the first surprise
 
@@ -138,9 +139,9 @@ def make_detector(
     wind = wind_columns(study, form, progress)
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
-    offset, zero = OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study)
+    bare = [OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study), _together(raw, index)]
     known = known_forms(study, elements, nominal, raw, J, wind, whiten, form)
-    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero), known]))
+    fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known]))
     with progress("measurements without a cause: form", counts[0]) as advance:
         shared = (fitter, J_of, instruments, form)
         left = np.stack(each(_null_residual, shared, list(range(counts[0])), lambda _: advance("")), axis=1)
@@ -150,7 +151,7 @@ def make_detector(
     kept = min(MODES, int(np.sum(variance > 3.0)))
     modes = U[:, :kept] * np.sqrt(np.maximum(variance[:kept] - 1.0, 0.0))
     known = known_forms(study, elements, nominal, raw, J, wind, whiten, form)
-    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(offset), whiten(zero), known, modes]))
+    fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known, modes]))
     context = Context(study, elements, index)
     batches = [b for f in families for b in f.batches(context) if b.columns.size]
     columns = Columns.of(_whitened(whiten, raw), batches, heat_of(study, elements), fitter.others)
@@ -162,6 +163,15 @@ def make_detector(
     small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
     lost = lost_conductances(study, elements, whiten, progress)
     return Detector(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost)
+
+
+def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.ndarray:
+    """(m, 1) what all clocks by LATE do, of a unit prior: a log's clock is off in its own run, and what comes early or
+    late in every run is a light part's or a sensor's time constant. (m, 0) where there is one run alone."""
+    clocks = [column for (kind, _, _), column in index.items() if kind == "clock"]
+    if len(clocks) < 2:
+        return np.zeros((len(raw), 0))
+    return np.asarray(LATE * raw[:, clocks].astype(float).sum(axis=1, keepdims=True))
 
 
 def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:

@@ -15,6 +15,39 @@ from twin.diagnose.elements import Elements
 from twin.diagnose.study import Study
 
 HOUR = 3600.0  # s
+# Largest sizes that physics has, by family and kind, in the unit of the batch; relative changes as factor - 1
+# (gains: logarithms of factors). A size beyond shows that the model is wrong and not the machine. Estimates on the
+# generous side, chosen without looking at any case. Heat is compared with the machine's own (`most_heat`).
+LARGEST = {
+    ("film_gain", "group"): 9.0,  # still air 2 to 5, a strong draught 20 to 50 W/(m^2 K): a factor of ten
+    ("film_gain", "film"): 100.0,  # W/(m^2 K): air at some 20 m/s
+    ("forced_convection", "group_film"): 200.0,  # W/(m^2 K): air at a rotor's 50 m/s
+    ("forced_convection", "film"): 200.0,
+    ("loss_law", "gain"): np.log(5.0),  # friction of a bearing with preload and lubricant
+    ("joint", "joint"): 9.0,  # conductances of joints scatter by a decade with pressure and roughness
+    ("joint", "contact"): 9.0,
+    ("zone", "air"): 20.0,  # K: a hall in winter with its door open
+    ("zone", "zone"): 20.0,
+    ("zone", "gradient"): 10.0,  # K/m
+    ("coolant", "coolant"): 5000.0,  # W/(m^2 K): water under pressure in a jet
+    ("sensor", "offset"): 100.0,  # K: a converter at its rail
+    ("sensor", "drift"): 20.0,  # K/day
+    ("sensor", "lag"): 7200.0,  # s
+    ("sensor", "detached"): 1.0,  # all of the reading is the air's
+    ("signal", "clock"): 43200.0,  # s: half a day
+    ("scale_expansion", "scale"): 5e-5,  # 1/K: twice that of aluminium
+    ("expansion", "expansion"): 1.0,  # aluminium for cast iron
+    ("expansion", "gain"): np.log(2.0),
+    ("slip", "slip"): 1e-4,  # m
+    ("initial_state", "start"): 30.0,  # K
+    ("measurement", "probe"): 1e-4 / 43200.0,  # m/s: 100 um in half a day
+    ("measurement", "frame"): 1e-3,  # a millimetre per metre
+    ("measurement", "heated"): 5e-5,  # m
+    ("misplaced_source", "moved"): 1.0,  # all of its heat
+    ("not_thermal", "step"): 1e-3,  # m
+}
+CABINET = 500.0  # W: what a cabinet or a hydraulic unit beside a machine without described losses gives off
+SOLAR = 1000.0  # W/m^2: the sun at the ground, upright on a surface that keeps all of it
 BELLS = (4 * HOUR, 6 * HOUR, 8 * HOUR, 10 * HOUR)
 
 
@@ -46,9 +79,11 @@ def _single(context: Context, family: str, kind: str, unit: str, sign: int = 0, 
 
 def _batch(family: str, kind: str, unit: str, rows: Sequence[tuple[str, Sequence[int]]],
            histories: Sequence[History], sign: int = 0, smallest: float = 0.0,
-           fixed: bool = False) -> Batch:  # fmt: skip
+           fixed: bool = False, largest: float | Sequence[float] | None = None) -> Batch:  # fmt: skip
+    bound = LARGEST.get((family, kind)) if largest is None else largest
+    of_places = () if bound is None else tuple(np.broadcast_to(np.asarray(bound, dtype=float), len(rows)).tolist())
     return Batch(family, kind, unit, tuple(p for p, _ in rows), np.array([c for _, c in rows], dtype=int),
-                 tuple(histories), sign, fixed, smallest)  # fmt: skip
+                 tuple(histories), sign, fixed, smallest, of_places)  # fmt: skip
 
 
 def _history(context: Context, name: str, weights: np.ndarray) -> History:
@@ -110,6 +145,18 @@ def _wide(one: np.ndarray, at: int, length: int) -> np.ndarray:
     return result
 
 
+def most_heat(context: Context) -> float:
+    """W: what no undescribed source can exceed, all that the machine is said to turn into heat at once in any run."""
+    most = 0.0
+    for k in context.study.fitted:
+        drive = context.study.runs[k].run.drive
+        total = drive.power.sum(axis=1) + np.abs(drive.port_heat).sum(axis=1)
+        if drive.losses.index:
+            total = total + drive.losses.value.max(axis=2).sum(axis=1)
+        most = max(most, float(total.max(initial=0.0)))
+    return max(most, CABINET)
+
+
 def none(context: Context) -> list[Batch]:
     """No hypotheses: decided otherwise."""
     return []
@@ -155,7 +202,7 @@ def heat_source(context: Context) -> list[Batch]:
         (p.name, [*(context.index["heat", p.name, s] for s in signals), *blocks["heat", p.name]])
         for p in context.study.probed.places
     ]
-    return [_batch("heat_source", "heat", "W", rows, histories, 1, 1.0)]
+    return [_batch("heat_source", "heat", "W", rows, histories, 1, 1.0, largest=most_heat(context))]
 
 
 def loss_law(context: Context) -> list[Batch]:
@@ -165,7 +212,8 @@ def loss_law(context: Context) -> list[Batch]:
     batches = [_batch("loss_law", "gain", "1", gains, one, 0, 0.15)] if gains else []
     for name in dict.fromkeys(h for _, h, _ in context.named("source")):
         rows = [(f"sources.{p}", [c]) for p, h, c in context.named("source") if h == name]
-        batches.append(_batch("loss_law", "source", "W", rows, (_history(context, name, np.ones((1, 1))),), 0, 1.0))
+        shape = (_history(context, name, np.ones((1, 1))),)
+        batches.append(_batch("loss_law", "source", "W", rows, shape, 0, 1.0, largest=most_heat(context)))
     return batches
 
 
@@ -212,7 +260,8 @@ def sun(context: Context) -> list[Batch]:
             if (np.abs(weights).sum(axis=1) > 0).all():
                 histories.append(History(bells.name(bell, runs), weights, windows=windows, bell=bell))
     rows = [(p.name, list(context.elements.block_of["heat", p.name])) for p in context.outer]
-    return [_batch("sun", "heat", "W", rows, histories, 1, 2.0)] if histories and rows else []
+    areas = [SOLAR * p.area for p in context.outer]
+    return [_batch("sun", "heat", "W", rows, histories, 1, 2.0, largest=areas)] if histories and rows else []
 
 
 def coolant(context: Context) -> list[Batch]:

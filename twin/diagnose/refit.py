@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from twin.diagnose.accepted import (
 )
 from twin.diagnose.acted import RELATIVE, slots_with
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.consistency import sizes
 from twin.diagnose.contest import LOW, lowest, priors, solved
 from twin.diagnose.detector import Detector
 from twin.diagnose.edges import shape_errors
@@ -53,6 +55,7 @@ class _Pass:
     residual: np.ndarray
     f: np.ndarray
     there: np.ndarray
+    white: np.ndarray
 
 
 def refit(
@@ -122,7 +125,7 @@ def refit(
         left = white - D @ amplitude
         before, misfit = misfit, float(left @ projector(left))
         if best is None or misfit < best.misfit:
-            best = _Pass(misfit, x, amplitude, J, D.copy(), F, errors, residual, f, there)
+            best = _Pass(misfit, x, amplitude, J, D.copy(), F, errors, residual, f, there, white)
         x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
         # parameters that the data hardly determine drift on for long, and nothing gets better
         rises = rises + 1 if misfit > before + LESS else 0
@@ -131,15 +134,23 @@ def refit(
     if best is not None and misfit > best.misfit + LESS:  # it has not arrived: what curves strongly swings about
         x, amplitude, J, D, F = best.x, best.amplitude, best.J, best.D, best.F
         errors, residual, f, there = best.errors, best.residual, best.f, best.there
+        white, projector = best.white, fitter.projector(J, errors)
     inverse = np.linalg.pinv(F)
-    result, first = [], 0
-    for a in accepted:
-        own = slice(first, first + len(a.amplitude))
-        result.append(replace(a, amplitude=amplitude[own], covariance=inverse[own, own]))
-        first = own.stop
+    ends = np.cumsum([0, *(len(a.amplitude) for a in accepted)]).tolist()
+    alone = sizes(projector.N, D, white, _rows(study), ends[:-1])
+    result = [
+        replace(a, amplitude=amplitude[i:j], covariance=inverse[i:j, i:j], by_run=of_runs)
+        for a, of_runs, (i, j) in zip(accepted, alone, pairwise(ends), strict=True)
+    ]
     more = np.hstack([WIDE * D * np.sqrt(np.diag(inverse)), errors])
     bare = np.concatenate([study.outputs(k, there) for k in study.fitted]) if units else f
     return Fitted(x, J, residual, fitter.projector(J, more), f - bare, more), result
+
+
+def _rows(study: Study) -> list[slice]:
+    """The rows of every fitted run."""
+    ends = np.cumsum([0, *(study.runs[k].size for k in study.fitted)]).tolist()
+    return [slice(i, j) for i, j in pairwise(ends)]
 
 
 def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], amplitude: np.ndarray) -> np.ndarray:

@@ -13,9 +13,11 @@ import numpy as np
 from twin.diagnose.accepted import Accepted, exchanged
 from twin.diagnose.acted import units_of
 from twin.diagnose.batch import Hypothesis
+from twin.diagnose.consistency import differs
 from twin.diagnose.contest import beginning, judged, proof, tried
 from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import Fitted
+from twin.diagnose.form_error import form_error
 from twin.diagnose.growth import chilled, grown
 from twin.diagnose.hotter import hotter
 from twin.diagnose.refit import refit
@@ -121,6 +123,10 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
         fitted, accepted = _without(detector, y, fitted, accepted, leaking)
         seen, _, step = look(detector, fitted)
         steps.append(step)
+    if uneven := [a for a in accepted if _of_machine(a) and differs(a.by_run, form_error(a.hypothesis))]:
+        fitted, accepted = _without(detector, y, fitted, accepted, uneven)
+        seen, _, step = look(detector, fitted)
+        steps.append(step)
     if accepted:  # which may have been all that made it seem hotter
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     else:
@@ -193,6 +199,11 @@ def _leaking(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, 
     ]  # fmt: skip
 
 
+def _of_machine(a: Accepted) -> bool:
+    """Whether a cause is a property of the machine: what acts on readings may be set up anew for every run."""
+    return bool(a.units) or a.hypothesis.batch.kind == "gain"
+
+
 def _misfit(a: Accepted) -> float:
     """Heat that a cause in windows may leave because the model is not the machine."""
     return (DRIES if a.hypothesis.batch.kind == "coolant" else LEAVES) * a.statistic
@@ -207,7 +218,7 @@ def _parts(study: Study, name: str) -> set[str]:
 
 
 def _stands(a: Accepted) -> bool:
-    """Whether a cause still explains something beside the others."""
+    """Whether a cause still explains something beside the others, with a size that physics allows."""
     batch = a.hypothesis.batch
     if batch.fixed:
         return True
@@ -215,7 +226,7 @@ def _stands(a: Accepted) -> bool:
     return (
         float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude) > STANDS * a.threshold
         and abs(first) >= 0.5 * batch.smallest
-        and (batch.sign == 0 or batch.sign * first > 0.0)
+        and batch.possible(a.hypothesis.place, first)
     )
 
 

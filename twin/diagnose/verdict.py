@@ -17,6 +17,7 @@ from twin.diagnose.detector import Detector
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.elements import pivot
 from twin.diagnose.fitter import bounds
+from twin.diagnose.form_error import form_error
 from twin.diagnose.search import MOST, SEVERAL
 from twin.diagnose.search_look import Search
 from twin.diagnose.search_strained import COVERS
@@ -31,22 +32,6 @@ REMAINDER = 0.35  # of the evidence for unknown heat before all names: the share
 KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
 STRAINED = 2.5  # prior standard deviations, beyond which a declared parameter is out of its tolerance
 STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint": "joint", "expansion": "expansion"}
-# What a size may be wrong by because the model's form is: relative standard deviations, by family or kind. Coefficients
-# of films are known least, and temperatures that nobody measured.
-OWN = {
-    "film": 0.12,
-    "group": 0.12,
-    "gain": 0.1,
-    "group_film": 0.12,
-    "coolant": 0.3,  # at least of WET: in campaigns films between 30 and 120 W/(m^2 K) came out some 20 too small
-    "scale": 0.12,
-    "moved": 0.2,
-    "capacity": 0.1,
-    "slip": 0.12,
-    "sun": 0.12,
-    "zone": 0.1,
-}
-OWN_OTHERS = 0.05
 MEDIUM = 0.15  # likewise of a coolant's film where its temperature is told, which follows from the heat
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
 PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
@@ -62,12 +47,12 @@ def told(kind: str, amplitude: float) -> float:
 def cause_of(a: Accepted, study: Study) -> Cause:
     """A cause as reports and edits take it: factors as factors, differences as differences.
 
-    The interval counts that the model's own form is wrong, see OWN.
+    The interval counts that the model's own form is wrong (`form_error`).
     """
     h = a.hypothesis
     kind, unit = h.batch.kind, h.batch.unit
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
-    own = OWN.get(h.family, OWN.get(kind, OWN_OTHERS)) * (max(value, WET) if h.family == "coolant" else value)
+    own = form_error(h) * (max(value, WET) if h.family == "coolant" else value)
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), own))
     low, high = value - 1.96 * sigma, value + 1.96 * sigma
     settings: dict[str, float | str] = {}

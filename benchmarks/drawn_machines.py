@@ -1,0 +1,160 @@
+"""Faults hidden in drawn machines, and what is said: `python -m benchmarks.drawn_machines FIRST N [boxes|lumped]`.
+
+Truth is the full model of the real machine (`twin.inject.machines.other`): another mesh, other film laws, values off.
+Every machine is looked at with nothing hidden and with one thing of each of CASES; a row per trial goes to
+out/drawn/SEED.jsonl, and rows that are there are not made again.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from twin.calibrate.fit.measured import measured
+from twin.cli.main import run as command
+from twin.diagnose.catalogue import FAMILIES
+from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.diagnose import Settings, prepare
+from twin.diagnose.gaps import emptied
+from twin.diagnose.search import search
+from twin.diagnose.study import with_measured
+from twin.diagnose.verdict import verdict_of, with_faults
+from twin.diagnose.whiten import measured_of
+from twin.inject.machines.drawn import RUNS, DrawnMachine, draw_machine
+from twin.inject.machines.other import other
+from twin.logs.read import read_run
+from twin.machine.description import Machine
+
+OUT = Path("out/drawn")
+TRUTHS = 2  # real machines with nothing hidden, per description
+# family -> size; places are drawn among those that the machine has
+IN_MACHINE = {"heat_source": "", "loss_law": "1.6", "joint": "0.3", "film_gain": "2", "expansion": "1.3"}
+IN_LOG = {"offset": "1 K", "drift": "2 K", "swapped": "", "factor": "1.4142135623730951"}
+SHARE = 0.25  # of the mean power of all sources: hidden heat
+
+
+def trials(drawn: DrawnMachine, machine: Machine, power: float) -> list[tuple[str, str, str]]:
+    """(family or kind, place, size) of everything that is hidden, drawn from the machine's seed.
+
+    power: W, of all sources in the mean.
+    """
+    rng = np.random.default_rng([drawn.seed, 77])
+    inside = [n for n, s in machine.sensors.items() if s.environment is None]
+    parts = list(machine.parts) or [*machine.nodes, *machine.bars]
+    films = [s for f in machine.films.values() for s in f.surfaces if not s.endswith("*")]
+    surfaces = films or [f"{p}.{side}" for p in machine.parts for side in ("x_max", "y_max", "z_max")]
+    places = {
+        "heat_source": surfaces if machine.parts else list(machine.nodes),
+        "loss_law": [f"sources.{s}" for s in machine.sources],
+        "joint": [f"contacts.{c}" for c in machine.contacts],
+        "film_gain": [f"films.{f}" for f in machine.films],
+        "expansion": [f"parts.{p}" for p in parts] if machine.parts else [],
+        "offset": [f"sensors.{s}" for s in inside],
+        "drift": [f"sensors.{s}" for s in inside],
+        "swapped": [f"sensors.{s}" for s in inside] if len(inside) > 2 else [],
+        "factor": [f"signals.{n}" for n, s in machine.signals.items() if str(s.unit) == "A"],
+    }
+    sizes = IN_MACHINE | IN_LOG | {"heat_source": f"{max(SHARE * power, 5.0):.3g} W"}
+    found = []
+    for family, of_family in places.items():
+        if of_family:
+            place, size = of_family[int(rng.integers(len(of_family)))], sizes[family]
+            if family == "swapped":
+                others = [s for s in of_family if s != place]
+                size = others[int(rng.integers(len(others)))]
+            found.append((family, place, size))
+    return found
+
+
+def _simulate(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachine, seed: int) -> list[Path]:
+    made = []
+    for k, run in enumerate(runs):
+        target = out / run.name
+        noise = ("--noise-temperature", f"{drawn.noise[0]:.4f} K", "--noise-tcp", f"{1e6 * drawn.noise[1]:.3f} um")
+        asked = ["simulate", machine, run, "-o", target, *noise, "--tcp-every", "20 min", "--seed", 100 * seed + k]
+        if command([str(a) for a in asked]):
+            raise RuntimeError(f"simulate {machine} {run}")
+        made.append(target)
+    return made
+
+
+def main(first: int, count: int, kind: str = "") -> None:
+    OUT.mkdir(parents=True, exist_ok=True)
+    for seed in range(first, first + count):
+        path = OUT / f"{kind or 'any'}_{seed}.jsonl"
+        if path.exists():
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            rows = judged(draw_machine(seed, kind or None), Path(folder))  # type: ignore[arg-type]
+        path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+        for row in rows:
+            print(seed, row["hidden"], row["verdict"], row["causes"], f"{row['seconds']:.0f} s", flush=True)
+
+
+def judged(drawn: DrawnMachine, folder: Path) -> list[dict[str, Any]]:
+    """A row per trial of one machine."""
+    drawn.write(folder / "m")
+    machine = drawn.machine(folder / "m")
+    logs = [folder / "m" / "runs" / name for name in RUNS]
+    texts = [other(drawn.text, 1000 * drawn.seed + k, folder / "m") for k in range(TRUTHS)]
+    measured_runs: list[tuple[tuple[str, ...], list[Path]]] = []
+    for k, text in enumerate(texts):
+        real = folder / f"real_{k}"
+        real.mkdir()
+        (real / "machine.toml").write_text(text, encoding="utf-8")
+        measured_runs.append((("nothing", "", ""), _simulate(real, logs, folder / f"null_{k}", drawn, 10 + k)))
+    runs = [read_run(p) for p in measured_runs[0][1]]
+    settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
+    nothing: Any = None
+    detector = prepare(nothing, machine, runs[:2], runs[2:], settings)[2]
+    power = float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
+    for i, (family, place, size) in enumerate(trials(drawn, machine, power)):
+        out = folder / f"trial_{i}"
+        if family in IN_MACHINE:
+            if command(["hide", family, place, size, str(folder / "real_0"), "-o", str(out / "real")]):
+                continue
+            measured_runs.append(((family, place, size), _simulate(out / "real", logs, out, drawn, 20 + i)))
+        else:
+            made = []
+            for run in measured_runs[1][1]:
+                group = "signal" if family == "factor" else "sensor"
+                history = () if family == "factor" else ("--history", family)
+                where = out / run.name
+                if command(["hide", group, place, size, str(run), "-o", str(where), *history]):
+                    break
+                made.append(where)
+            if len(made) == len(RUNS):
+                measured_runs.append(((family, place, size), made))
+    return [_said(detector, hidden, [read_run(p) for p in paths]) for hidden, paths in measured_runs]
+
+
+def _said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> dict[str, Any]:
+    began = time.perf_counter()
+    study = detector.study
+    usable, stuck = stuck_sensors(runs[:2], study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
+    plans = [
+        measured(study.probed.base, run, p.run.drive, p.run.name)
+        for run, p in zip([*usable, *runs[2:]], study.runs, strict=True)
+    ]
+    own = emptied(detector, plans) if stuck else detector
+    found = search(own, measured_of(with_measured(study, plans)))
+    verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
+    return {
+        "hidden": hidden,
+        "verdict": verdict,
+        "causes": [(c.family, c.place, round(c.amplitude, 4), c.history) for c in causes],
+        "by_run": [[(s.amplitude, s.sigma) for s in a.by_run] for a in found.accepted],
+        "observed": {k: v / detector.thresholds.get(k, np.inf) for k, v in found.steps[0].observed.items()},
+        "seconds": time.perf_counter() - began,
+    }
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:4])
