@@ -98,41 +98,57 @@ def main(first: int, count: int, kind: str = "") -> None:
             print(seed, row["hidden"], row["verdict"], row["causes"], f"{row['seconds']:.0f} s", flush=True)
 
 
+Measured = tuple[tuple[str, str, str], list[Path]]  # what was hidden, and the measured runs
+
+
 def judged(drawn: DrawnMachine, folder: Path) -> list[dict[str, Any]]:
     """A row per trial of one machine."""
     drawn.write(folder / "m")
     machine = drawn.machine(folder / "m")
     logs = [folder / "m" / "runs" / name for name in RUNS]
-    texts = [other(drawn.text, 1000 * drawn.seed + k, folder / "m") for k in range(TRUTHS)]
-    measured_runs: list[tuple[tuple[str, ...], list[Path]]] = []
-    for k, text in enumerate(texts):
-        real = folder / f"real_{k}"
-        real.mkdir()
-        (real / "machine.toml").write_text(text, encoding="utf-8")
-        measured_runs.append((("nothing", "", ""), _simulate(real, logs, folder / f"null_{k}", drawn, 10 + k)))
+    measured_runs: list[Measured] = [_healthy(drawn, folder, logs, k) for k in range(TRUTHS)]
     runs = [read_run(p) for p in measured_runs[0][1]]
     settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
     nothing: Any = None
     detector = prepare(nothing, machine, runs[:2], runs[2:], settings)[2]
     power = float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
-    for i, (family, place, size) in enumerate(trials(drawn, machine, power)):
+    for i, hidden in enumerate(trials(drawn, machine, power)):
         out = folder / f"trial_{i}"
-        if family in IN_MACHINE:
-            if command(["hide", family, place, size, str(folder / "real_0"), "-o", str(out / "real")]):
-                continue
-            measured_runs.append(((family, place, size), _simulate(out / "real", logs, out, drawn, 20 + i)))
+        if hidden[0] in IN_MACHINE:
+            made = _in_machine(drawn, folder / "real_0", logs, out, hidden, 20 + i)
         else:
-            made = []
-            for run in measured_runs[1][1]:
-                group = "signal" if family == "factor" else "sensor"
-                history = () if family == "factor" else ("--history", family)
-                where = out / run.name
-                if command(["hide", group, place, size, str(run), "-o", str(where), *history]):
-                    break
-                made.append(where)
-            if len(made) == len(RUNS):
-                measured_runs.append(((family, place, size), made))
+            made = _in_log(measured_runs[1][1], out, hidden)
+        if made:
+            measured_runs.append((hidden, made))
     return [_said(detector, hidden, [read_run(p) for p in paths]) for hidden, paths in measured_runs]
+
+
+def _healthy(drawn: DrawnMachine, folder: Path, logs: Sequence[Path], k: int) -> Measured:
+    """A real machine with nothing hidden, and its runs."""
+    real = folder / f"real_{k}"
+    real.mkdir()
+    (real / "machine.toml").write_text(other(drawn.text, 1000 * drawn.seed + k, folder / "m"), encoding="utf-8")
+    return ("nothing", "", ""), _simulate(real, logs, folder / f"null_{k}", drawn, 10 + k)
+
+
+def _in_machine(
+    drawn: DrawnMachine, real: Path, logs: Sequence[Path], out: Path, hidden: tuple[str, str, str], seed: int
+) -> list[Path]:
+    """Runs of a real machine with a fault; none where it cannot be hidden there."""
+    if command(["hide", *hidden, str(real), "-o", str(out / "real")]):
+        return []
+    return _simulate(out / "real", logs, out, drawn, seed)
+
+
+def _in_log(healthy: Sequence[Path], out: Path, hidden: tuple[str, str, str]) -> list[Path]:
+    """Healthy runs with a fault in their logs; none where it cannot be hidden there."""
+    kind, place, size = hidden
+    group, history = ("signal", ()) if kind == "factor" else ("sensor", ("--history", kind))
+    made = [out / run.name for run in healthy]
+    for run, where in zip(healthy, made, strict=True):
+        if command(["hide", group, place, size, str(run), "-o", str(where), *history]):
+            return []
+    return made
 
 
 def _said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> dict[str, Any]:
