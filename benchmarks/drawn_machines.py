@@ -11,6 +11,7 @@ import json
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -40,37 +41,66 @@ IN_LOG = {"offset": "1 K", "drift": "2 K", "swapped": "", "factor": "1.414213562
 SHARE = 0.25  # of the mean power of all sources: hidden heat
 
 
+Row = dict[str, Any]
+
+
 def trials(drawn: DrawnMachine, machine: Machine, power: float) -> list[tuple[str, str, str]]:
     """(family or kind, place, size) of everything that is hidden, drawn from the machine's seed.
 
     power: W, of all sources in the mean.
     """
     rng = np.random.default_rng([drawn.seed, 77])
-    inside = [n for n, s in machine.sensors.items() if s.environment is None]
-    parts = list(machine.parts) or [*machine.nodes, *machine.bars]
-    films = [s for f in machine.films.values() for s in f.surfaces if not s.endswith("*")]
-    surfaces = films or [f"{p}.{side}" for p in machine.parts for side in ("x_max", "y_max", "z_max")]
-    places = {
-        "heat_source": surfaces if machine.parts else list(machine.nodes),
-        "loss_law": [f"sources.{s}" for s in machine.sources],
-        "joint": [f"contacts.{c}" for c in machine.contacts],
-        "film_gain": [f"films.{f}" for f in machine.films],
-        "expansion": [f"parts.{p}" for p in parts] if machine.parts else [],
-        "offset": [f"sensors.{s}" for s in inside],
-        "drift": [f"sensors.{s}" for s in inside],
-        "swapped": [f"sensors.{s}" for s in inside] if len(inside) > 2 else [],
-        "factor": [f"signals.{n}" for n, s in machine.signals.items() if str(s.unit) == "A"],
-    }
     sizes = IN_MACHINE | IN_LOG | {"heat_source": f"{max(SHARE * power, 5.0):.3g} W"}
     found = []
-    for family, of_family in places.items():
-        if of_family:
-            place, size = of_family[int(rng.integers(len(of_family)))], sizes[family]
+    for family, places in _places(machine).items():
+        if places:
+            place, size = places[int(rng.integers(len(places)))], sizes[family]
             if family == "swapped":
-                others = [s for s in of_family if s != place]
+                others = [s for s in places if s != place]
                 size = others[int(rng.integers(len(others)))]
             found.append((family, place, size))
     return found
+
+
+def _places(machine: Machine) -> dict[str, list[str]]:
+    """Where each family or kind may be hidden."""
+    sensors = [f"sensors.{n}" for n, s in machine.sensors.items() if s.environment is None]
+    surfaces = [s for f in machine.films.values() for s in f.surfaces if not s.endswith("*")]
+    sides = [f"{p}.{side}" for p in machine.parts for side in ("x_max", "y_max", "z_max")]
+    return {
+        "heat_source": (surfaces or sides) if machine.parts else list(machine.nodes),
+        "loss_law": [f"sources.{s}" for s in machine.sources],
+        "joint": [f"contacts.{c}" for c in machine.contacts],
+        "film_gain": [f"films.{f}" for f in machine.films],
+        "expansion": [f"parts.{p}" for p in machine.parts],
+        "offset": sensors,
+        "drift": sensors,
+        "swapped": sensors if len(sensors) > 2 else [],
+        "factor": [f"signals.{n}" for n, s in machine.signals.items() if str(s.unit) == "A"],
+    }
+
+
+def answer(row: Row) -> str:
+    """What a row is worth: "right" (family and place first), "among" (named besides, or one of what cannot be
+    distinguished), "missed", "unknown" or "wrong"; with nothing hidden "nothing" or "false alarm"."""
+    kind, place, size = row["hidden"]
+    if kind == "nothing":
+        return "nothing" if row["verdict"] == "nothing" else "false alarm"
+    if row["verdict"] in ("nothing", "unknown"):
+        return {"nothing": "missed", "unknown": "unknown"}[row["verdict"]]
+    family = {"factor": "signal"}.get(kind, "sensor" if kind in IN_LOG else kind)
+    sought = {_pair(f"{place}<>{size.removeprefix('sensors.')}")} if kind == "swapped" else {place}
+    named = [(c[0], _pair(c[1]) if "<>" in c[1] else c[1]) for c in row["causes"]]
+    right = {(family, p) for p in sought}
+    if named and named[0] in right:
+        return "right"
+    rivals = [tuple(r) for r in row["rivals"]] if row["verdict"] == "ambiguous" else []
+    return "among" if right & {*named, *rivals} else "wrong"
+
+
+def _pair(place: str) -> str:
+    """Two sensors in alphabetical order."""
+    return "sensors." + "<>".join(sorted(place.removeprefix("sensors.").split("<>")))
 
 
 def _simulate(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachine, seed: int) -> list[Path]:
@@ -87,21 +117,27 @@ def _simulate(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachin
 
 def main(first: int, count: int, kind: str = "") -> None:
     OUT.mkdir(parents=True, exist_ok=True)
+    answers: dict[str, Counter[str]] = {}
     for seed in range(first, first + count):
         path = OUT / f"{kind or 'any'}_{seed}.jsonl"
-        if path.exists():
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            rows = judged(draw_machine(seed, kind or None), Path(folder))  # type: ignore[arg-type]
-        path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
-        for row in rows:
-            print(seed, row["hidden"], row["verdict"], row["causes"], f"{row['seconds']:.0f} s", flush=True)
+        if not path.exists():
+            with tempfile.TemporaryDirectory() as folder:
+                rows = judged(draw_machine(seed, kind or None), Path(folder))  # type: ignore[arg-type]
+            path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+        for line in path.read_text(encoding="utf-8").splitlines():
+            row = json.loads(line)
+            answers.setdefault(row["hidden"][0], Counter())[answer(row)] += 1
+            print(
+                seed, row["hidden"], answer(row), row["verdict"], row["causes"], f"{row['seconds']:.0f} s", flush=True
+            )
+    for kind, of_kind in answers.items():
+        print(f"   {kind:<12} {', '.join(f'{n} {told}' for told, n in of_kind.most_common())}")
 
 
 Measured = tuple[tuple[str, str, str], list[Path]]  # what was hidden, and the measured runs
 
 
-def judged(drawn: DrawnMachine, folder: Path) -> list[dict[str, Any]]:
+def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
     """A row per trial of one machine."""
     drawn.write(folder / "m")
     machine = drawn.machine(folder / "m")
@@ -151,7 +187,7 @@ def _in_log(healthy: Sequence[Path], out: Path, hidden: tuple[str, str, str]) ->
     return made
 
 
-def _said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> dict[str, Any]:
+def _said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     began = time.perf_counter()
     study = detector.study
     usable, stuck = stuck_sensors(runs[:2], study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
@@ -166,6 +202,7 @@ def _said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> dict[str, 
         "hidden": hidden,
         "verdict": verdict,
         "causes": [(c.family, c.place, round(c.amplitude, 4), c.history) for c in causes],
+        "rivals": [(r.family, r.place) for c in causes for r in c.rivals],
         "by_run": [[(s.amplitude, s.sigma) for s in a.by_run] for a in found.accepted],
         "observed": {k: v / detector.thresholds.get(k, np.inf) for k, v in found.steps[0].observed.items()},
         "seconds": time.perf_counter() - began,

@@ -29,7 +29,7 @@ PATCHED = {
     "DRAWS": "trajectories that the reduced machine of trials is made from",
     "RICH": "its rich basis",
     "STATES": "its states at most",
-    "MOST": "nodes of a surface that a tank is connected to",
+    "MOST": "nodes of a surface that a tank is connected to; positions of which a model keeps all TCP rows",
 }
 
 

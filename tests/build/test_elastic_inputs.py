@@ -18,10 +18,11 @@ from twin.build.structure import Structure
 from twin.machine.description import Encoder
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
+from twin.rom import tcp
 from twin.rom.apply import with_values
 from twin.rom.artefact import read_artefact, write_artefact
 from twin.rom.model import MachineModel
-from twin.rom.tcp import MOST, at_positions, is_exact, row_weights, tcp_at, tcp_over, tcp_rows
+from twin.rom.tcp import at_positions, is_exact, row_weights, tcp_at, tcp_over, tcp_rows
 
 SCALE = '[scales.x_glass]\naxis = "x"\nsurface = "bed.y_min"\nexpansion = "40e-6 1/K"\nfixed_at = "-50 mm"\n\n'
 TANK = '[tanks.oil]\nsurface = "bed.x_max"\ncapacity = "5 kJ/K"\nconductance = "10 W/K"\n\n'  # one more state
@@ -187,10 +188,12 @@ def test_a_model_with_the_rows_of_positions_is_exact_there(reduced, positions, s
     assert np.abs(read(reduced) - read(there)).max() > 1e-8  # what interpolation would have left
 
 
-def test_other_positions_are_interpolated_and_without_a_structure_nothing_changes(reduced, positions):
+def test_other_positions_are_interpolated_and_without_a_structure_nothing_changes(reduced, positions, monkeypatch):
     there, other = at_positions(reduced, positions), positions[:20] * 0.99 + 1e-4
     np.testing.assert_array_equal(row_weights(there, other)[0][:, : len(reduced.poses)], row_weights(reduced, other)[0])
     bare = replace(reduced, structure=None)
     assert at_positions(bare, positions) is bare
     assert at_positions(reduced, np.zeros((0, 1))) is reduced
-    assert at_positions(reduced, np.linspace(-0.2, 0.2, MOST + 1)[:, None]) is reduced
+    monkeypatch.setattr(tcp, "MOST", len(there.poses) - len(reduced.poses))
+    assert at_positions(reduced, positions).scattered
+    assert at_positions(reduced, np.vstack([positions, other])) is reduced  # more than it keeps

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from twin.diagnose.acted import slots_with, units_of
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.contest import exact
+from twin.diagnose.gain import gains
 from twin.diagnose.readings import late
 from twin.diagnose.refit import refit
 from twin.diagnose.search import search
@@ -219,3 +222,35 @@ def test_sizes_scored_together_are_scored_as_each_alone():
         P = fitted.projector(change)
         assert h.statistic == pytest.approx(float(P @ (2.0 * white - change)), rel=1e-6, abs=1e-6)
         assert h.information == pytest.approx(float(P @ change) / h.amplitude[0] ** 2, rel=1e-6)
+
+
+def test_what_comes_late_in_every_run_is_no_clock():
+    """A log's clock is off in its own run; the same in all is how fast a part or its sensor responds."""
+    study = small_case.study()
+    x = 0.5 * np.random.default_rng(8).standard_normal(len(study.probed.parameters))
+    y = clean(x) + noise(8)
+    for k in study.fitted:
+        y += 60.0 * late(study, {k: study.states(k, x)}, 60.0)
+    _, causes = verdict_of(search(small_case.made_detector(), y), FAMILIES)
+    assert "clock" not in [c.history for c in causes]
+
+
+def test_swapped_sensors_are_swapped_back_on_the_sealed_run():
+    study = small_case.study()
+    x = 0.5 * np.random.default_rng(4).standard_normal(len(study.probed.parameters))
+    y, first = clean(x) + noise(4), 0
+    for k in study.fitted:
+        (b, s), _ = study.runs[k].shapes
+        T = y[first : first + b * s].reshape(b, s)
+        T[:, [0, 1]] = T[:, [1, 0]]
+        first += study.runs[k].size
+    found = search(small_case.made_detector(), y)
+    assert [a.hypothesis.batch.kind for a in found.accepted] == ["swapped"]
+    sealed = study.runs[2].measured
+    T, w = study.runs[2].split(study.outputs(2, x))
+    T = T + small_case.NOISE / np.sqrt(5) * np.random.default_rng(5).standard_normal(T.shape)
+    sealed = replace(sealed, temperature=T[:, [1, 0, *range(2, T.shape[1])]], tcp=w)
+    table = {g.channel: g for g in gains(found, 2, sealed, 1, (np.full(T.shape[1], 0.05), np.full(3, 3e-7)))}
+    for name in sealed.sensors[:2]:
+        assert table[name].affected
+        assert table[name].extended < 0.2 * table[name].recalibrated

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.accepted import stepped, with_shifts
+from twin.diagnose.accepted import Accepted, stepped, with_shifts
 from twin.diagnose.diagnosis import Gain
 from twin.diagnose.readings import play, readings_of
 from twin.diagnose.search_look import Search
@@ -70,18 +71,36 @@ def gains(
     planned = study.runs[k]
     models = [planned.split(v) for v in vars(predicted(found, k)).values()]
     rng = np.random.default_rng(seed)
+    readings = sealed.temperature, sealed.temperature, _in_place(sealed, found.accepted)
     result = []
     for i, name in enumerate(sealed.sensors):
-        errors = [sealed.temperature[:, i] - T[:, i] for T, _ in models]
-        moved = float(np.sqrt(np.mean((models[2][0][:, i] - models[1][0][:, i]) ** 2)))
-        result.append(_gain(sealed.name, name, "K", errors, sealed.bin_time, moved > NOTICED * floors[0][i], rng))
+        errors = [read[:, i] - T[:, i] for read, (T, _) in zip(readings, models, strict=True)]
+        affected = bool(_moved(errors) > NOTICED * floors[0][i])
+        result.append(_gain(sealed.name, name, "K", errors, sealed.bin_time, affected, rng))
     for c in range(3 if len(sealed.tcp) else 0):
         errors = [sealed.tcp[:, c] - w[:, c] for _, w in models]
-        moved = float(np.sqrt(np.mean((models[2][1][:, c] - models[1][1][:, c]) ** 2)))
         axis = ("dx", "dy", "dz")[c]
-        affected = moved > NOTICED * floors[1][c]
+        affected = bool(_moved(errors) > NOTICED * floors[1][c])
         result.append(_gain(sealed.name, axis, "m", errors, sealed.tcp_time, affected, rng))
     return tuple(result)
+
+
+def _moved(errors: Sequence[np.ndarray]) -> float:
+    """By how much (rms) causes change what is left of a channel."""
+    change = errors[2] - errors[1]
+    good = np.isfinite(change)
+    return float(np.sqrt(np.mean(change[good] ** 2))) if good.any() else 0.0
+
+
+def _in_place(sealed: Measured, accepted: Sequence[Accepted]) -> np.ndarray:
+    """(b, s) its temperatures with the sensors back in place that were found swapped: they still are."""
+    T, names = sealed.temperature.copy(), list(sealed.sensors)
+    for a in accepted:
+        pair = a.hypothesis.name.removeprefix("sensors.").split("<>") if a.hypothesis.batch.kind == "swapped" else []
+        if pair and set(pair) <= set(names):
+            i, j = (names.index(n) for n in pair)
+            T[:, [i, j]] = T[:, [j, i]]
+    return T
 
 
 def _gain(

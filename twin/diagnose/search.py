@@ -17,7 +17,6 @@ from twin.diagnose.consistency import differs
 from twin.diagnose.contest import beginning, judged, proof, tried
 from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import Fitted
-from twin.diagnose.form_error import form_error
 from twin.diagnose.growth import chilled, grown
 from twin.diagnose.hotter import hotter
 from twin.diagnose.refit import refit
@@ -26,6 +25,7 @@ from twin.diagnose.search_look import Search, Step, cosines, look, scored
 from twin.diagnose.search_strained import COVERS, LATER, NEAR, PULLED, closed, strained
 from twin.diagnose.settled import settled
 from twin.diagnose.sight import Sight
+from twin.diagnose.size_discrepancy import size_discrepancy
 from twin.diagnose.study import K, Study
 
 MOST = 3  # causes
@@ -123,7 +123,7 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
         fitted, accepted = _without(detector, y, fitted, accepted, leaking)
         seen, _, step = look(detector, fitted)
         steps.append(step)
-    if uneven := [a for a in accepted if _of_machine(a) and differs(a.by_run, form_error(a.hypothesis))]:
+    if uneven := [a for a in accepted if _of_machine(a) and differs(a.by_run, size_discrepancy(a.hypothesis))]:
         fitted, accepted = _without(detector, y, fitted, accepted, uneven)
         seen, _, step = look(detector, fitted)
         steps.append(step)

@@ -17,11 +17,11 @@ from twin.diagnose.detector import Detector
 from twin.diagnose.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.elements import pivot
 from twin.diagnose.fitter import bounds
-from twin.diagnose.form_error import form_error
 from twin.diagnose.search import MOST, SEVERAL
 from twin.diagnose.search_look import Search
 from twin.diagnose.search_strained import COVERS
 from twin.diagnose.sight import sight
+from twin.diagnose.size_discrepancy import size_discrepancy
 from twin.diagnose.study import Study
 from twin.diagnose.unknown import history
 
@@ -47,12 +47,12 @@ def told(kind: str, amplitude: float) -> float:
 def cause_of(a: Accepted, study: Study) -> Cause:
     """A cause as reports and edits take it: factors as factors, differences as differences.
 
-    The interval counts that the model's own form is wrong (`form_error`).
+    The interval counts that the model's own form is wrong (`size_discrepancy`).
     """
     h = a.hypothesis
     kind, unit = h.batch.kind, h.batch.unit
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
-    own = form_error(h) * (max(value, WET) if h.family == "coolant" else value)
+    own = size_discrepancy(h) * (max(value, WET) if h.family == "coolant" else value)
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), own))
     low, high = value - 1.96 * sigma, value + 1.96 * sigma
     settings: dict[str, float | str] = {}

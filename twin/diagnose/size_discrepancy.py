@@ -22,6 +22,6 @@ OWN = {
 OWN_OTHERS = 0.05
 
 
-def form_error(h: Hypothesis) -> float:
+def size_discrepancy(h: Hypothesis) -> float:
     """Relative standard deviation of the size of a hypothesis."""
     return OWN.get(h.family, OWN.get(h.batch.kind, OWN_OTHERS))
