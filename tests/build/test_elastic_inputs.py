@@ -186,6 +186,11 @@ def test_a_model_with_the_rows_of_positions_is_exact_there(reduced, positions, s
 
     np.testing.assert_allclose(read(there), tcp_at(reduced, states["reduced"], positions), atol=1e-13)
     assert np.abs(read(reduced) - read(there)).max() > 1e-8  # what interpolation would have left
+    bare = replace(there, structure=None)
+    np.testing.assert_allclose(tcp_at(bare, states["reduced"], positions), read(there), atol=1e-15)
+    np.testing.assert_allclose(
+        tcp_over(bare, [x[None] for x in states["reduced"]], positions)[0], read(there), atol=1e-15
+    )
 
 
 def test_other_positions_are_interpolated_and_without_a_structure_nothing_changes(reduced, positions, monkeypatch):

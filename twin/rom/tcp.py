@@ -76,7 +76,7 @@ def tcp_rows(model: MachineModel, positions: np.ndarray) -> tuple[np.ndarray, ..
     """
     different, which = _distinct(_within_grid(model, positions))
     if not is_exact(model):
-        weights, _ = pose_weights(model.pose_grid, different)
+        weights, _ = row_weights(model, different)
         return tuple(np.tensordot(weights, body.G, 1)[which] for body in model.bodies)
     rows = elastic_rows(model, different)
     return tuple((Z @ inputs(model, b))[which] for b, Z in enumerate(rows))
@@ -124,7 +124,7 @@ def tcp_at(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray) 
     if exact:
         rows = elastic_rows(model, different)
     else:
-        weights, _ = pose_weights(model.pose_grid, different)
+        weights, _ = row_weights(model, different)
     w = np.zeros((len(which), 3))
     for b, (body, states) in enumerate(zip(model.bodies, x, strict=True)):
         if exact:
@@ -140,7 +140,7 @@ def tcp_over(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray
     """TCP displacements (k, m, 3) [m] of k states x_b (k, n_b) per body, each at all positions (m, n_axes) [m]."""
     positions = _within_grid(model, positions)
     if not is_exact(model):
-        weights, _ = pose_weights(model.pose_grid, positions)
+        weights, _ = row_weights(model, positions)
         at_poses = sum(np.tensordot(states, body.G, (1, 2)) for body, states in zip(model.bodies, x, strict=True))
         return np.einsum("mp,kpc->kmc", weights, at_poses)
     rows = elastic_rows(model, positions)
