@@ -116,9 +116,10 @@ class _Doomed(workers._Helper):
 def test_an_interrupt_ends_the_helpers():
     """They are children of a process that is interrupted, and must not outlive it."""
     code = (
-        "import os, sys\n"
+        "import os, signal, sys\n"
         "from tests.build.test_workers import scaled\n"
         "from twin.build.workers import each, _Helper\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # what runs in the background inherits none
         "start = _Helper.__init__\n"
         "def told(self):\n"
         "    start(self)\n"
