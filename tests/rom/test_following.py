@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import twin.run.jax_setup  # noqa: F401  isort: skip
+
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -336,3 +340,17 @@ def test_a_law_sees_the_air_at_the_height_of_its_surface():
     assert stepper.loads(drive, 0, stepper.uniform(26.5)).theta[0] == pytest.approx(free(26.5, 26.0), rel=0.02)
     steps = integrate(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(26.5))
     assert steps.theta[0, 0] == pytest.approx(free(26.5, 26.0), rel=0.02)
+
+
+def test_a_surface_as_warm_as_its_air_has_a_derivative():
+    """The fourth root has none there; a run that starts in balance with the air must not make all derivatives NaN."""
+    tables = jnp.asarray(5.0 + np.abs(DIFFERENCES) ** 0.25)[None]
+
+    def heat(d: jax.Array) -> jax.Array:
+        return d * read_table(jnp, tables, difference_place(jnp, d))
+
+    slopes = [float(jax.jacfwd(heat)(jnp.array([d]))[0, 0]) for d in (0.0, 1e-15, -1e-9, 1e-6, 1e-3)]
+    assert slopes == pytest.approx([5.0] * 5, abs=0.3)
+    places = [float(difference_place(np, np.float64(d))) for d in (-1e-3, -1e-9, 0.0, 1e-9, 1e-3)]
+    assert places == sorted(places)
+    assert places[2] == 32.0

@@ -17,6 +17,7 @@ import numpy as np
 
 from twin.build.workers import each
 from twin.diagnose.study import Study
+from twin.errors import ModelError
 from twin.progress import Progress, silent
 
 STEP = 0.8  # prior standard deviations between the two Jacobians of a second derivative
@@ -64,6 +65,7 @@ def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
     y0 = np.concatenate([study.outputs(k, np.zeros(n)) for k in study.fitted])
     bare = Surrogate(study.scale, form, y0, np.zeros((len(y0), n)), np.zeros((0, n, n), dtype=np.float32))
     J = _jacobian(study, np.zeros(n)) / bare.rate(np.zeros(n))
+    _refuse_nan(study, J, y0)
     strong = np.flatnonzero(np.linalg.norm((J * bare.rate(np.zeros(n))) / _units(study)[:, None], axis=0) > STRONG)
     points = [STEP * np.eye(n)[i] for i in strong]
     with progress("derivatives by the parameters", len(points)) as advance:
@@ -77,6 +79,17 @@ def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
     H[np.ix_(np.arange(len(y0)), strong, strong)] += H[np.ix_(np.arange(len(y0)), strong, strong)].transpose(0, 2, 1)
     H[np.ix_(np.arange(len(y0)), strong, strong)] /= 2
     return Surrogate(study.scale, form, y0, J, H)
+
+
+def _refuse_nan(study: Study, J: np.ndarray, y0: np.ndarray) -> None:
+    """Raises ModelError where outputs or derivatives are no numbers: every statistic of them would be zero."""
+    bad = [p.path for p, column in zip(study.probed.parameters, J.T, strict=True) if not np.isfinite(column).all()]
+    if bad or not np.isfinite(y0).all():
+        what = f"the derivative by {bad[0]} (and {len(bad) - 1} more)" if bad else "what the model predicts"
+        raise ModelError(
+            f"{what} is not finite in these runs", study.probed.base.name,
+            "look for a law outside its range in these loads: twin check, twin losses --explain",
+        )  # fmt: skip
 
 
 def _units(study: Study) -> np.ndarray:

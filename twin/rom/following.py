@@ -26,6 +26,7 @@ FOLLOW = 0.2
 
 # Surface minus ambient: uniform in the fourth root, in which free convection (Nu ~ Ra^(1/4)) is linear.
 WIDEST = 100.0  # K
+SMALL = 1e-6  # K, below which the root is a straight line: a machine as warm as its air has a derivative, too
 _HALF = 32
 DIFFERENCES = np.sign(np.arange(-_HALF, _HALF + 1)) * (np.arange(-_HALF, _HALF + 1) / _HALF) ** 4 * WIDEST
 # Temperature of a source's surface: copper is linear in it, viscosity changes by 1 % between two points.
@@ -50,7 +51,8 @@ class Following:
 
 def difference_place(xp: Any, difference: Array) -> Array:
     """Place in DIFFERENCES (0 .. 64) of a surface minus ambient temperature [K], held at the ends."""
-    root = xp.sign(difference) * xp.sqrt(xp.sqrt(xp.abs(difference) / WIDEST))
+    size = xp.maximum(xp.abs(difference), SMALL)
+    root = difference / size * xp.sqrt(xp.sqrt(size / WIDEST))
     return xp.clip(_HALF * (1.0 + root), 0.0, 2.0 * _HALF)
 
 
