@@ -26,7 +26,7 @@ FOLLOW = 0.2
 
 # Surface minus ambient: uniform in the fourth root, in which free convection (Nu ~ Ra^(1/4)) is linear.
 WIDEST = 100.0  # K
-SMALL = 1e-6  # K, below which the root is a straight line: a machine as warm as its air has a derivative, too
+SMALL = 1e-6  # K, below which the root is linear in it, so that its derivative is finite where both are equally warm
 _HALF = 32
 DIFFERENCES = np.sign(np.arange(-_HALF, _HALF + 1)) * (np.arange(-_HALF, _HALF + 1) / _HALF) ** 4 * WIDEST
 # Temperature of a source's surface: copper is linear in it, viscosity changes by 1 % between two points.
