@@ -1,8 +1,8 @@
 """Faults hidden in drawn machines, and what is said: `python -m benchmarks.drawn_machines FIRST N [boxes|lumped]`.
 
 Truth is the full model of the real machine (`twin.inject.machines.other`): another mesh, other film laws, values off.
-Every machine is looked at with nothing hidden and with one thing of each of CASES; a row per trial goes to
-out/drawn/SEED.jsonl, and rows that are there are not made again.
+Every machine is looked at with nothing hidden and with one fault of each of IN_MACHINE and IN_LOG; a row per trial goes
+to out/drawn/KIND_SEED.jsonl, and files that are there are not made again. The last lines count the answers.
 """
 
 from __future__ import annotations

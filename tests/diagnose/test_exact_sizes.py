@@ -224,13 +224,13 @@ def test_sizes_scored_together_are_scored_as_each_alone():
         assert h.information == pytest.approx(float(P @ change) / h.amplitude[0] ** 2, rel=1e-6)
 
 
-def test_what_comes_late_in_every_run_is_no_clock():
+def test_what_comes_early_in_every_run_is_no_clock():
     """A log's clock is off in its own run; the same in all is how fast a part or its sensor responds."""
     study = small_case.study()
     x = 0.5 * np.random.default_rng(8).standard_normal(len(study.probed.parameters))
     y = clean(x) + noise(8)
     for k in study.fitted:
-        y += 60.0 * late(study, {k: study.states(k, x)}, 60.0)
+        y -= 90.0 * late(study, {k: study.states(k, x)}, -90.0)
     _, causes = verdict_of(search(small_case.made_detector(), y), FAMILIES)
     assert "clock" not in [c.history for c in causes]
 

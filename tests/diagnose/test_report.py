@@ -17,7 +17,7 @@ from twin.diagnose.accepted import Accepted
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.diagnose import Result
-from twin.diagnose.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Limit, Rival, Window
+from twin.diagnose.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Limit, Pull, Rival, Window
 from twin.diagnose.extension import write_extension
 from twin.diagnose.gain import gains
 from twin.diagnose.report_evidence import candidates_picture, cosine_picture, nulls_picture
@@ -512,3 +512,21 @@ def test_long_tables_are_cut_and_say_so():
     text = table(["a"], [[str(k)] for k in range(100)])
     assert text.count("<td>") == 60
     assert "40 more in report.json" in text
+
+
+def test_nothing_says_first_what_calibration_had_to_change():
+    d = diagnosis("nothing")
+    runs = [replace(s, recalibrated=s.delivered, tcp_recalibrated=s.tcp_delivered) for s in d.series]
+    still = replace(d, series=tuple(runs))
+    white = tuple((name, before, 0.0) for name, before, _ in d.whiteness)
+    quiet = replace(still, whiteness=white)
+    assert "within their noise the description explains them" in verdict_sentence(quiet)
+    run = next(s for s in still.series if not s.sealed)
+    moved = replace(run, recalibrated=run.delivered - 2.0, tcp_recalibrated=run.tcp_delivered - [0.0, 9e-6, 0.0])
+    pull = Pull("sources.spindle.gain", 1.0, 1.35, 0.5, 1.4, "1", temperature_change=2.0, displacement_change=8e-6)
+    text = verdict_sentence(replace(quiet, series=(moved,), pulls=(*d.pulls, pull)))
+    assert "within their noise" not in text
+    for words in ("by 2.00 K", "dy by 9.00 um", "most of it by sources.spindle.gain, 1.35"):
+        assert words in text
+    left = tuple((name, before, 0.5) for name, before, _ in d.whiteness)
+    assert "correlated by 0.50" in verdict_sentence(replace(quiet, whiteness=left))

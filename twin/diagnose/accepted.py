@@ -154,22 +154,27 @@ def curved_slope(detector: Detector, h: Hypothesis, size: float, x: np.ndarray) 
     return np.asarray((more - less) / (2.0 * by))
 
 
+def in_place(T: np.ndarray, sensors: Sequence[str], accepted: Sequence[Accepted]) -> np.ndarray:
+    """(b, s) temperatures T of sensors with those back in place that were found swapped."""
+    order = list(range(len(sensors)))
+    for a in accepted:
+        pair = a.hypothesis.name.removeprefix("sensors.").split("<>") if a.hypothesis.batch.kind == "swapped" else []
+        if pair and set(pair) <= set(sensors):
+            i, j = (list(sensors).index(name) for name in pair)
+            order[i], order[j] = order[j], order[i]
+    return T[:, order]
+
+
 def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
     """(m,) measurements y with the channels back in place that were found swapped: exact, whatever the parameters."""
-    swaps = [a.hypothesis.name for a in accepted if a.hypothesis.batch.kind == "swapped"]
-    if not swaps:
+    if not any(a.hypothesis.batch.kind == "swapped" for a in accepted):
         return y
     parts, first = [], 0
     for k in study.fitted:
         planned = study.runs[k]
         own = y[first : first + planned.size].copy()
         (b, s), _ = planned.shapes
-        T, names = own[: b * s].reshape(b, s), list(planned.measured.sensors)
-        for name in swaps:
-            pair = name.removeprefix("sensors.").split("<>")
-            if set(pair) <= set(names):
-                i, j = (names.index(n) for n in pair)
-                T[:, [i, j]] = T[:, [j, i]]
+        own[: b * s] = in_place(own[: b * s].reshape(b, s), planned.measured.sensors, accepted).ravel()
         parts.append(own)
         first += planned.size
     return np.concatenate(parts)

@@ -61,12 +61,15 @@ def differs(found: Sequence[Size], own: float) -> bool:
     if len(told) < 2:
         return False
     a, variance = np.array([s.amplitude for s in told]), np.array([s.sigma**2 for s in told])
-    together = 1.0 / (1.0 / variance).sum()
-    kept = variance < TOLD**2 * len(told) * together
+    kept = variance < TOLD**2 * len(told) / (1.0 / variance).sum()
     if kept.sum() < 2:
         return False
     a, variance = a[kept], variance[kept]
-    variance = variance + (own * float(a @ (1.0 / variance) / (1.0 / variance).sum())) ** 2
-    mean = float(a @ (1.0 / variance) / (1.0 / variance).sum())
-    Q = float(((a - mean) ** 2 / variance).sum())
+    variance = variance + (own * _mean(a, variance)) ** 2
+    Q = float(((a - _mean(a, variance)) ** 2 / variance).sum())
     return bool(scipy.stats.chi2.sf(Q, len(a) - 1) < CHANCE)
+
+
+def _mean(a: np.ndarray, variance: np.ndarray) -> float:
+    """Weighted by inverse variances."""
+    return float((a / variance).sum() / (1.0 / variance).sum())

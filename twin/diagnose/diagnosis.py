@@ -64,8 +64,8 @@ class Pull:
     pull: float  # posterior shift in prior standard deviations
     unit: str
     freed: bool = False  # of its tolerance: it is the size of a cause, not what calibration made of it
-    kelvin: float = 0.0  # K rms, by which the shift alone moves the sensor that it moves most, to first order
-    metres: float = 0.0  # m rms, likewise of the TCP
+    temperature_change: float = 0.0  # K rms, of the sensor that the shift alone changes most, to first order
+    displacement_change: float = 0.0  # m rms, of the TCP component that it changes most, to first order
 
 
 @dataclass(frozen=True)

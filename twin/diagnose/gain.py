@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.accepted import Accepted, stepped, with_shifts
+from twin.diagnose.accepted import in_place, stepped, with_shifts
 from twin.diagnose.diagnosis import Gain
 from twin.diagnose.readings import play, readings_of
 from twin.diagnose.search_look import Search
@@ -71,7 +71,7 @@ def gains(
     planned = study.runs[k]
     models = [planned.split(v) for v in vars(predicted(found, k)).values()]
     rng = np.random.default_rng(seed)
-    readings = sealed.temperature, sealed.temperature, _in_place(sealed, found.accepted)
+    readings = sealed.temperature, sealed.temperature, in_place(sealed.temperature, sealed.sensors, found.accepted)
     result = []
     for i, name in enumerate(sealed.sensors):
         errors = [read[:, i] - T[:, i] for read, (T, _) in zip(readings, models, strict=True)]
@@ -90,17 +90,6 @@ def _moved(errors: Sequence[np.ndarray]) -> float:
     change = errors[2] - errors[1]
     good = np.isfinite(change)
     return float(np.sqrt(np.mean(change[good] ** 2))) if good.any() else 0.0
-
-
-def _in_place(sealed: Measured, accepted: Sequence[Accepted]) -> np.ndarray:
-    """(b, s) its temperatures with the sensors back in place that were found swapped: they still are."""
-    T, names = sealed.temperature.copy(), list(sealed.sensors)
-    for a in accepted:
-        pair = a.hypothesis.name.removeprefix("sensors.").split("<>") if a.hypothesis.batch.kind == "swapped" else []
-        if pair and set(pair) <= set(names):
-            i, j = (names.index(n) for n in pair)
-            T[:, [i, j]] = T[:, [j, i]]
-    return T
 
 
 def _gain(

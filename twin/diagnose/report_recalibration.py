@@ -52,7 +52,7 @@ def left_words(d: Diagnosis) -> str:
 
 
 def _weight(pull: Pull) -> float:
-    return max(pull.kelvin / KELVIN, pull.metres / METRES)
+    return max(pull.temperature_change / KELVIN, pull.displacement_change / METRES)
 
 
 def _value(pull: Pull) -> str:

@@ -268,7 +268,7 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
     moves = _moves(found.detector.fitter.surrogate.at(np.zeros(len(x)))[1] * x, study)
     pulls = [
         Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit,
-             kelvin=float(T), metres=float(w))
+             temperature_change=float(T), displacement_change=float(w))
         for p, c, s, T, w in zip(study.probed.parameters, x, sigma, *moves, strict=True)
     ]  # fmt: skip
     for a in found.accepted:

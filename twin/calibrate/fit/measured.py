@@ -171,16 +171,8 @@ def _tcp_rows(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, np.ndarray, np.ndarray]:
     tcp = run.tcp
     if tcp is None:
-        none = np.zeros(0)
-        return (
-            none.astype(int),
-            none,
-            np.zeros((0, len(model.poses))),
-            np.zeros((0, 3)),
-            None,
-            none,
-            np.zeros((0, len(model.pose_axes))),
-        )
+        none, weights, positions = np.zeros(0), np.zeros((0, len(model.poses))), np.zeros((0, len(model.pose_axes)))
+        return none.astype(int), none, weights, np.zeros((0, 3)), None, none, positions
     missing = [a for a in model.pose_axes if a not in tcp.axes]
     if missing:
         raise LogError(
