@@ -26,7 +26,7 @@ from twin.diagnose.gain import predicted
 from twin.diagnose.gaps import emptied
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
-from twin.diagnose.settled import settled
+from twin.diagnose.settled_beside import settled
 from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of

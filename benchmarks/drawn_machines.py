@@ -152,6 +152,8 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
         out = folder / f"trial_{i}"
         if hidden[0] in IN_MACHINE:
             made = _in_machine(drawn, folder / "real_0", logs, out, hidden, 20 + i)
+        elif hidden[0] == "factor":
+            made = _misread(drawn, folder / "real_1", logs, out, hidden, 20 + i)
         else:
             made = _in_log(measured_runs[1][1], out, hidden)
         if made:
@@ -176,13 +178,23 @@ def _in_machine(
     return _simulate(out / "real", logs, out, drawn, seed)
 
 
+def _misread(
+    drawn: DrawnMachine, real: Path, logs: Sequence[Path], out: Path, hidden: tuple[str, str, str], seed: int
+) -> list[Path]:
+    """Runs of a real machine whose logs say a factor too much: as `_said` reads the given logs, it saw less."""
+    saw = [out / "saw" / log.name for log in logs]
+    for log, where in zip(logs, saw, strict=True):
+        if command(["hide", "signal", hidden[1], f"{1.0 / float(hidden[2]):.12g}", str(log), "-o", str(where)]):
+            return []
+    return _simulate(real, saw, out, drawn, seed)
+
+
 def _in_log(healthy: Sequence[Path], out: Path, hidden: tuple[str, str, str]) -> list[Path]:
     """Healthy runs with a fault in their logs; none where it cannot be hidden there."""
     kind, place, size = hidden
-    group, history = ("signal", ()) if kind == "factor" else ("sensor", ("--history", kind))
     made = [out / run.name for run in healthy]
     for run, where in zip(healthy, made, strict=True):
-        if command(["hide", group, place, size, str(run), "-o", str(where), *history]):
+        if command(["hide", "sensor", place, size, str(run), "-o", str(where), "--history", kind]):
             return []
     return made
 

@@ -19,8 +19,8 @@ from twin.diagnose.diagnosis import Window
 from twin.diagnose.search import _leaking, _restless, refit, search
 from twin.diagnose.search_declared import declared_candidates
 from twin.diagnose.search_look import look
-from twin.diagnose.search_strained import _weak, closed, strained
-from twin.diagnose.settled import settled
+from twin.diagnose.search_strained import _weak, closed, loose_ones, strained
+from twin.diagnose.settled_beside import settled
 from twin.diagnose.verdict import verdict_of
 
 pytestmark = pytest.mark.long
@@ -124,17 +124,18 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
     x[next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
     fitted = detector.fitter(y)
-    x0, covariance = settled(detector, y, ())
+    x0, _ = settled(detector, y, ())
     declared = declared_candidates(detector, y, fitted)
     seen, ranked, step = look(detector, fitted, declared)
-    relaxed = strained(detector, y, fitted, x0, covariance, look(detector, fitted))
+    loose = loose_ones(detector, y, fitted.x, x0)
+    relaxed = strained(detector, y, fitted, loose, look(detector, fitted))
     assert relaxed is not None
     module = sys.modules[closed.__module__]
     monkeypatch.setattr(module, "misfit", lambda *_: 0.0)  # the number itself removes nothing of what was left
     monkeypatch.setattr(module, "_stays", lambda *_: stays)
     other = next(h for h in ranked if h.family not in ("loss_law", "signal"))
     alarm = replace(other, statistic=1.3 * detector.thresholds[other.family])
-    ended = closed(detector, y, fitted, declared, (seen, [alarm], step), relaxed, x0)
+    ended = closed(detector, y, fitted, declared, (seen, [alarm], step), relaxed, x0, loose)
     assert (ended is not None) == stays
     quiet = replace(other, statistic=0.5 * detector.thresholds[other.family])
-    assert closed(detector, y, fitted, declared, (seen, [quiet], step), relaxed, x0) is not None
+    assert closed(detector, y, fitted, declared, (seen, [quiet], step), relaxed, x0, loose) is not None

@@ -16,6 +16,6 @@ def test_derivatives_that_are_not_finite_are_refused_by_the_name_of_the_paramete
     study = small_case.study()
     J = np.ones((sum(study.runs[k].size for k in study.fitted), len(study.probed.parameters)))
     J[5, 2] = np.nan
-    monkeypatch.setattr(sys.modules[make_surrogate.__module__], "_jacobian", lambda *_: J)
+    monkeypatch.setattr(sys.modules[make_surrogate.__module__], "jacobian_of", lambda *_: J)
     with pytest.raises(ModelError, match=f"derivative by {study.probed.parameters[2].path}"):
         make_surrogate(study)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.diagnose import small_case
 from twin.diagnose.nulls import Form
-from twin.diagnose.settled import settled
+from twin.diagnose.settled_beside import settled
 from twin.diagnose.windy import wind_columns
 
 HIDDEN = np.array([1.0, -0.8])  # prior standard deviations of the first two sources

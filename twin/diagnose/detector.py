@@ -9,7 +9,7 @@ cases.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,13 +18,16 @@ from twin.build.workers import each
 from twin.calibrate.fit.noise import Channels, estimated
 from twin.diagnose.bank import Nominal, nominal_run, respond
 from twin.diagnose.catalogue import Family
+from twin.diagnose.discretisation import Difference
 from twin.diagnose.elements import Elements, elements_of, slim
 from twin.diagnose.fitter import Fitter
 from twin.diagnose.formal import known_forms
 from twin.diagnose.hypotheses import Context
 from twin.diagnose.lost import Lost, lost_conductances
-from twin.diagnose.nulls import Form, Instruments, null
+from twin.diagnose.nulls import SPREAD, Form, Instruments, null
+from twin.diagnose.pulls import Pulls, gumbel
 from twin.diagnose.readings import readings_of
+from twin.diagnose.settled import settled_alone
 from twin.diagnose.sight import Columns, sight
 from twin.diagnose.study import Study
 from twin.diagnose.surrogate import Surrogate, make_surrogate
@@ -41,6 +44,8 @@ LATE = 60.0  # s, by which light parts and sensors respond earlier or later than
 ALARM = 0.03
 FLOOR = 36.0  # of thresholds: some families never pass in synthetic measurements, and would at the first surprise
 
+Differences = Sequence[Difference]
+
 
 @dataclass(frozen=True)
 class Detector:
@@ -55,6 +60,7 @@ class Detector:
     nulls: dict[str, np.ndarray]  # per family, and "unknown": largest statistic in every null
     thresholds: dict[str, float]
     lost: Lost
+    pulls: Pulls
 
     @property
     def whiten(self) -> Whitener:
@@ -75,12 +81,22 @@ class StoredDetector:
     nulls: dict[str, np.ndarray]
     thresholds: dict[str, float]
     lost: Lost
+    pulls: Pulls
 
     def of(self, study: Study) -> Detector:
         """The detector of a study that differs from the one it was made for in its measured values alone."""
         fitter = Fitter(study, self.surrogate, Whitener(study, self.channels), self.others)
         return Detector(
-            study, fitter, self.elements, self.nominal, self.index, self.columns, self.nulls, self.thresholds, self.lost
+            study,
+            fitter,
+            self.elements,
+            self.nominal,
+            self.index,
+            self.columns,
+            self.nulls,
+            self.thresholds,
+            self.lost,
+            self.pulls,
         )
 
 
@@ -88,24 +104,34 @@ def stored(detector: Detector) -> StoredDetector:
     fitter = detector.fitter
     return StoredDetector(
         fitter.surrogate, fitter.whiten.channels, fitter.others, detector.elements, detector.nominal, detector.index,
-        detector.columns, detector.nulls, detector.thresholds, detector.lost,
+        detector.columns, detector.nulls, detector.thresholds, detector.lost, detector.pulls,
     )  # fmt: skip
 
 
-def _null_residual(shared: tuple[Fitter, list[np.ndarray], Instruments, Form], seed: int) -> np.ndarray:
+def _null_residual(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Differences], seed: int) -> np.ndarray:
     """What a calibration leaves of a null (m,)."""
-    fitter, J, instruments, form = shared
-    fitted = fitter(null(fitter.study, J, seed, instruments, form))
+    fitter, J, instruments, form, differences = shared
+    fitted = fitter(null(fitter.study, J, seed, instruments, form, differences=differences))
     white = fitter.whiten(fitted.residual)
     explained = fitted.projector.N @ fitted.projector.most_likely(white)
     return fitter.whiten.colour(white - explained)
 
 
-def _null_largest(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Columns], seed: int) -> dict[str, float]:
-    """The largest statistic of every family in a null."""
-    fitter, J, instruments, form, columns = shared
-    fitted = fitter(null(fitter.study, J, seed, instruments, form))
-    return sight(columns, fitted.projector, fitter.whiten(fitted.residual)).largest()
+@dataclass(frozen=True)
+class _OfNull:
+    """What is seen in a null: the largest statistic of every family, and what two calibrations say."""
+
+    largest: dict[str, float]
+    fitted: np.ndarray  # (n,)
+    settled: np.ndarray  # (n,)
+
+
+def _of_null(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Differences, Columns], seed: int) -> _OfNull:
+    fitter, J, instruments, form, differences, columns = shared
+    y = null(fitter.study, J, seed, instruments, form, differences=differences)
+    fitted = fitter(y)
+    seen = sight(columns, fitted.projector, fitter.whiten(fitted.residual))
+    return _OfNull(seen.largest(), fitted.x, settled_alone(fitter, y)[0])
 
 
 def instruments_of(study: Study, temperature: float, tcp: float) -> Instruments:
@@ -122,9 +148,11 @@ def make_detector(
     form: Form = Form(),
     counts: tuple[int, int] = (FORM, NULLS),
     progress: Progress = silent,
+    differ: Callable[[Surrogate], Differences] = lambda _: (),
 ) -> Detector:
-    """The detector of a study."""
+    """The detector of a study; differ: what other discretisations measure otherwise."""
     surrogate = make_surrogate(study, progress)
+    other = differ(surrogate)
     J = surrogate.J * surrogate.rate(np.zeros(len(study.probed.parameters)))
     J_of, y_of = _by_run(study, J), _by_run(study, surrogate.y0)
     with progress("responses of elementary causes", 2) as advance:
@@ -139,11 +167,11 @@ def make_detector(
     wind = wind_columns(study, form, progress)
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
-    bare = [OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study), _together(raw, index)]
+    bare = [OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study), _together(raw, index), _discretised(other, len(J))]
     known = known_forms(study, elements, nominal, raw, J, wind, whiten, form)
     fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known]))
     with progress("measurements without a cause: form", counts[0]) as advance:
-        shared = (fitter, J_of, instruments, form)
+        shared = (fitter, J_of, instruments, form, other)
         left = np.stack(each(_null_residual, shared, list(range(counts[0])), lambda _: advance("")), axis=1)
     whiten = Whitener(study, _channels(study, left, floors))
     U, s, _ = np.linalg.svd(whiten(left), full_matrices=False)
@@ -157,12 +185,13 @@ def make_detector(
     columns = Columns.of(_whitened(whiten, raw), batches, heat_of(study, elements), fitter.others)
     with progress("measurements without a cause: thresholds", counts[1]) as advance:
         seeds = list(range(10_000, 10_000 + counts[1]))
-        largest = each(_null_largest, (fitter, J_of, instruments, form, columns), seeds, lambda _: advance(""))
+        seen = each(_of_null, (fitter, J_of, instruments, form, other, columns), seeds, lambda _: advance(""))
     names = [*(f.name for f in families), "unknown"]
-    nulls = {name: np.array([of_null.get(name, 0.0) for of_null in largest]) for name in names}
+    nulls = {name: np.array([of_null.largest.get(name, 0.0) for of_null in seen]) for name in names}
+    pulls = Pulls.of(study.probed.parameters, np.array([o.fitted for o in seen]), np.array([o.settled for o in seen]))
     small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
     lost = lost_conductances(study, elements, whiten, progress)
-    return Detector(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost)
+    return Detector(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost, pulls)
 
 
 def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.ndarray:
@@ -172,6 +201,12 @@ def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.nda
     if len(clocks) < 2:
         return np.zeros((len(raw), 0))
     return np.asarray(LATE * raw[:, clocks].astype(float).sum(axis=1, keepdims=True))
+
+
+def _discretised(differences: Differences, m: int) -> np.ndarray:
+    """(m, k) what other discretisations do, each of a share of its own, and to each parameter's effect likewise."""
+    columns = [np.column_stack([o.d, SPREAD * o.D]) for o in differences]
+    return np.hstack(columns) if columns else np.zeros((m, 0))
 
 
 def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:
@@ -191,10 +226,9 @@ def _whitened(whiten: Whitener, raw: np.ndarray) -> np.ndarray:
 def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[str, float]:
     """Per family the statistic that a common tail probability allows, so that `alarm` of all nulls pass any of them.
 
-    Gumbel tail through the quantiles of 50 % and 97 % (on such tails: Embrechts, Klueppelberg, Mikosch, Modelling
-    Extremal Events, 1997, ch. 6).
+    By Gumbel tails.
     """
-    tails = {name: _gumbel(values) for name, values in nulls.items() if len(values) and values.max() > 0.0}
+    tails = {name: gumbel(values) for name, values in nulls.items() if len(values) and values.max() > 0.0}
     if not tails:
         return dict.fromkeys(nulls, FLOOR)
     table = np.stack([nulls[name] for name in tails], axis=1)
@@ -209,13 +243,6 @@ def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[st
         low, high = (p, high) if share <= alarm else (low, p)
     found = dict(zip(tails, limits(low), strict=True))
     return {name: float(max(found.get(name, FLOOR), FLOOR)) for name in nulls}
-
-
-def _gumbel(values: np.ndarray) -> tuple[float, float]:
-    """Location and scale of a Gumbel law with the upper half's quantiles (50 % and 97 %) of the values."""
-    a, b = np.quantile(values, [0.5, 0.97])
-    scale = max((b - a) / (-np.log(-np.log(0.97)) + np.log(-np.log(0.5))), 1e-3)
-    return float(a + scale * np.log(-np.log(0.5))), float(scale)
 
 
 def _floors(study: Study, instruments: Instruments) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -17,13 +17,15 @@ from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.coarse import too_coarse
 from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
+from twin.diagnose.discretisation import Difference, differences
 from twin.diagnose.gain import gains, predicted
-from twin.diagnose.nulls import Form
+from twin.diagnose.nulls import form_of
 from twin.diagnose.probed_model import ProbedModel, drive_arrays, make_probed_model
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
-from twin.diagnose.settled import settled
+from twin.diagnose.settled_beside import settled
 from twin.diagnose.study import Study, make_study
+from twin.diagnose.surrogate import Surrogate
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
 from twin.errors import ArtefactError, LogError
@@ -109,7 +111,11 @@ def prepare(
     asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)
     names = tuple((f.name, f.number, f.file) for f in settings.families)
     tolerance = tuple((p.path, p.nominal, p.sigma) for p in known)
-    counts = (settings.form, settings.nulls)
+    counts, form = (settings.form, settings.nulls), form_of(machine)
+
+    def differ(surrogate: Surrogate) -> tuple[Difference, ...]:
+        return differences(machine, study, surrogate, known, every, closed, progress)
+
     inputs = (
         machine_hash(machine),
         asked,
@@ -122,7 +128,7 @@ def prepare(
     )
     detector = cached(
         "detector", make_detector.__module__, inputs,
-        lambda: stored(make_detector(study, settings.families, instruments, Form(), counts, progress)),
+        lambda: stored(make_detector(study, settings.families, instruments, form, counts, progress, differ)),
     )  # fmt: skip
     return probed, study, detector.of(study), plans
 

@@ -9,17 +9,21 @@ every statistic: model discrepancy is learned from some of them, thresholds from
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from twin.build.places import beside
+from twin.diagnose.discretisation import Difference
 from twin.diagnose.elements import heated_places, own_place
 from twin.diagnose.integration import INNER
 from twin.diagnose.slots import Slots
 from twin.diagnose.study import Study
+from twin.machine.description import Machine
 from twin.run.system import Array
 
+SPREAD = 0.6  # of parameters, in prior standard deviations: tolerances are stated with care
 EXPONENTS = (0.5, 0.8)  # of speeds in films: from laminar to turbulent
 
 
@@ -44,6 +48,11 @@ class Form:
     tcp_zero: float = 0.3e-6  # m
 
 
+def form_of(machine: Machine) -> Form:
+    """That of a machine: a lumped one has no mesh at the patch of a contact."""
+    return Form(contact=0.0) if machine.lumped else Form()
+
+
 @dataclass(frozen=True)
 class Instruments:
     """White noise of single readings."""
@@ -53,8 +62,9 @@ class Instruments:
 
 
 def null(
-    study: Study, J: list[np.ndarray], seed: int, instruments: Instruments, form: Form = Form(), spread: float = 0.6
-) -> np.ndarray:
+    study: Study, J: list[np.ndarray], seed: int, instruments: Instruments, form: Form = Form(), spread: float = SPREAD,
+    differences: Sequence[Difference] = (),
+) -> np.ndarray:  # fmt: skip
     """Measurements (m,) of the fitted runs without a cause; NaN where the plan has none. J: nominal Jacobians by run.
 
     spread: of the parameters, in prior standard deviations.
@@ -122,7 +132,10 @@ def null(
         row_sigma = instruments.tcp / m.row_weight(instruments.tcp)
         w = w + row_sigma[:, None] * rng.standard_normal(w.shape) + form.tcp_zero * rng.standard_normal(3)
         parts.append(np.concatenate([T.ravel(), w.ravel()]))
-    return np.concatenate(parts)
+    y = np.concatenate(parts)
+    for difference in differences:
+        y = y + rng.standard_normal() * difference.at(x)
+    return y
 
 
 def _first(zeros: Array, value: np.ndarray) -> np.ndarray:

@@ -94,10 +94,11 @@ def drive_arrays(drive: Drive) -> tuple[np.ndarray, ...]:
 
 
 def make_probed_model(
-    machine: Machine, parameters: Sequence[Parameter], runs: Sequence[Run], progress: Progress = silent
-) -> ProbedModel:
-    """The probed model of a machine and the loads of runs, cached by both."""
-    rich = rich_probed_model(machine, progress)
+    machine: Machine, parameters: Sequence[Parameter], runs: Sequence[Run], progress: Progress = silent,
+    linear: bool = False,
+) -> ProbedModel:  # fmt: skip
+    """The probed model of a machine and the loads of runs, cached by both; linear: with linear elements."""
+    rich = rich_probed_model(machine, progress, linear)
     rich = replace(rich, rich=at_positions(rich.rich, tcp_positions(rich.rich, runs)))
     base = pruned(rich.rich)
     load = base.load_model
@@ -128,7 +129,7 @@ def make_probed_model(
         V, reduction = np.eye(rich.rich.n), (0.0, 0.0)
     else:
         logged = (*_logged(load, runs), rich.rich.poses)
-        inputs = (machine_hash(machine), known, tuple(starts), arrays_hash(logged))
+        inputs = (machine_hash(machine), linear, known, tuple(starts), arrays_hash(logged))
         V, reduction = cached("window", __name__, inputs, make)
     return _assembled(rich, V, parameters, runs, names, drives, starts, reduction)
 

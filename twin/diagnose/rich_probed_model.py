@@ -28,11 +28,11 @@ class RichProbedModel:
     height: tuple[np.ndarray, ...]  # per body (n, n_films of the description): A_k @ height [m^3]
 
 
-def rich_probed_model(machine: Machine, progress: Progress = silent) -> RichProbedModel:
-    """The rich model with places, cached by description and meshes."""
+def rich_probed_model(machine: Machine, progress: Progress = silent, linear: bool = False) -> RichProbedModel:
+    """The rich model with places, cached by description and meshes; linear: with linear elements on these."""
 
     def make() -> RichProbedModel:
-        full = assemble(with_displaced_sensors(machine), progress)
+        full = assemble(with_displaced_sensors(machine), progress, linear)
         places = places_of(machine, full)
         model = with_places(full, places)
         height = _heights(machine, full, model)
@@ -50,7 +50,7 @@ def rich_probed_model(machine: Machine, progress: Progress = silent) -> RichProb
             heights.append(V.T @ h[:, :n_films])
         return RichProbedModel(replace(model, bodies=tuple(bodies)), places, tuple(heights))
 
-    return cached("probed", __name__, (machine_hash(machine),), make)
+    return cached("probed", __name__, (machine_hash(machine), linear), make)
 
 
 def _heights(machine: Machine, full: FullModel, model: MachineModel) -> list[np.ndarray]:

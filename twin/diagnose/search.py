@@ -22,8 +22,8 @@ from twin.diagnose.hotter import hotter
 from twin.diagnose.refit import refit
 from twin.diagnose.search_declared import declared_candidates, declared_exactly, misplaced_candidates
 from twin.diagnose.search_look import Search, Step, cosines, look, scored
-from twin.diagnose.search_strained import COVERS, LATER, NEAR, PULLED, closed, strained
-from twin.diagnose.settled import settled
+from twin.diagnose.search_strained import COVERS, LATER, NEAR, closed, loose_ones, strained
+from twin.diagnose.settled_beside import settled
 from twin.diagnose.sight import Sight
 from twin.diagnose.size_discrepancy import size_discrepancy
 from twin.diagnose.study import K, Study
@@ -51,15 +51,16 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
     declared = declared_candidates(detector, y, fitted)
     known = scored(detector, fitted)
     glance = look(detector, fitted, declared, known)
-    relaxed = strained(detector, y, fitted, x0, covariance, glance)
+    loose = loose_ones(detector, y, fitted.x, x0)
+    relaxed = strained(detector, y, fitted, loose, glance)
     alarm = any(h.statistic > detector.thresholds[h.family] for h in glance[1])
-    if alarm or relaxed or np.abs(x0).max(initial=0.0) > PULLED:  # without, no cause is named
+    if alarm or loose:  # without, no cause is named
         exact = {
             h.name: h for h in [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
         }
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
         glance = look(detector, fitted, declared, known)
-    if relaxed and (ended := closed(detector, y, fitted, declared, glance, relaxed, x0)):
+    if relaxed and (ended := closed(detector, y, fitted, declared, glance, relaxed, x0, loose)):
         return ended
     accepted, steps = list[Accepted](), list[Step]()
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
@@ -131,7 +132,7 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     else:
         x = x0
-    return Search(detector, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance)
+    return Search(detector, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance, loose)
 
 
 def _without(

@@ -12,6 +12,7 @@ from twin.diagnose.batch import Hypothesis, best
 from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import Fitted
 from twin.diagnose.lost import lost_candidates
+from twin.diagnose.pulls import Loose
 from twin.diagnose.sight import Sight, sight
 from twin.diagnose.sizes import sized_candidates
 from twin.diagnose.unknown import Heat, evidence
@@ -40,6 +41,7 @@ class Search:
     g: np.ndarray  # (n_columns,) after the accepted ones
     heat: Heat  # likewise
     covariance: np.ndarray  # (n, n) of x
+    loose: tuple[Loose, ...] = ()  # declared numbers out of their tolerance, the farthest first
 
 
 @dataclass(frozen=True)

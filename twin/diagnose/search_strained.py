@@ -17,17 +17,16 @@ from twin.diagnose.batch import Hypothesis, score
 from twin.diagnose.contest import beginning, misfit
 from twin.diagnose.detector import Detector
 from twin.diagnose.fitter import Fitted
+from twin.diagnose.pulls import Loose
 from twin.diagnose.refit import WIDE, refit
 from twin.diagnose.search_look import Search, Step, look
-from twin.diagnose.settled import settled
+from twin.diagnose.settled import settled_alone
+from twin.diagnose.settled_beside import settled
 from twin.diagnose.sight import Sight
+from twin.diagnose.study import Study
 
-PULLED = 2.5  # standard deviations, of what tolerances allow a settled parameter, beyond which it is out of tolerance
-BEYOND = 3.0  # prior standard deviations likewise of one that was fitted with model discrepancy
-# prior standard deviations that the settled parameter must move by in the same direction: a fit that leaves to model
-# discrepancy what it likes moves weak ones anywhere (chosen on ten drawn networks, judged on ten others)
-AGREES = 1.0
-TOLD = 0.94  # variance of a settled parameter that says something of its own
+PULLED = 2.5  # standard deviations by which data without its tolerance must tell a number from the declared one
+BEYOND = 3.0  # prior standard deviations that a number out of its tolerance keeps beside any other explanation
 LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
 NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
@@ -44,6 +43,7 @@ OTHERS = 12  # other explanations that are looked at
 def closed(
     detector: Detector, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis],
     glance: tuple[Sight, list[Hypothesis], Step], relaxed: tuple[Fitted, Accepted], x0: np.ndarray,
+    loose: tuple[Loose, ...],
 ) -> Search | None:  # fmt: skip
     """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
     something else that was seen before (glance) explains more. Signals that explain as much are its rivals."""
@@ -68,9 +68,37 @@ def closed(
         for i, name in enumerate(batch.places)
         if _does_the_same(detector, detector.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
     )  # fmt: skip
-    one = replace(one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals)
+    (j,) = freed(detector.study, one.hypothesis)
+    amplitude, variance = _amplitude(one, next(own for own in loose if own.index == j), detector.study)
+    one = replace(
+        one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals,
+        amplitude=np.array([amplitude]), covariance=np.array([[variance]]),
+    )  # fmt: skip
     x, covariance = settled(detector, y, (one,))
-    return Search(detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance)
+    return Search(detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance, loose)
+
+
+def loose_ones(detector: Detector, y: np.ndarray, fitted: np.ndarray, settled: np.ndarray) -> tuple[Loose, ...]:
+    """The FAR declared numbers farthest out of their tolerance, by parameters (n,) of two calibrations."""
+    strain = detector.pulls.strain(fitted, settled)
+    found = []
+    for j in np.argsort(-strain)[:FAR]:
+        if strain[j] >= 1.0:
+            x, covariance = settled_alone(detector.fitter, y, (int(j),))
+            found.append(Loose(int(j), float(x[j]), float(np.sqrt(covariance[j, j])), float(strain[j])))
+    return tuple(found)
+
+
+def _amplitude(one: Accepted, loose: Loose, study: Study) -> tuple[float, float]:
+    """The amplitude of a number out of its tolerance as the settled calibration has it without one, and its variance.
+
+    The fit that finds causes leaves to model discrepancy what looks like it, and frees the number to make up for that.
+    """
+    scale = float(study.scale[loose.index])
+    change, sigma = scale * loose.x, scale * loose.sigma
+    if one.hypothesis.batch.kind not in CONDUCTS:
+        return change, sigma**2
+    return float(np.expm1(change)), float(np.exp(2.0 * change) * sigma**2)
 
 
 def _does_the_same(detector: Detector, signal: np.ndarray, one: Accepted, fits: bool) -> bool:
@@ -116,22 +144,18 @@ def _weak(detector: Detector, ranked: Sequence[Hypothesis], misfits: float) -> b
 
 
 def strained(
-    detector: Detector, y: np.ndarray, fitted: Fitted, x0: np.ndarray, covariance: np.ndarray,
+    detector: Detector, y: np.ndarray, fitted: Fitted, loose: Sequence[Loose],
     glance: tuple[Sight, list[Hypothesis], Step],
 ) -> tuple[Fitted, Accepted] | None:  # fmt: skip
-    """Of the declared numbers that calibration moves farthest the one that leaves least, freed of its tolerance.
+    """Of the declared numbers out of their tolerance the one that leaves least, freed of it.
 
-    None if all are within, or what was seen at a glance explains so much more that it would be left. x0 (n,),
-    covariance (n, n): settled. Where tolerances are right, x0 has the variance 1 - covariance.
+    None if there is none, or what was seen at a glance explains so much more that it would be left.
     """
-    variance = np.diag(covariance)
-    pulls = np.where(variance < TOLD, x0 / np.sqrt(np.maximum(1.0 - variance, 1.0 - TOLD)), 0.0)
-    agrees = (np.abs(x0) >= AGREES) & (np.sign(x0) == np.sign(fitted.x))
-    strain = np.where(agrees, np.maximum(np.abs(pulls) / PULLED, np.abs(fitted.x) / BEYOND), 0.0)
+    strain = {own.index: own.strain for own in loose}
     found = []
     for batch in detector.columns.batches:
         for i, name in enumerate(batch.places if batch.kind in ("gain", *CONDUCTS) else ()):
-            if (j := parameter_of(detector.study, name)) is None:
+            if (j := parameter_of(detector.study, name)) is None or j not in strain:
                 continue
             always = next(h for h in batch.histories if not h.windows)
             size = float(fitted.x[j] * detector.study.scale[j])
@@ -139,11 +163,10 @@ def strained(
                 size = float(np.expm1(size))
             likelihood = float((PULLED * strain[j]) ** 2)
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(detector.study.scale[j] ** -2.0)))
-    far = sorted((h for h in found if h.statistic >= PULLED**2), key=lambda h: -h.statistic)
     seen, ranked, _ = glance
     most = ranked[0].statistic if ranked else 0.0
     freed_ones, before = [], misfit(detector, fitted)
-    for h in far[:FAR]:
+    for h in sorted(found, key=lambda h: -h.statistic):
         # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
         # leave as much as its own discrepancy makes
         likely = h.batch.kind == "group" or _scored(detector, fitted, seen, h) > FAINT * most

@@ -8,46 +8,58 @@ left to the tolerances. The fit begins at the description, so that of two calibr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from twin.diagnose.accepted import Accepted, exchanged, freed, read_change, stepped, with_shifts
-from twin.diagnose.detector import Detector
-from twin.diagnose.fitter import CLOSE, bounds
+from twin.diagnose.fitter import CLOSE, Fitter, bounds
 from twin.diagnose.study import Study
 
 PASSES, INNER = 3, 6
 LONGEST = 1.0  # prior standard deviations, of a step
+ANY = 10.0  # prior standard deviations, of a parameter without tolerance: more than its bounds are apart
+
+Outputs = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> tuple[np.ndarray, np.ndarray]:
-    """Parameters (n,) in prior standard deviations of measurements y (m,), and their covariance (n, n).
+def settled_alone(fitter: Fitter, y: np.ndarray, free: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters (n,) in prior standard deviations of measurements y (m,) without a cause, and their covariance (n, n).
 
-    Amplitudes of the accepted causes stay as they are. The covariance counts model discrepancy as what it is:
-    A (1 + J^T W (1 + N N^T) W J) A with A = (1 + J^T W J)^-1 (White, Econometrica 48, 1980, on such sandwiches).
+    free: parameters that have no tolerance: the data and the tolerances of all others decide.
     """
-    study, surrogate, whiten = detector.study, detector.fitter.surrogate, detector.whiten
+    study = fitter.study
+
+    def left(x: np.ndarray) -> np.ndarray:
+        return fitter.whiten(y - np.concatenate([study.outputs(k, x) for k in study.fitted]))
+
+    return settle(fitter, fitter.surrogate.at, left, free)
+
+
+def settle(
+    fitter: Fitter, outputs: Outputs, left: Callable[[np.ndarray], np.ndarray], free: Sequence[int] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters (n,) that leave least, and their covariance (n, n).
+
+    outputs: x -> (m,), (m, n), nearly; left: x -> (m,) white, exactly. The covariance counts model discrepancy as
+    what it is: A (P + J^T W (1 + N N^T) W J) A with A = (P + J^T W J)^-1 (White, Econometrica 48, 1980, on
+    such sandwiches).
+    """
+    study, whiten = fitter.study, fitter.whiten
     low, high = bounds(study)
-    N = detector.fitter.others
+    N = fitter.others
     W = 1.0 / (1.0 + _rows(study) * (N**2).sum(axis=1))
-    y = exchanged(study, y, accepted)
-    reading = [a for a in accepted if not a.units and a.hypothesis.batch.kind != "gain"]
-    held = [j for a in accepted for j in freed(study, a.hypothesis)]
+    precision = np.ones(len(low))
+    precision[list(free)] = ANY**-2.0
+    P = np.diag(precision)
     x = np.zeros(len(low))
     for _ in range(PASSES):
         before = x
-        there = with_shifts(study, accepted, x)
-        read = np.zeros(len(y))
-        for a in reading:
-            read += read_change(detector, a.hypothesis, a.amplitude, there)
-        beside = np.concatenate([stepped(detector, accepted, k, there) for k in study.fitted]) - surrogate.at(there)[0]
+        white_left, there = left(x), outputs(x)[0]
         for _ in range(INNER):
-            f, J = surrogate.at(with_shifts(study, accepted, x))
-            J[:, held] = 0.0
+            f, J = outputs(x)
             white = whiten(J)
-            A = np.linalg.inv(np.eye(len(x)) + white.T @ (W[:, None] * white))
-            found = A @ (white.T @ (W * (whiten(y - f - beside + J @ x) - read)))
+            A = np.linalg.inv(P + white.T @ (W[:, None] * white))
+            found = A @ (white.T @ (W * (white_left + whiten(there - f + J @ x))))
             step = np.clip(np.clip(found, low, high) - x, -LONGEST, LONGEST)
             x = x + step
             if np.abs(step).max(initial=0.0) < CLOSE:
@@ -56,7 +68,7 @@ def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> 
             break
     weighted = W[:, None] * white
     crossed = N.T @ weighted
-    return x, A @ (np.eye(len(x)) + weighted.T @ weighted + crossed.T @ crossed) @ A
+    return x, A @ (P + weighted.T @ weighted + crossed.T @ crossed) @ A
 
 
 def _rows(study: Study) -> np.ndarray:

@@ -52,7 +52,7 @@ class Surrogate:
         return self.y0 + self.J @ t + 0.5 * (bent @ t), (self.J + bent) * self.rate(x)
 
 
-def _jacobian(study: Study, x: np.ndarray) -> np.ndarray:
+def jacobian_of(study: Study, x: np.ndarray) -> np.ndarray:
     n = len(study.probed.parameters)
     return np.vstack([study.jacobian(k, x)[:, :n] for k in study.fitted])
 
@@ -64,12 +64,12 @@ def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
     form = np.array([0 if p.scale == "linear" else -1 if p.kind in CONDUCTS else 1 for p in parameters])
     y0 = np.concatenate([study.outputs(k, np.zeros(n)) for k in study.fitted])
     bare = Surrogate(study.scale, form, y0, np.zeros((len(y0), n)), np.zeros((0, n, n), dtype=np.float32))
-    J = _jacobian(study, np.zeros(n)) / bare.rate(np.zeros(n))
+    J = jacobian_of(study, np.zeros(n)) / bare.rate(np.zeros(n))
     _refuse_nan(study, J, y0)
     strong = np.flatnonzero(np.linalg.norm((J * bare.rate(np.zeros(n))) / _units(study)[:, None], axis=0) > STRONG)
     points = [STEP * np.eye(n)[i] for i in strong]
     with progress("derivatives by the parameters", len(points)) as advance:
-        made = each(_jacobian, study, points, lambda _: advance(""))
+        made = each(jacobian_of, study, points, lambda _: advance(""))
     H = np.zeros((len(y0), n, n), dtype=np.float32)
     for i, x, jac in zip(strong, points, made, strict=True):
         H[:, :, i] = (jac / bare.rate(x) - J) / bare.t(x)[i]

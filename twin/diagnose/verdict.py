@@ -30,7 +30,6 @@ CLOSE = 6.0  # within which a rival of another family, or another part, makes a 
 POWER = 1.645  # one-sided 95 %
 REMAINDER = 0.35  # of the evidence for unknown heat before all names: the share that may be left beside them
 KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
-STRAINED = 2.5  # prior standard deviations, beyond which a declared parameter is out of its tolerance
 STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint": "joint", "expansion": "expansion"}
 MEDIUM = 0.15  # likewise of a coolant's film where its temperature is told, which follows from the heat
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
@@ -200,19 +199,15 @@ def _more_alike(found: Search, left: float) -> bool:
 
 
 def strained_of(found: Search) -> tuple[Cause, ...]:
-    """Declared parameters that calibration alone moved beyond STRAINED prior standard deviations."""
-    study = found.detector.study
-    sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    """Declared parameters that calibration alone moved out of their tolerance, at their values without one."""
     result = []
-    for p, pull, spread in zip(study.probed.parameters, found.x0, sigma, strict=True):
-        family = STRAIN.get(p.kind)
-        if family is None or abs(pull) < STRAINED or p.scale == "linear":
-            continue
-        gain, low, high = (float(np.exp(p.sigma * (pull + z * spread))) for z in (0.0, -1.96, 1.96))
-        place = p.path.removesuffix(".gain").removesuffix(".conductance")
+    for own in found.loose:
+        p = found.detector.study.probed.parameters[own.index]
+        gain, low, high = (float(np.exp(p.sigma * (own.x + z * own.sigma))) for z in (0.0, -1.96, 1.96))
+        place = ".".join(p.path.split(".")[:2])
         result.append(Cause(
-            family=family, place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
-            statistic=float(pull) ** 2, threshold=STRAINED**2, history=CALIBRATED,
+            family=STRAIN[p.kind], place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
+            statistic=own.strain**2, threshold=1.0, history=CALIBRATED,
         ))  # fmt: skip
     return tuple(sorted(result, key=lambda c: -c.statistic))
 

@@ -1,0 +1,94 @@
+"""What another discretisation would measure otherwise: the shape of this machine's own discretisation error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from twin.diagnose.discretisation import _acting, differences, inside_of, with_insides
+from twin.diagnose.probed_model import make_probed_model
+from twin.diagnose.pulls import Pulls
+from twin.diagnose.study import make_study
+from twin.diagnose.surrogate import make_surrogate
+from twin.machine.check_lumped import node_capacity, total_capacity
+from twin.machine.description import Machine
+from twin.machine.parameters import parameters
+
+
+def outputs(machine: Machine) -> np.ndarray:
+    """(m,) of the fitted runs, of the parameters of the machine as shipped."""
+    known = parameters(small_case.machine())
+    study = small_case.study()
+    plans = [p.measured for p in study.runs]
+    other = make_study(make_probed_model(machine, known, small_case.runs()), plans, study.fitted)
+    return np.concatenate([other.outputs(k, np.zeros(len(known))) for k in study.fitted])
+
+
+@pytest.fixture(scope="module")
+def both():
+    machine, study = small_case.machine(), small_case.study()
+    plans = [p.measured for p in study.runs]
+    found = differences(machine, study, make_surrogate(study), parameters(machine), small_case.runs(), plans)
+    assert len(found) == 2  # bars, nodes
+    return found
+
+
+def test_bars_of_half_the_element_size_tell_the_error_of_the_described_ones(both):
+    """A machine of eight times as many elements, which nothing was made with, is where the difference leads to."""
+    machine = small_case.machine()
+    bars = {n: b.model_copy(update={"elements": 8 * b.elements}) for n, b in machine.bars.items()}
+    error = outputs(machine.model_copy(update={"bars": bars})) - outputs(machine)
+    d = both[0].d
+    assert np.linalg.norm(error - d) < 0.3 * np.linalg.norm(
+        error
+    )  # the nut heats within an element: less than second order
+
+
+def test_the_difference_follows_the_parameters(both):
+    study = small_case.study()
+    n = len(study.probed.parameters)
+    x = 0.3 * np.random.default_rng(4).standard_normal(n)
+    machine, known = small_case.machine(), parameters(small_case.machine())
+    split = with_insides(machine)
+    plans = [p.measured for p in study.runs]
+    acting = [_acting(p, split) for p in known]
+    other = make_study(make_probed_model(split, acting, small_case.runs()), plans, study.fitted)
+    exact = np.concatenate([other.outputs(k, x) - study.outputs(k, x) for k in study.fitted])
+    assert np.linalg.norm(exact - both[1].at(x)) < 0.2 * np.linalg.norm(exact)
+    assert np.linalg.norm(exact - both[1].at(x)) < np.linalg.norm(exact - both[1].d)
+
+
+def test_an_inside_takes_half_of_a_node_and_nothing_is_lost():
+    machine = small_case.machine()
+    split = with_insides(machine)
+    assert total_capacity(split) == pytest.approx(total_capacity(machine))
+    added = [n for n in machine.nodes if inside_of(n) in split.nodes]
+    assert added
+    assert len(split.nodes) == len(machine.nodes) + len(added)
+    heaviest = max(machine.nodes, key=lambda n: node_capacity(machine, n))
+    assert heaviest in added
+    for n in added:
+        row = machine.tcp.expansion.get(n, (0.0, 0.0, 0.0))
+        both = [split.tcp.expansion.get(m, (0.0, 0.0, 0.0)) for m in (n, inside_of(n))]
+        assert np.sum(both, axis=0) == pytest.approx(row)
+    light = {n: v.model_copy(update={"capacity": 50.0}) for n, v in machine.nodes.items()}
+    assert with_insides(machine.model_copy(update={"nodes": light})).nodes.keys() == machine.nodes.keys()
+
+
+def test_a_parameter_is_out_of_its_tolerance_where_few_synthetic_measurements_move_one_so_far():
+    known = parameters(small_case.machine())
+    rng = np.random.default_rng(1)
+    spread = rng.uniform(0.3, 2.0, len(known))
+    fitted, settled = (spread * rng.standard_normal((2000, len(known))) for _ in range(2))
+    pulls = Pulls.of(known, fitted, settled)
+    passing = np.mean([(pulls.fitted.strain(x) >= 1.0).any() for x in spread * rng.standard_normal((2000, len(known)))])
+    assert 0.01 < passing < 0.06
+    named = next(i for i, p in enumerate(known) if p.kind == "source")
+    other = next(i for i, p in enumerate(known) if p.kind == "capacity")
+    far = np.zeros(len(known))
+    far[[named, other]] = 20.0
+    strain = pulls.strain(far, far)
+    assert strain[named] > 1.0
+    assert strain[other] == 0.0  # a capacity is no cause
+    assert pulls.strain(far, -far)[named] == 0.0  # the calibrations contradict each other
