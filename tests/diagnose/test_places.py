@@ -9,8 +9,11 @@ from tests.diagnose import small_case
 from tests.support.descriptions import SLIDE
 from twin.build.acting import Acting, with_acting
 from twin.build.full_model import assemble
+from twin.build.mesh import load_body_meshes
 from twin.build.places import DISPLACED, PREFIX, places_of, pruned, with_displaced_sensors, with_places
+from twin.build.probe import near
 from twin.build.stepper import CoupledStepper, sensor_temperatures
+from twin.inject.machines.drawn import draw_machine
 from twin.logs.read import read_run
 from twin.logs.signals import signal_values
 from twin.machine.load import load_machine
@@ -125,10 +128,27 @@ def test_heat_at_a_place_warms_what_is_there():
 
 def test_displaced_sensors_stand_beside_their_sensors():
     machine = load_machine(SLIDE)
-    displaced = with_displaced_sensors(machine)
+    displaced = with_displaced_sensors(machine, load_body_meshes(machine))
     own = [s for s in displaced.sensors if s.endswith(DISPLACED)]
     assert len(own) == sum(s.part is not None for s in machine.sensors.values())
     for name in own:
         a, b = displaced.sensors[name], machine.sensors[name.removesuffix(DISPLACED)]
         assert np.linalg.norm(np.subtract(a.position, b.position)) == pytest.approx(0.008)
-    assert with_displaced_sensors(small_case.machine()) is small_case.machine()
+    assert with_displaced_sensors(small_case.machine(), ()) is small_case.machine()
+
+
+def test_sensors_of_small_parts_are_displaced_the_other_way_or_less(tmp_path):
+    """8 mm off a bearing block of 100 mm is off the block, and no diagnosis of that machine was made."""
+    drawn = draw_machine(0, "boxes")
+    drawn.write(tmp_path / "m")
+    machine = drawn.machine(tmp_path / "m")
+    bodies = load_body_meshes(machine)
+    displaced = with_displaced_sensors(machine, bodies)
+    parts = {part.name: part for body in bodies for part in body.parts}
+    far = []
+    for name in (s for s in displaced.sensors if s.endswith(DISPLACED)):
+        a, b = displaced.sensors[name], machine.sensors[name.removesuffix(DISPLACED)]
+        assert near(parts[b.part], np.array(a.position))
+        far.append(float(np.linalg.norm(np.subtract(a.position, b.position))))
+    assert len(far) == sum(s.part is not None for s in machine.sensors.values())
+    assert min(far) > 0.0015

@@ -36,17 +36,14 @@ class FullModel:
     surfaces: tuple[SurfaceMesh, ...]  # likewise
 
 
-def assemble(machine: Machine, progress: Progress = silent, linear: bool = False) -> FullModel:
-    """Read meshes, assemble and condense, or assemble nodes and bars. Raises DescriptionError and ModelError.
-
-    linear: with linear elements, as `assemble_meshed` says; nothing of lumped machines.
-    """
+def assemble(machine: Machine, progress: Progress = silent) -> FullModel:
+    """Read meshes, assemble and condense, or assemble nodes and bars. Raises DescriptionError and ModelError."""
     if machine.lumped:
         return _assemble_lumped(machine)
     with progress("meshes", 1) as advance:
         bodies = load_body_meshes(machine)
         advance("meshes")
-    return assemble_meshed(machine, bodies, progress, linear)
+    return assemble_meshed(machine, bodies, progress)
 
 
 def assemble_meshed(

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from twin.build.full_model import FullModel
 from twin.build.mesh import BodyMesh, PartMesh
+from twin.build.probe import near
 from twin.build.surface import mass, patch
 from twin.machine.bodies import split_surface
 from twin.machine.check_lumped import film_area
@@ -25,6 +26,7 @@ from twin.rom.model import AffineBody, MachineModel
 PREFIX = "place:"  # no name of a description contains a colon
 DISPLACED = "--aside"  # suffix of sensors moved aside
 ASIDE = 0.008  # m
+SHARES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25)  # of ASIDE that are tried: parts may be as small as a bearing block
 WEAK, STRONG = 0.05, 20.0  # W/(m^2 K), of the film of a place: what bases are made for
 
 
@@ -39,22 +41,26 @@ class Place:
     area: float  # m^2
 
 
-def with_displaced_sensors(machine: Machine, seed: int = 5) -> Machine:
+def with_displaced_sensors(machine: Machine, bodies: Sequence[BodyMesh], seed: int = 5) -> Machine:
     """The description with a second sensor some millimetres beside each one on a part: what a wrong place would read.
 
-    Lumped machines have no places between nodes and stay as they are.
+    The other way, or nearer, where that would be off the part. Lumped machines have no places between nodes and stay as
+    they are.
     """
     if machine.lumped:
         return machine
+    parts = {part.name: part for body in bodies for part in body.parts}
     rng = np.random.default_rng(seed)
     sensors = dict(machine.sensors)
     for name, sensor in machine.sensors.items():
         if sensor.part is not None and sensor.position is not None:
             aside = rng.standard_normal(3)
-            moved = np.asarray(sensor.position) + ASIDE * aside / np.linalg.norm(aside)
-            sensors[name + DISPLACED] = Sensor(
-                part=sensor.part, position=(float(moved[0]), float(moved[1]), float(moved[2]))
-            )
+            for share in SHARES:
+                moved = np.asarray(sensor.position) + share * ASIDE * aside / np.linalg.norm(aside)
+                if near(parts[sensor.part], moved):
+                    position = (float(moved[0]), float(moved[1]), float(moved[2]))
+                    sensors[name + DISPLACED] = Sensor(part=sensor.part, position=position)
+                    break
     return machine.model_copy(update={"sensors": sensors})
 
 

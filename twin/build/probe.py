@@ -13,6 +13,15 @@ from twin.errors import DescriptionError
 FAR = 0.05  # of the part's diagonal: points further outside are mistakes
 
 
+def near(part: PartMesh, point: np.ndarray) -> bool:
+    """Whether `probe` takes the point (3,) [m]."""
+    try:
+        probe(part, point, "")
+    except DescriptionError:
+        return False
+    return True
+
+
 def probe(part: PartMesh, point: np.ndarray, where: str) -> tuple[np.ndarray, np.ndarray]:
     """Unknowns (k,) of the part and weights (k,), summing to 1, that interpolate at `point` (3,) [m].
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.cache import cached, machine_hash
-from twin.build.full_model import FullModel, assemble
+from twin.build.full_model import FullModel, assemble, assemble_meshed
 from twin.build.places import Place, places_of, with_displaced_sensors, with_places
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
@@ -32,7 +32,11 @@ def rich_probed_model(machine: Machine, progress: Progress = silent, linear: boo
     """The rich model with places, cached by description and meshes; linear: with linear elements on these."""
 
     def make() -> RichProbedModel:
-        full = assemble(with_displaced_sensors(machine), progress, linear)
+        if machine.lumped:
+            full = assemble(machine, progress)
+        else:
+            bodies = load_body_meshes(machine)
+            full = assemble_meshed(with_displaced_sensors(machine, bodies), bodies, progress, linear)
         places = places_of(machine, full)
         model = with_places(full, places)
         height = _heights(machine, full, model)
