@@ -8,6 +8,7 @@ import numpy as np
 
 from twin.build.cache import cached, machine_hash
 from twin.build.full_model import FullModel, assemble, assemble_meshed
+from twin.build.mesh import load_body_meshes
 from twin.build.places import Place, places_of, with_displaced_sensors, with_places
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
