@@ -50,7 +50,7 @@ class Form:
 
 def form_of(machine: Machine) -> Form:
     """That of a machine: a lumped one has no mesh at the patch of a contact."""
-    return Form(contact=0.0) if machine.lumped else Form()
+    return Form(contact=0.2) if machine.lumped else Form()
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,8 @@ def rich_probed_model(machine: Machine, progress: Progress = silent, linear: boo
         if machine.lumped:
             full = assemble(machine, progress)
         else:
-            bodies = load_body_meshes(machine)
-            full = assemble_meshed(with_displaced_sensors(machine, bodies), bodies, progress, linear)
+            meshes = load_body_meshes(machine)
+            full = assemble_meshed(with_displaced_sensors(machine, meshes), meshes, progress, linear)
         places = places_of(machine, full)
         model = with_places(full, places)
         height = _heights(machine, full, model)
