@@ -24,6 +24,7 @@ from twin.diagnose.catalogue import FAMILIES
 from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.gaps import emptied
+from twin.diagnose.sealed import judged as on_sealed
 from twin.diagnose.search import search
 from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import verdict_of, with_faults
@@ -210,10 +211,14 @@ def _said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     own = emptied(detector, plans) if stuck else detector
     found = search(own, measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
+    opened = on_sealed(found, verdict, causes, FAMILIES, plans[2:], 1)
+    verdict, causes = opened.verdict, opened.causes
     return {
         "hidden": hidden,
         "verdict": verdict,
-        "causes": [(c.family, c.place, round(c.amplitude, 4), c.history) for c in causes],
+        "note": opened.note,
+        "causes": [(c.family, c.place, round(c.amplitude, 4), c.history, c.ci95) for c in causes],
+        "gains": [(g.channel, g.unit, g.recalibrated, g.extended, g.ci95) for g in opened.gains if g.affected],
         "rivals": [(r.family, r.place) for c in causes for r in c.rivals],
         "by_run": [[(s.amplitude, s.sigma) for s in a.by_run] for a in found.accepted],
         "observed": {k: v / detector.thresholds.get(k, np.inf) for k, v in found.steps[0].observed.items()},

@@ -53,6 +53,20 @@ def assemble_meshed(
 
     linear: with linear elements on the same tetrahedra, faces flat (`twin.build.linear`).
     """
+    full = assemble_unrestricted(machine, bodies, progress, linear)
+    return with_linear_temperatures(full) if linear else full
+
+
+def with_linear_temperatures(full: FullModel) -> FullModel:
+    """The full model with its temperatures restricted to linear elements."""
+    bodies = tuple(linear_body(mesh, body) for mesh, body in zip(full.bodies, full.thermal.bodies, strict=True))
+    return replace(full, thermal=replace(full.thermal, bodies=bodies))
+
+
+def assemble_unrestricted(
+    machine: Machine, bodies: tuple[BodyMesh, ...], progress: Progress = silent, linear: bool = False
+) -> FullModel:
+    """As `assemble_meshed`, but temperatures stay quadratic: more may be added before they are restricted."""
     bodies = tuple(straightened(body) for body in bodies) if linear else bodies
     with progress("thermal matrices", 1) as advance:
         thermal = assemble_thermal(machine, bodies)
@@ -68,8 +82,6 @@ def assemble_meshed(
     acting, inputs = elastic_inputs(structure)
     parts = zip(thermal.bodies, rows, inputs, selections, strict=True)
     full = tuple(replace(b, G=G, W=W, F=F) for b, G, W, F in parts)
-    if linear:
-        full = tuple(linear_body(mesh, body) for mesh, body in zip(bodies, full, strict=True))
     thermal = replace(thermal, bodies=full, structure=acting)
     return FullModel(thermal, structure, bodies, surfaces)
 

@@ -44,9 +44,14 @@ def linear_elasticity(body: BodyMesh, solid: Elasticity, U: csr_array) -> tuple[
     return restricted, csr_array(V.T @ U), body.nodes[vertices(body)]
 
 
+def from_vertices_and_tanks(mesh: BodyMesh, n: int) -> csr_array:
+    """(n, m) likewise for all n unknowns of a thermal body: tanks, which follow its nodes, stay."""
+    return csr_array(block_diag([from_vertices(mesh), identity(n - mesh.n)], format="csr"))
+
+
 def linear_body(mesh: BodyMesh, body: AffineBody) -> AffineBody:
-    """The thermal body with linear temperatures; tanks, which follow its nodes, stay."""
-    V = csr_array(block_diag([from_vertices(mesh), identity(body.n - mesh.n)], format="csr"))
+    """The thermal body with linear temperatures."""
+    V = from_vertices_and_tanks(mesh, body.n)
     keep = np.concatenate([vertices(mesh), np.arange(mesh.n, body.n)])
     ends = np.cumsum([0, *(part.mesh.nvertices for part in mesh.parts)])
     return replace(

@@ -18,9 +18,10 @@ from twin.diagnose.coarse import too_coarse
 from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
 from twin.diagnose.discretisation import Difference, differences
-from twin.diagnose.gain import gains, predicted
+from twin.diagnose.gain import predicted
 from twin.diagnose.nulls import form_of
 from twin.diagnose.probed_model import ProbedModel, drive_arrays, make_probed_model
+from twin.diagnose.sealed import judged
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
 from twin.diagnose.settled_beside import settled
@@ -167,24 +168,10 @@ def diagnose(
         notes.append(coarse.note)
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED]
-    extension = (
-        tuple(c for c in causes if groups.get(c.family) == "machine" and c.history != CALIBRATED)
-        if verdict in ("named", "out_of_tolerance", "ambiguous", "signal")
-        else ()
-    )
-    extension += tuple(c for c in causes if c.family == "signal" and c.place.startswith("signals."))
-    opened = plans[len(runs) :]
-    table = tuple(
-        g for k, m in enumerate(opened, start=len(runs))
-        for g in gains(shown, k, m, settings.seed, _floors(detector, m))
-    )  # fmt: skip
-    worse = sum(g.ci95[1] < 0.0 for g in table)
-    if extension and worse > sum(g.ci95[0] > 0.0 for g in table):
-        notes.append(
-            f"not written into the description: on the sealed run the extension makes {worse} of {len(table)} channels "
-            "worse beyond chance, so the names explain the runs that were looked at and not the machine"
-        )
-        extension = ()
+    opened = judged(shown, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
+    if opened.note:
+        notes.append(opened.note)
+    verdict, causes, extension = opened.verdict, opened.causes, opened.extension
     first = found.steps[0]
     diagnosis = Diagnosis(
         machine=machine.machine.name,
@@ -194,7 +181,7 @@ def diagnose(
         pulls=pulls_of(shown),
         detection_limits=limits_of(detector),
         unknown=unknown_of(found) if verdict == "unknown" else None,
-        gain=table,
+        gain=opened.gains,
         ranked=tuple(rival_of(h, float(first.cosine[0, i])) for i, h in enumerate(first.ranked)),
         cosine=first.cosine,
         nulls=detector.nulls,
@@ -217,14 +204,6 @@ def diagnose(
         },
     )
     return Result(diagnosis, found, extension)
-
-
-def _floors(detector: Detector, m: Measured) -> tuple[np.ndarray, np.ndarray]:
-    """Noise of a sealed run's sensors (s,) and TCP components (3,): as in the first fitted run."""
-    sensors, tcp = detector.whiten.channels[0]
-    own = detector.study.runs[0].measured.sensors
-    known = dict(zip(own, sensors.sigma, strict=True))
-    return np.array([known.get(s, float(np.median(sensors.sigma)) if len(own) else 0.1) for s in m.sensors]), tcp.sigma
 
 
 def _summary(verdict: Verdict, causes: Sequence[Cause], found: Search) -> tuple[str, ...]:

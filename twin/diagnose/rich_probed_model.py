@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.cache import cached, machine_hash
-from twin.build.full_model import FullModel, assemble, assemble_meshed
+from twin.build.full_model import FullModel, assemble, assemble_unrestricted
+from twin.build.linear import from_vertices_and_tanks, linear_body
 from twin.build.mesh import load_body_meshes
 from twin.build.places import Place, places_of, with_displaced_sensors, with_places
 from twin.build.project import project
@@ -37,10 +38,15 @@ def rich_probed_model(machine: Machine, progress: Progress = silent, linear: boo
             full = assemble(machine, progress)
         else:
             meshes = load_body_meshes(machine)
-            full = assemble_meshed(with_displaced_sensors(machine, meshes), meshes, progress, linear)
+            full = assemble_unrestricted(with_displaced_sensors(machine, meshes), meshes, progress, linear)
         places = places_of(machine, full)
         model = with_places(full, places)
         height = _heights(machine, full, model)
+        if linear:
+            pairs = list(zip(full.bodies, model.bodies, strict=True))
+            V_of = [from_vertices_and_tanks(mesh, body.n) for mesh, body in pairs]
+            height = [V.T @ h for V, h in zip(V_of, height, strict=True)]
+            model = replace(model, bodies=tuple(linear_body(mesh, body) for mesh, body in pairs))
         n_films = len(full.thermal.load_model.films)
         if machine.lumped:
             bases = [np.diag(np.asarray(body.E.diagonal()) ** -0.5) for body in model.bodies]
