@@ -21,10 +21,13 @@ _LEAP = 2.0  # K from one row to the next, in a channel that usually changes by 
 _LEAST = 20
 
 
-def value_problems(table: Table, where: str, name: str, wanted: Collection[str] = ()) -> list[Problem]:
+def value_problems(
+    table: Table, where: str, name: str, wanted: Collection[str] = (), told: Collection[str] = ()
+) -> list[Problem]:
     """Warnings about the values of one table: "loads", "temperatures" or "tcp".
 
-    wanted: columns that a machine reads; without any value they are errors, as they are on running.
+    wanted: columns that a machine reads; without any value they are errors, as they are on running. told: columns
+    whose large values other findings tell already.
     """
     problems = []
     constant: list[str] = []
@@ -47,6 +50,8 @@ def value_problems(table: Table, where: str, name: str, wanted: Collection[str] 
             elif len(values) >= 100 and (name == "temperatures" or _siblings_change(table, column)):
                 what = f"column '{column}' never changes ({low:g} {unit})"
                 problems.append(warning(what, where, "a stuck or detached sensor? leave it out if so"))
+        if column in told:
+            continue
         problems += _plausible(column, low, high, unit, where, name)
         if low < high:
             problems += _outliers(column, held(values), unit, where)
