@@ -10,12 +10,16 @@ from twin.logs.faults.series import Series
 
 _BLOCKS = 16  # of a series; noise shorter than one is not looked for
 _FEWEST = 10  # rows of a block
+# Changes elsewhere, from which on they say what is usual: a rounded temperature has few in slow air, and heat is never
+# noise; a probe may have some while nothing turns, and is louder when something does
+_CALM = {"degC": 5, "m": 20}
 # Of the typical change from row to row in noise, to what 99 % of the rows do not exceed elsewhere. Where a machine
 # starts to move, or a coolant to flow, this is at most 1.3 in the clean halves of two real recordings.
 _NOISE = 5.0
 _REST = 10  # rows that a rail lasts at least, and
 _LONGER = 3.0  # times the longest rest of the same channel elsewhere: rounded channels rest, too
-_POSSIBLE = (-50.0, 200.0)  # degC: beyond what any sensor on a machine tool can read: a rail, however short
+_STUCK = 20  # rows, of a rest that a leap ends
+POSSIBLE = (-50.0, 200.0)  # degC: beyond what any sensor on a machine tool can read: a rail, however short
 _SHORT = 3  # rows of such a one
 
 
@@ -31,33 +35,43 @@ class Stretch:
 def noise(s: Series) -> list[Stretch]:
     """Stretches in which a channel changes from row to row far more than it does anywhere else.
 
-    Stretches without any change are no measure of what is usual: probes stand still while nothing turns.
+    Blocks of rows are parted into calm and loud ones wherever that leaves the loud ones far above all others.
+    Rows without any change are no measure of what is usual: probes stand still while nothing turns.
     """
     change = np.abs(np.diff(s.values))
     width = max(_FEWEST, len(change) // _BLOCKS)
-    edges = np.arange(0, len(change) - width + 1, width)
-    if len(edges) < 4:
-        return []
-    blocks = [change[e : e + width] for e in edges]
-    moving = [b for b in blocks if np.count_nonzero(b) > 1]
-    if len(moving) < 2:
-        return []
-    calm = max(float(np.quantile([np.quantile(b, 0.9) for b in moving], 0.25)), s.resolution)
-    loud = np.array([np.median(b) > _NOISE * calm for b in blocks] + [False])
-    found = []
-    for first, last in _runs(loud):
-        end = len(change) if last == len(blocks) - 1 else edges[last] + width
-        inside = np.flatnonzero(change[max(edges[first] - width, 0) : min(end + width, len(change))] > _NOISE * calm)
-        inside += max(edges[first] - width, 0)
-        found.append((int(inside[0]), int(inside[-1])))
-    outside = np.ones(len(change), dtype=bool)
-    for a, b in found:
-        outside[a : b + 1] = False
-    if not found or np.count_nonzero(change[outside]) < _FEWEST:
-        return []
-    limit = _NOISE * max(float(np.quantile(change[outside & (change > 0.0)], 0.99)), s.resolution)
-    typical = [(a, b, float(np.median(change[a : b + 1]))) for a, b in found]
-    return [Stretch(a + 1, b + (b == len(change) - 1), size) for a, b, size in typical if size > limit]
+    blocks = [change[e : e + width] for e in range(0, len(change) - width + 1, width)]
+    levels = sorted({max(float(np.quantile(b, 0.9)), s.resolution) for b in blocks})
+    typical = np.array([np.median(b) for b in blocks])
+    for calm in reversed(levels[:-1]):
+        runs = _runs(typical > _NOISE * calm)
+        found = _edges(change, [(a * width, (b + 1) * width) for a, b in runs], width, _NOISE * calm)
+        outside = np.ones(len(change), dtype=bool)
+        for first, last in found:
+            outside[first : last + 1] = False
+        usual = change[outside & (change > 0.0)]
+        if not found or len(usual) < _CALM[s.unit]:
+            continue
+        limit = _NOISE * max(float(np.quantile(usual, 0.99)), s.resolution)
+        sizes = [float(np.median(change[first : last + 1])) for first, last in found]
+        if min(sizes) > limit:
+            at_end = len(change) - 1
+            return [Stretch(a + 1, b + (b == at_end), size) for (a, b), size in zip(found, sizes, strict=True)]
+    return []
+
+
+def _edges(change: np.ndarray, rough: list[tuple[int, int]], width: int, large: float) -> list[tuple[int, int]]:
+    """First and last large change of every rough stretch, looked for one block farther on each side."""
+    found: list[tuple[int, int]] = []
+    for begin, end in rough:
+        low = max(begin - width, 0)
+        inside = low + np.flatnonzero(change[low : end + width] > large)
+        first, last = int(inside[0]), int(inside[-1])
+        if found and first <= found[-1][1] + 1:
+            first, last = found[-1][0], max(last, found[-1][1])
+            found.pop()
+        found.append((first, last))
+    return found
 
 
 def rail(s: Series, leap: int) -> Stretch | None:
@@ -65,11 +79,21 @@ def rail(s: Series, leap: int) -> Stretch | None:
     value = s.values[leap]
     last = _end_of_rest(s.values, leap)
     rest = last - leap + 1
-    if not _POSSIBLE[0] < value < _POSSIBLE[1] and s.unit == "degC" and rest >= min(_SHORT, len(s.values) - leap):
+    if not POSSIBLE[0] < value < POSSIBLE[1] and s.unit == "degC" and rest >= min(_SHORT, len(s.values) - leap):
         return Stretch(leap, last, float(value))
     elsewhere = max(_longest_rest(s.values[:leap]), _longest_rest(s.values[last + 1 :]))
     if rest >= _REST and rest > _LONGER * elsewhere:
         return Stretch(leap, last, float(value))
+    return None
+
+
+def rest_before(s: Series, leap: int) -> Stretch | None:
+    """The longest rest of a channel, where it ends by a leap: the channel was stuck, and did not rest."""
+    differ = np.flatnonzero(s.values[:leap] != s.values[leap - 1])
+    first = int(differ[-1]) + 1 if len(differ) else 0
+    elsewhere = max(_longest_rest(s.values[:first]), _longest_rest(s.values[leap:]))
+    if leap - first > max(_STUCK, elsewhere):
+        return Stretch(first, leap - 1, float(s.values[first]))
     return None
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.logs.channels import PLACES
+from twin.logs.faults.breaks import POSSIBLE
 from twin.logs.faults.series import Series
 from twin.logs.run import Run
 from twin.logs.slips import other_scale
@@ -37,7 +38,7 @@ def begins_apart(run: Run, series: list[Series]) -> Apart | None:
 
     series: the temperatures. Temperatures among the loads count among the others.
     """
-    begin = {s.name: float(np.median(s.values[:_BEGIN])) for s in series}
+    begin = {s.name: float(np.median(s.values[:_BEGIN])) for s in series if s.row[0] < _BEGIN}
     air = [v[np.isfinite(v)][:_BEGIN] for n, v in run.loads.columns.items() if run.loads.units[n] == "degC"]
     levels = [*begin.values(), *(float(np.median(v)) for v in air if len(v))]
     if len(levels) < _FEWEST or not begin:
@@ -49,8 +50,8 @@ def begins_apart(run: Run, series: list[Series]) -> Apart | None:
     size = begin[name] - usual
     if abs(size) < max(_LEAST, _RATIO * float(np.max(np.abs(np.array(others) - usual)))):
         return None
-    if other_scale(begin[name], usual):  # told as a slip of the unit
-        return None
+    if other_scale(begin[name], usual) or not POSSIBLE[0] < begin[name] < POSSIBLE[1]:
+        return None  # told as a slip of the unit, or as a value that no machine has
     stated = run.initial_temperature is not None
     return Apart(name, size, stated or _cold(series, rest_at_start(run), size))
 

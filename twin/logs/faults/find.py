@@ -7,18 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.logs.faults.breaks import noise, rail
+from twin.logs.faults.breaks import noise, rail, rest_before
 from twin.logs.faults.cold_start import begins_apart
 from twin.logs.faults.fault import Fault, Kind
-from twin.logs.faults.leaps import changes, leaps, leapt_together
-from twin.logs.faults.series import Series, beside, tcp_series, temperature_series
+from twin.logs.faults.leaps import changes, leaps, leapt_together, set_to_zero
+from twin.logs.faults.series import Series, beside, long_enough, tcp_series, temperature_series
 from twin.logs.run import Run, Table
-from twin.logs.stuck import standstills
+from twin.logs.stuck import Standstill, standstills
 
 _NEAR = 1.5  # usual steps: what is no farther apart in time is one event
 _BACK = 0.3  # of the larger of two leaps: they are there and back where their sum is less
 _ZERO = 0.05  # of a probe's leap: as near to zero it is set to zero
 _WAS = 10.0  # times nearer to zero than before
+_SAME = 0.8  # of the longer of two standstills that both last: rounded channels come to rest one after the other
 
 
 @dataclass(frozen=True)
@@ -36,19 +37,18 @@ def faults_of(run: Run) -> list[Fault]:
     readings of an end, are not. Times must increase, as `read_run` demands. Nothing is changed in the run.
     """
     temperatures, tcp = temperature_series(run), tcp_series(run)
-    spliced = _splices(temperatures)
-    found = [*spliced, *_stuck_temperatures(run, temperatures), *_stuck_probes(run, tcp)]
+    noisy = [_fault("noise", s, n.first, n.last, n.size) for s in (*temperatures, *tcp) for n in noise(s)]
+    temperatures, tcp = (long_enough(_without(s, noisy) for s in series) for series in (temperatures, tcp))
+    found = [*noisy, *_splices(temperatures), *_stuck(run, temperatures), *_stuck_probes(run, tcp)]
     for s in (*temperatures, *tcp):
-        known = [f for f in found if f.fault.kind == "splice" or s.name in f.fault.channels]
-        broken = _breaks_and_leaps(s, known)
-        rails = [b.fault for b in broken if b.fault.kind in ("rail", "noise")]
-        found = [f for f in found if not _within(f.fault, rails)] + broken
+        known = [f for f in found if f.fault.kind == "splice" or _of(f.fault, s)]
+        leapt = _rails_and_leaps(s, known)
+        rails = [f.fault for f in leapt if f.fault.kind == "rail"]
+        found = [f for f in found if not _within(f.fault, rails)] + leapt
     if apart := begins_apart(run, temperatures):
         s = next(s for s in temperatures if s.name == apart.name)
-        broken_at_once = any(s.name in f.fault.channels and f.fault.first_row == s.row[0] for f in found)
-        if not broken_at_once:
-            kind: Kind = "offset" if apart.cold else "offset_or_warm"
-            found.append(_fault(kind, s, 0, len(s.row) - 1, apart.size))
+        kind: Kind = "offset" if apart.cold else "offset_or_warm"
+        found.append(_fault(kind, s, 0, len(s.row) - 1, apart.size))
     order = [*(run.temperatures.columns if run.temperatures is not None else ()), "dx", "dy", "dz"]
     return sorted(_together(found, order), key=lambda f: (f.table != "temperatures", f.first_row))
 
@@ -65,36 +65,40 @@ def _splices(series: Sequence[Series]) -> list[_Found]:
     return found
 
 
-def _breaks_and_leaps(s: Series, known: Sequence[_Found]) -> list[_Found]:
-    """Faults of one series beside those that are known: what begins or ends there is told already."""
-    found = [_fault("noise", s, n.first, n.last, n.size) for n in noise(s)]
-    sound = np.ones(len(s.row), dtype=bool)
-    for f in found:
-        sound[(s.row >= f.fault.first_row) & (s.row <= f.fault.last_row)] = False
-    quiet = s.only(sound)
-    if len(quiet.row) < 2:
-        return found
-    change = changes(quiet)
-    near = _near(s)
-    ends = [t for f in (*known, *found) for t in (f.fault.first_time, f.fault.last_time)]
-    at = [
-        (i, size)
-        for i, size in leaps(quiet, change)
-        if not any(abs(quiet.time[i] - t) <= 2.0 * near for t in ends if t < s.time[-1])
-    ]
+def _rails_and_leaps(s: Series, known: Sequence[_Found]) -> list[_Found]:
+    """Leaps of one series beside what is known: what begins or ends there is told already."""
+    near = 2.0 * _near(s)
+    ends = [f.fault.first_time if f.fault.kind == "splice" else f.fault.last_time for f in known]
+    told = np.any([np.abs(s.time - t) <= near for t in ends], axis=0) if ends else np.zeros(len(s.time), dtype=bool)
+    change = changes(s)
+    change = replace(change, excess=np.where(told, 0.0, change.excess))
+    found: list[_Found] = []
+    at = leaps(s, change)
+    if not at and s.table == "tcp" and (zero := set_to_zero(s, change)) is not None:
+        return [_fault("rezero", s, zero, len(s.row) - 1, float(change.excess[zero]))]
     while at:
         (i, size), at = at[0], at[1:]
-        stays = rail(quiet, i)
-        if stays is not None:
-            found.append(_fault("rail", quiet, i, stays.last, stays.size))
+        back = bool(at) and abs(size + at[0][1]) <= _BACK * max(abs(size), abs(at[0][1]))
+        if (stays := rail(s, i)) is not None:
+            found.append(_fault("rail", s, i, stays.last, stays.size))
             at = [(k, z) for k, z in at if k > stays.last + 1]
-        elif at and abs(size + at[0][1]) <= _BACK * max(abs(size), abs(at[0][1])):
-            found.append(_fault("leap", quiet, i, at[0][0] - 1, size))
+        elif _told(float(s.time[i]), near, (*known, *found), float(s.time[-1])):
+            continue
+        elif back:
+            found.append(_fault("leap", s, i, at[0][0] - 1, size))
             at = at[1:]
+        elif (rest := rest_before(s, i)) is not None:
+            found.append(_fault("stuck", s, rest.first, rest.last, rest.size))
         else:
-            kind: Kind = "rezero" if s.table == "tcp" and _to_zero(quiet, i, size, change.usual) else "leap"
-            found.append(_fault(kind, quiet, i, len(quiet.row) - 1, size))
+            kind: Kind = "rezero" if s.table == "tcp" and _to_zero(s, i, size, change.usual) else "leap"
+            found.append(_fault(kind, s, i, len(s.row) - 1, size))
     return found
+
+
+def _told(time: float, near: float, known: Iterable[_Found], end: float) -> bool:
+    """Whether what happens at a time [s] is the beginning or the end of a known fault."""
+    ends = [t for f in known for t in (f.fault.first_time, f.fault.last_time) if f.fault.kind != "leap"]
+    return any(abs(time - t) <= near for t in ends if t < end)
 
 
 def _to_zero(s: Series, at: int, size: float, usual: float) -> bool:
@@ -103,15 +107,21 @@ def _to_zero(s: Series, at: int, size: float, usual: float) -> bool:
     return after <= max(_ZERO * abs(size), usual) and before > _WAS * after
 
 
-def _stuck_temperatures(run: Run, series: Sequence[Series]) -> list[_Found]:
-    if run.temperatures is None or not series:
+def _stuck(run: Run, series: Sequence[Series]) -> list[_Found]:
+    """Temperatures that stand still while the others go on."""
+    if run.temperatures is None:
         return []
+    n = len(run.temperatures.time)
+    columns = {s.name: np.full(n, np.nan) for s in series}
+    for s in series:
+        columns[s.name][s.row] = s.values
     named = {s.name: s for s in series}
-    return [
-        _fault("stuck", s, int(np.searchsorted(s.row, still.first)), int(np.searchsorted(s.row, still.last)), still.value)
-        for still in standstills(run.temperatures)
-        if (s := named.get(still.name)) is not None
-    ]  # fmt: skip
+    found = []
+    for still in _every_standstill(Table(run.temperatures.time, columns, dict.fromkeys(columns, "degC"))):
+        s = named[still.name]
+        first, last = (int(np.searchsorted(s.row, row)) for row in (still.first, still.last))
+        found.append(_fault("stuck", s, first, last, still.value))
+    return found
 
 
 def _stuck_probes(run: Run, series: Sequence[Series]) -> list[_Found]:
@@ -121,10 +131,32 @@ def _stuck_probes(run: Run, series: Sequence[Series]) -> list[_Found]:
         others = beside(s, run.temperatures)
         others |= {o.name: o.values for o in series if o.name != s.name and np.array_equal(o.row, s.row)}
         table = Table(s.time, {**others, s.name: s.values}, {**dict.fromkeys(others, ""), s.name: s.unit})
-        for still in standstills(table):
-            if still.name == s.name:
-                found.append(_fault("stuck", s, still.first, still.last, still.value))
+        found += [_fault("stuck", s, w.first, w.last, w.value) for w in _every_standstill(table) if w.name == s.name]
     return found
+
+
+def _every_standstill(table: Table) -> list[Standstill]:
+    """All standstills: each search tells one of a channel, so what was found is left out, and searched again."""
+    found: list[Standstill] = []
+    columns = {name: np.array(values, dtype=float) for name, values in table.columns.items()}
+    while new := standstills(replace(table, columns=columns)):
+        found += new
+        for still in new:
+            columns[still.name][still.first : still.last + 1] = np.nan
+    return found
+
+
+def _without(s: Series, faults: Iterable[_Found]) -> Series:
+    """The readings of a series outside of its faults."""
+    keep = np.ones(len(s.row), dtype=bool)
+    for f in (f.fault for f in faults):
+        if _of(f, s):
+            keep[(s.row >= f.first_row) & (s.row <= f.last_row)] = False
+    return s.only(keep)
+
+
+def _of(fault: Fault, s: Series) -> bool:
+    return fault.table == s.table and s.name in fault.channels
 
 
 def _fault(kind: Kind, s: Series, first: int, last: int, size: float) -> _Found:
@@ -146,6 +178,14 @@ def _within(fault: Fault, others: Iterable[Fault]) -> bool:
     )
 
 
+def _at_once(a: Fault, b: Fault, near: float) -> bool:
+    """Whether two faults of a kind are one event: they begin and end together, or stand still for much the same time."""
+    if a.kind == "stuck":
+        both = min(a.last_time, b.last_time) - max(a.first_time, b.first_time)
+        return both >= _SAME * max(a.last_time - a.first_time, b.last_time - b.first_time)
+    return max(abs(a.first_time - b.first_time), abs(a.last_time - b.last_time)) <= near
+
+
 def _together(found: Sequence[_Found], order: Sequence[str]) -> list[Fault]:
     """One fault where several channels, or places of one, have the same one at the same time."""
     merged: list[_Found] = []
@@ -153,8 +193,7 @@ def _together(found: Sequence[_Found], order: Sequence[str]) -> list[Fault]:
         f = one.fault
         for k, other in enumerate(merged):
             o = other.fault
-            apart = max(abs(f.first_time - o.first_time), abs(f.last_time - o.last_time))
-            if (f.kind, f.table) == (o.kind, o.table) and apart <= max(one.near, other.near):
+            if (f.kind, f.table) == (o.kind, o.table) and _at_once(f, o, max(one.near, other.near)):
                 channels = tuple(sorted({*f.channels, *o.channels}, key=order.index))
                 larger = max(o, f, key=lambda x: abs(x.size))
                 first, last = min(f.first_row, o.first_row), max(f.last_row, o.last_row)

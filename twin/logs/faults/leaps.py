@@ -21,6 +21,10 @@ _SIDE = 3
 _RATIO = 4.0  # of the smallest leap of a channel to its largest other change
 _SCALE = 5.0  # of a leap to what 98 % of the rows do not exceed, or to the last digit
 _TOGETHER = 3.0  # the same, where most channels do it in one row: by chance or by heat they do not
+# The same as _RATIO, of a leap that ends at zero to the last digit: that one of several large changes does so by chance
+# has a probability of one in the digits of its range, a hundred or more
+_ZEROED = 1.5
+_FAR = 10.0  # last digits from zero, before
 _MOST = 8  # leaps in one channel; with more of them no change is unusual
 # A leap is over in its row: a first-order lag reaches in the next two rows at most 86 % of what it has after four, where
 # its time constant is one row or more. Faster ones look like leaps.
@@ -64,6 +68,18 @@ def leaps(s: Series, c: Changes) -> list[tuple[int, float]]:
         if sizes[m] >= _RATIO * other and sizes[m] >= _SCALE * c.usual and sizes[m] > 0.0:
             found = m + 1
     return sorted((at, size) for at, size in (_located(s, c, i) for i in peaks[:found]) if size != 0.0)
+
+
+def set_to_zero(s: Series, c: Changes) -> int | None:
+    """Index of the first reading after a probe was set to zero, where it shows exactly that: the largest change of all
+    ends at zero to the last digit, far from where it was."""
+    peaks = _peaks(c.excess, 2)
+    if not peaks or abs(c.excess[peaks[0]]) < _TOGETHER * c.usual:
+        return None
+    at, size = _located(s, c, peaks[0])
+    other = abs(c.excess[peaks[1]]) if len(peaks) > 1 else 0.0
+    exact = abs(s.values[at]) <= 0.5 * s.resolution and abs(s.values[at - 1]) > _FAR * s.resolution
+    return at if size != 0.0 and exact and abs(size) >= _ZEROED * other else None
 
 
 def leapt_together(series: list[Series], all_changes: list[Changes]) -> dict[int, dict[str, float]]:

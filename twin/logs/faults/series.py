@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,7 @@ def temperature_series(run: Run) -> list[Series]:
     if run.temperatures is None:
         return []
     time, columns = run.temperatures.time, run.temperatures.columns
-    return _long_enough([_series("temperatures", n, "degC", time, v, np.arange(len(v))) for n, v in columns.items()])
+    return long_enough([_series("temperatures", n, "degC", time, v, np.arange(len(v))) for n, v in columns.items()])
 
 
 def tcp_series(run: Run) -> list[Series]:
@@ -53,7 +54,7 @@ def tcp_series(run: Run) -> list[Series]:
     group = group.reshape(-1) if place.shape[1] else np.zeros(len(run.tcp.time), dtype=int)
     counts = np.bincount(group)
     rows = [np.flatnonzero(group == g) for g in np.flatnonzero(counts >= ROWS)]
-    return _long_enough([
+    return long_enough([
         _series("tcp", name, "m", run.tcp.time, run.tcp.displacement[:, k], at)
         for k, name in enumerate(COMPONENTS)
         for at in rows
@@ -73,5 +74,6 @@ def _series(table: str, name: str, unit: str, time: np.ndarray, values: np.ndarr
     return Series(table, name, unit, rows, time[rows], values[rows])
 
 
-def _long_enough(series: list[Series]) -> list[Series]:
+def long_enough(series: Iterable[Series]) -> list[Series]:
+    """Those with readings enough to say what is usual."""
     return [s for s in series if len(s.row) >= ROWS]
