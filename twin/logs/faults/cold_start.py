@@ -12,7 +12,7 @@ from twin.logs.faults.series import Series
 from twin.logs.run import Run
 from twin.logs.slips import other_scale
 
-_BEGIN = 5  # readings, whose median is where a channel begins
+_BEGIN = 5  # rows, whose median is where a channel begins
 _FEWEST = 4  # channels, to tell which one is off
 # Of the largest deviation from the median to the next one: at the starts of the clean half of a real lathe, whose
 # thermocouples and resistance sensors differ by 3 K, and of a real spindle, it is at most 1.53
@@ -38,7 +38,7 @@ def begins_apart(run: Run, series: list[Series]) -> Apart | None:
 
     series: the temperatures. Temperatures among the loads count among the others.
     """
-    begin = {s.name: float(np.median(s.values[:_BEGIN])) for s in series if s.row[0] < _BEGIN}
+    begin = {s.name: float(np.median(s.values[s.row < _BEGIN])) for s in series if s.row[0] < _BEGIN}
     air = [v[np.isfinite(v)][:_BEGIN] for n, v in run.loads.columns.items() if run.loads.units[n] == "degC"]
     levels = [*begin.values(), *(float(np.median(v)) for v in air if len(v))]
     if len(levels) < _FEWEST or not begin:

@@ -7,7 +7,7 @@ from typing import Literal
 
 Kind = Literal["noise", "rail", "leap", "rezero", "stuck", "splice", "offset", "offset_or_warm"]
 MEANS: dict[Kind, str] = {  # kind: what happened, and what `size` is
-    "noise": "leaps, and is noise from then on; its typical change from row to row",
+    "noise": "leaps, and is noise from then on; how far its readings typically depart from their neighbours",
     "rail": "leaps to a value that it does not leave, as an open circuit does; that value",
     "leap": "changes within one row by more than heat can; the change",
     "rezero": "leaps to zero: somebody set the probe to zero; the change",

@@ -50,7 +50,7 @@ def _problem(run: Run, same: Sequence[Fault]) -> Problem:
     if f.kind == "rail":
         what = f"{_do(f, 'leap')} to {_size(f)} and {'stay' if len(f.channels) > 1 else 'stays'} there, {during}"
         return warning(what, lines, f"an open or short circuit? {_EMPTY}")
-    what = f"{_do(f, 'leap')} and {'change' if len(f.channels) > 1 else 'changes'} by {_size(f)} from row to row, {during}"
+    what = f"{_do(f, 'leap')} to and fro by {_size(f)} from row to row, {during}"
     return warning(what, lines, f"a broken wire or a loose plug? {_EMPTY}")
 
 
