@@ -21,6 +21,7 @@ from twin.logs.faults.find import faults_of
 from twin.logs.run import Run
 
 CASES = 100  # of each kind and half
+ZEROED = 10e-6  # m, that a probe shows before it is set to zero
 SPINDLE = 16.0  # h, of each half of its recording
 ALL = ("noise", "rail", "leap", "rezero", "splice", "stuck", "offset", "offset_or_warm")
 
@@ -44,6 +45,14 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 def _other(rng: np.random.Generator, run: Run, name: str) -> str:
     assert run.temperatures is not None
     return f"sensors.{rng.choice([n for n in run.temperatures.columns if n != name])}"
+
+
+def _zeroed(rng: np.random.Generator, run: Run, name: str, start: float) -> Damage:
+    """At the first row from a time on at which the probe shows 10 um or more; if there is none, where it shows most."""
+    assert run.tcp is not None
+    shows = np.where(run.tcp.time >= start, np.abs(run.tcp.displacement[:, COMPONENTS.index(name)]), 0.0)
+    row = int(np.argmax(shows >= ZEROED)) if shows.max() >= ZEROED else int(np.argmax(shows))
+    return Damage("measurement", f"tcp.{name}", 0.0, "rezero", start=float(run.tcp.time[row]))
 
 
 KINDS = (
@@ -94,14 +103,14 @@ KINDS = (
         ("splice",),
     ),
     Planted(
-        "probe leaps by 5 .. 100 um",
-        lambda rng, run, n, t: Damage("not_thermal", f"tcp.{n}", 1e-6 * _log_uniform(rng, 5, 100), "step", start=t),
+        "probe leaps by 10 .. 100 um",
+        lambda rng, run, n, t: Damage("not_thermal", f"tcp.{n}", 1e-6 * _log_uniform(rng, 10, 100), "step", start=t),
         ("leap", "rezero"),
         of_tcp=True,
     ),
     Planted(
-        "probe is set to zero",
-        lambda rng, run, n, t: Damage("measurement", f"tcp.{n}", 0.0, "rezero", start=t),
+        "probe is set to zero, 10 um off",
+        _zeroed,
         ("rezero",),
         of_tcp=True,
     ),

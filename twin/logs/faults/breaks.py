@@ -16,6 +16,8 @@ _CALM = {"degC": 5, "m": 20}
 # Of the typical departure from the neighbours in noise, to what 99 % of the rows do not exceed elsewhere, or to the last
 # digit: in 12 clean days of a lathe and 16 h of a spindle no block of rows reaches 1
 _NOISE = 3.0
+# The same, to what the sound readings span: a sensor beside a winding flickers with each cut by a per cent of its rise
+_SPAN = 0.05
 _REST = 10  # rows that a rail lasts at least, and
 _LONGER = 3.0  # times the longest rest of the same channel elsewhere: rounded channels rest, too
 _STUCK = 20  # rows, of a rest that a leap ends
@@ -53,11 +55,19 @@ def noise(s: Series) -> list[Stretch]:
         usual = away[outside & (away > 0.0)]
         if not found or len(usual) < _CALM[s.unit]:
             continue
-        limit = _NOISE * max(float(np.quantile(usual, 0.99)), s.resolution)
+        limit = max(_NOISE * float(np.quantile(usual, 0.99)), _NOISE * s.resolution, _SPAN * _spanned(s.values, found))
         sizes = [float(np.median(away[first : last + 1])) for first, last in found]
         if min(sizes) > limit:
             return [_stretch(*edges, size, len(away)) for edges, size in zip(found, sizes, strict=True)]
     return []
+
+
+def _spanned(values: np.ndarray, noisy: list[tuple[int, int]]) -> float:
+    """The range of the readings outside of stretches of departures, which are those of the rows from the second on."""
+    sound = np.ones(len(values), dtype=bool)
+    for first, last in noisy:
+        sound[first : last + 3] = False
+    return float(np.ptp(values[sound])) if sound.any() else 0.0
 
 
 def _stretch(first: int, last: int, size: float, n: int) -> Stretch:

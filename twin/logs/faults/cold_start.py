@@ -12,7 +12,8 @@ from twin.logs.faults.series import Series
 from twin.logs.run import Run
 from twin.logs.slips import other_scale
 
-_BEGIN = 5  # rows, whose median is where a channel begins
+_BEGIN = 5  # rows; a channel begins apart if it is apart in all of them
+_STAYS = 0.5  # of the size: not a single wrong value
 _FEWEST = 4  # channels, to tell which one is off
 # Of the largest deviation from the median to the next one: at the starts of the clean half of a real lathe, whose
 # thermocouples and resistance sensors differ by 3 K, and of a real spindle, it is at most 1.53
@@ -38,9 +39,10 @@ def begins_apart(run: Run, series: list[Series]) -> Apart | None:
 
     series: the temperatures. Temperatures among the loads count among the others.
     """
-    begin = {s.name: float(np.median(s.values[s.row < _BEGIN])) for s in series if s.row[0] < _BEGIN}
-    air = [v[np.isfinite(v)][:_BEGIN] for n, v in run.loads.columns.items() if run.loads.units[n] == "degC"]
-    levels = [*begin.values(), *(float(np.median(v)) for v in air if len(v))]
+    first = {s.name: s.values[s.row < _BEGIN] for s in series if s.row[0] < _BEGIN}
+    begin = {name: float(values[0]) for name, values in first.items()}
+    air = [v[np.isfinite(v)] for n, v in run.loads.columns.items() if run.loads.units[n] == "degC"]
+    levels = [*begin.values(), *(float(v[0]) for v in air if len(v))]
     if len(levels) < _FEWEST or not begin:
         return None
     name = max(begin, key=lambda n: abs(begin[n] - np.median(levels)))
@@ -49,6 +51,8 @@ def begins_apart(run: Run, series: list[Series]) -> Apart | None:
     usual = float(np.median(others))
     size = begin[name] - usual
     if abs(size) < max(_LEAST, _RATIO * float(np.max(np.abs(np.array(others) - usual)))):
+        return None
+    if np.min((first[name] - usual) / size) < _STAYS:
         return None
     if other_scale(begin[name], usual) or not POSSIBLE[0] < begin[name] < POSSIBLE[1]:
         return None  # told as a slip of the unit, or as a value that no machine has

@@ -75,7 +75,7 @@ def _rails_and_leaps(s: Series, known: Sequence[_Found]) -> list[_Found]:
     found: list[_Found] = []
     at = leaps(s, change)
     if not at and s.table == "tcp" and (zero := set_to_zero(s, change)) is not None:
-        return [_fault("rezero", s, zero, len(s.row) - 1, float(change.excess[zero]))]
+        return [_fault("rezero", s, zero[0], len(s.row) - 1, zero[1])]
     while at:
         (i, size), at = at[0], at[1:]
         back = bool(at) and abs(size + at[0][1]) <= _BACK * max(abs(size), abs(at[0][1]))

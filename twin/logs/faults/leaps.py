@@ -28,8 +28,8 @@ _TOGETHER = 2.0
 _ZEROED = 1.5
 _FAR = 10.0  # last digits from zero, before
 _MOST = 8  # leaps in one channel; with more of them no change is unusual
-# A leap is over in its row: a first-order lag reaches in the next two rows at most 86 % of what it has after four, where
-# its time constant is one row or more. Faster ones look like leaps.
+# A leap is over in its row: of the change to the median of three rows, a first-order lag makes at most 73 % in the first
+# row if its time constant is a row or more. Faster ones look like leaps.
 _AT_ONCE = 0.8
 _PACE = 10  # rows over which the fastest change of a channel is taken, to judge a gap by
 _GAP = 1.5  # usual steps
@@ -39,49 +39,50 @@ _GAP = 1.5  # usual steps
 class Changes:
     """What of each change heat does not explain, and the scale of these amounts where nothing happens."""
 
-    excess: np.ndarray  # (n,) of the change from the row before; 0 within six rows of the ends
+    change: np.ndarray  # (n,) from the three readings before a row to the three from it on, 0 near the ends
+    excess: np.ndarray  # (n,) of that, 0 within six rows of the ends
     usual: float  # what 98 % of them do not exceed, or the last digit
 
 
 def changes(s: Series) -> Changes:
     """How much of each change lies outside of its neighbours. The first and last 2 x 3 rows cannot be judged."""
     n, k = len(s.values), _SIDE
-    excess = np.zeros(n)
+    change, excess = np.zeros(n), np.zeros(n)
     if n <= 4 * k:
-        return Changes(excess, 0.0)
+        return Changes(change, excess, 0.0)
     level = np.median(sliding_window_view(s.values, k), axis=1)  # (n - k + 1,) of the rows i .. i + k - 1
-    change = np.zeros(n)
     change[k : n - k + 1] = level[k:] - level[:-k]
     inner = slice(2 * k, n - 2 * k + 1)
     before, after = change[k : n - 3 * k + 1], change[3 * k : n - k + 1]
     between = np.clip(change[inner], np.minimum(before, after), np.maximum(before, after))
     excess[inner] = change[inner] - between
     excess = np.sign(excess) * np.maximum(np.abs(excess) - _in_gaps(s), 0.0)
-    return Changes(excess, max(float(np.quantile(np.abs(excess), 0.98)), s.resolution))
+    return Changes(change, excess, _usual(s, excess))
 
 
 def leaps(s: Series, c: Changes) -> list[tuple[int, float]]:
     """Index in the series of the first reading after each leap, and its size; in the order of time."""
     peaks = _peaks(c.excess, _MOST + 1)
-    sizes = np.array([abs(c.excess[i]) for i in peaks])
+    sizes = [abs(float(c.excess[i])) for i in peaks] + [0.0]
+    others = c.excess.copy()
     found = 0
-    for m in range(min(_MOST, len(peaks))):
-        other = sizes[m + 1] if m + 1 < len(sizes) else 0.0
-        if sizes[m] >= _RATIO * other and sizes[m] >= _SCALE * c.usual and sizes[m] > 0.0:
+    for m, peak in enumerate(peaks[:_MOST]):
+        others[peak - 1 : peak + 2] = 0.0
+        if sizes[m] >= max(_RATIO * sizes[m + 1], _SCALE * _usual(s, others), 1e-300):
             found = m + 1
     return sorted((at, size) for at, size in (_located(s, c, i) for i in peaks[:found]) if size != 0.0)
 
 
-def set_to_zero(s: Series, c: Changes) -> int | None:
-    """Index of the first reading after a probe was set to zero, where it shows exactly that: the largest change of all
-    ends at zero to the last digit, far from where it was."""
+def set_to_zero(s: Series, c: Changes) -> tuple[int, float] | None:
+    """The first reading after a probe was set to zero, and the leap, where it shows exactly that: the largest change of
+    all ends at zero to the last digit, far from where it was."""
     peaks = _peaks(c.excess, 2)
     if not peaks or abs(c.excess[peaks[0]]) < _TOGETHER * c.usual:
         return None
     at, size = _located(s, c, peaks[0])
     other = abs(c.excess[peaks[1]]) if len(peaks) > 1 else 0.0
     exact = abs(s.values[at]) <= 0.5 * s.resolution and abs(s.values[at - 1]) > _FAR * s.resolution
-    return at if size != 0.0 and exact and abs(size) >= _ZEROED * other else None
+    return (at, size) if size != 0.0 and exact and abs(size) >= _ZEROED * other else None
 
 
 def leapt_together(series: list[Series], all_changes: list[Changes]) -> dict[int, dict[str, float]]:
@@ -106,18 +107,23 @@ def _located(s: Series, c: Changes, peak: int) -> tuple[int, float]:
     near = np.arange(peak - 1, peak + 2)
     steps = s.values[near] - s.values[near - 1]
     best = int(np.argmax(steps * np.sign(c.excess[peak])))
-    done = abs(steps[best]) >= _AT_ONCE * abs(c.excess[peak])
+    done = abs(steps[best]) >= _AT_ONCE * abs(c.change[near[best]])
     return int(near[best]), float(c.excess[peak]) if done else 0.0
 
 
+def _usual(s: Series, excess: np.ndarray) -> float:
+    return max(float(np.quantile(np.abs(excess), 0.98)), s.resolution)
+
+
 def _peaks(excess: np.ndarray, most: int) -> list[int]:
-    """Where the magnitudes are largest, largest first, none within three rows of another."""
-    left = np.abs(excess)
-    found = []
-    while len(found) < most and left.max() > 0.0:
-        i = int(np.argmax(left))
+    """Where the magnitudes are largest, largest first, none within three rows of another of its sign."""
+    left = excess.copy()
+    found: list[int] = []
+    while len(found) < most and left.any():
+        i = int(np.argmax(np.abs(left)))
         found.append(i)
-        left[max(i - _SIDE, 0) : i + _SIDE + 1] = 0.0
+        near = slice(max(i - _SIDE, 0), i + _SIDE + 1)
+        left[near] = np.where(left[near] * left[i] > 0.0, 0.0, left[near])
     return found
 
 

@@ -42,23 +42,23 @@ def temperature_series(run: Run) -> list[Series]:
     if run.temperatures is None:
         return []
     time, columns = run.temperatures.time, run.temperatures.columns
-    return long_enough([_series("temperatures", n, "degC", time, v, np.arange(len(v))) for n, v in columns.items()])
+    return long_enough(_series("temperatures", n, "degC", time, v, np.arange(len(v))) for n, v in columns.items())
 
 
 def tcp_series(run: Run) -> list[Series]:
-    """One per component and place of tcp.csv that has readings enough: places differ, so their rows are no history."""
+    """One per component and place of tcp.csv that has readings enough: rows at other places are another history."""
     if run.tcp is None or not len(run.tcp.time):
         return []
-    place = np.column_stack([run.tcp.position, *run.tcp.angle.values()])
+    n = len(run.tcp.time)
+    place = np.column_stack([np.zeros(n), run.tcp.position, *run.tcp.angle.values()])
     _, group = np.unique(np.round(np.nan_to_num(place) / _PLACE), axis=0, return_inverse=True)
-    group = group.reshape(-1) if place.shape[1] else np.zeros(len(run.tcp.time), dtype=int)
-    counts = np.bincount(group)
-    rows = [np.flatnonzero(group == g) for g in np.flatnonzero(counts >= ROWS)]
-    return long_enough([
+    group = group.reshape(-1)
+    rows = [np.flatnonzero(group == g) for g in np.flatnonzero(np.bincount(group) >= ROWS)]
+    return long_enough(
         _series("tcp", name, "m", run.tcp.time, run.tcp.displacement[:, k], at)
         for k, name in enumerate(COMPONENTS)
         for at in rows
-    ])  # fmt: skip
+    )
 
 
 def beside(series: Series, others: Table | None) -> dict[str, np.ndarray]:

@@ -63,6 +63,8 @@ def _leaps(run: Run, same: Sequence[Fault], path: str) -> Problem:
         ends = f.last_row < len(tables_of(run)[f.table].time) - 1
         what += f" at {_hours(f.first_time)}" + (f" and back after {_hours(f.last_time)}" if ends else "")
     remedy = "a loose sensor, or a probe that was moved? leave its cells empty where it is wrong, or split the run there"
+    if len(f.channels) > 2:
+        remedy = "rows of another time, or a module that they share? look at the plot, and split the run there if so"
     return warning(what, at(path, [s.first_row for s in same]), remedy)
 
 
