@@ -60,7 +60,7 @@ def _check(
     for name, table in tables_of(run).items():
         where = str(run.folder / f"{name}.csv")
         problems += clock_problems(run, name, table, where)
-        told = {c for f in faults if f.table == name for c in f.channels if f.kind in ("noise", "rail", "leap", "splice")}
+        told = {c for f in faults if f.table == name and not f.kind.startswith("offset") for c in f.channels}
         problems += value_problems(table, where, name, wanted if name == "loads" else (), told)
     problems += range_problems(run, signals)
     problems += temperature_slips(run)

@@ -46,7 +46,8 @@ def _problem(run: Run, same: Sequence[Fault]) -> Problem:
     lines = span(path, f.first_row, f.last_row)
     if f.kind == "stuck":
         what = f"{_do(f, 'stand')} still at {_size(f)} while others go on, {during}"
-        return warning(what, lines, "a frozen channel? leave its cells empty if so")
+        remedy = "a frozen channel" if f.table == "temperatures" else "a frozen probe, or one that is read in motion only"
+        return warning(what, lines, f"{remedy}? leave its cells empty if so")
     if f.kind == "rail":
         what = f"{_do(f, 'leap')} to {_size(f)} and {'stay' if len(f.channels) > 1 else 'stays'} there, {during}"
         return warning(what, lines, f"an open or short circuit? {_EMPTY}")
