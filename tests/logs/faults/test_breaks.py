@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.logs.faults.breaks import noise, rail, rest_before
+from twin.logs.faults.breaks import noise, rail, rest_before, rests_by_rounding
 from twin.logs.faults.series import Series
 
 ROWS = np.arange(480)
@@ -73,3 +73,15 @@ def test_the_longest_rest_before_a_leap_was_none():
     assert (found.first, found.last, found.size) == (150, 239, values[150])
     values[300:] = values[300]  # it rests even longer elsewhere
     assert rest_before(series(values), 240) is None
+
+
+def test_a_rounded_channel_that_goes_on_by_one_digit_lost_nothing():
+    turning = np.round(30.0 - ((ROWS - 240) / 400.0) ** 2, 1)
+    last = int(np.flatnonzero(turning == 30.0)[-1])
+    assert rests_by_rounding(series(turning), last)
+    assert not rests_by_rounding(series(np.where(ROWS > last, turning - 0.5, turning)), last)
+    assert not rests_by_rounding(series(turning), len(ROWS) - 1)  # the log ends before it goes on
+    loud = warm(0.3)
+    loud[100:200] = loud[100]
+    loud[200] = loud[100] + 1e-5  # unrounded: by chance
+    assert not rests_by_rounding(series(loud), 199)

@@ -20,6 +20,7 @@ _NOISE = 3.0
 _SPAN = 0.05
 _REST = 10  # rows that a rail lasts at least, and
 _LONGER = 3.0  # times the longest rest of the same channel elsewhere: rounded channels rest, too
+_DIGIT = 1.5  # last digits, between one and two
 _STUCK = 20  # rows, of a rest that a leap ends
 POSSIBLE = (-50.0, 200.0)  # degC: beyond what any sensor on a machine tool can read: a rail, however short
 _SHORT = 3  # rows of such a one
@@ -110,6 +111,14 @@ def rest_before(s: Series, leap: int) -> Stretch | None:
     if leap - first > max(_STUCK, elsewhere):
         return Stretch(first, leap - 1, float(s.values[first]))
     return None
+
+
+def rests_by_rounding(s: Series, last: int) -> bool:
+    """Whether a rest that ends at `last` ends by one digit, in a channel that changes digit by digit: whatever it was,
+    nothing was lost. Rounded channels rest for hours where a temperature turns."""
+    change = np.abs(np.diff(s.values))
+    one = _DIGIT * s.resolution
+    return last < len(change) and change[last] <= one and float(np.median(change[change > 0.0])) <= one
 
 
 def _end_of_rest(values: np.ndarray, first: int) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.logs.faults.breaks import noise, rail, rest_before
+from twin.logs.faults.breaks import noise, rail, rest_before, rests_by_rounding
 from twin.logs.faults.cold_start import begins_apart
 from twin.logs.faults.fault import Fault, Kind
 from twin.logs.faults.leaps import changes, leaps, leapt_together, set_to_zero
@@ -120,7 +120,8 @@ def _stuck(run: Run, series: Sequence[Series]) -> list[_Found]:
     for still in _every_standstill(Table(run.temperatures.time, columns, dict.fromkeys(columns, "degC"))):
         s = named[still.name]
         first, last = (int(np.searchsorted(s.row, row)) for row in (still.first, still.last))
-        found.append(_fault("stuck", s, first, last, still.value))
+        if not rests_by_rounding(s, last):
+            found.append(_fault("stuck", s, first, last, still.value))
     return found
 
 
