@@ -1,4 +1,4 @@
-"""Faults planted into real recordings: how many `twin check` finds, in the right channel and line, and what else it says.
+"""Faults planted into real recordings: how many `twin check` finds in the right channel, and what else it says.
 
 Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. The thresholds were chosen on one half of
 the recordings, days 1, 3, 5 ... of a lathe and hours 0 to 16 of a spindle; the other half was looked at afterwards.
@@ -95,9 +95,7 @@ KINDS = (
     ),
     Planted(
         "is swapped from a time on",
-        lambda rng, run, n, t: Damage(
-            "sensor", f"sensors.{n}", np.nan, "swapped", other=_other(rng, run, n), start=t
-        ),
+        lambda rng, run, n, t: Damage("sensor", f"sensors.{n}", np.nan, "swapped", other=_other(rng, run, n), start=t),
         ("leap",),
     ),
     Planted(
@@ -158,7 +156,9 @@ def clean(runs: Sequence[Run]) -> None:
 def measured(run: Run, of_tcp: bool) -> list[str]:
     """Channels with readings."""
     if of_tcp:
-        return [c for k, c in enumerate(COMPONENTS) if run.tcp is not None and np.isfinite(run.tcp.displacement[:, k]).any()]
+        return [
+            c for k, c in enumerate(COMPONENTS) if run.tcp is not None and np.isfinite(run.tcp.displacement[:, k]).any()
+        ]
     return list(run.temperatures.columns) if run.temperatures is not None else []
 
 
@@ -170,7 +170,9 @@ def row(kind: Planted, runs: Sequence[Run], known: Sequence[set[Told]], rng: np.
         run = runs[k]
         name = str(rng.choice(measured(run, kind.of_tcp)))
         time = run.loads.time
-        planted = kind.draw(rng, run, name, float(rng.uniform(time[0] + 0.1 * np.ptp(time), time[0] + 0.6 * np.ptp(time))))
+        planted = kind.draw(
+            rng, run, name, float(rng.uniform(time[0] + 0.1 * np.ptp(time), time[0] + 0.6 * np.ptp(time)))
+        )
         new = [f for f in faults_of(damaged(run, planted)) if told(f) not in known[k]]
         mine = {name, planted.other.removeprefix("sensors.")}
         own = [f for f in new if f.kind == "splice" or mine & set(f.channels)]

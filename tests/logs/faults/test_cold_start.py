@@ -14,15 +14,15 @@ from twin.logs.run import Run, Table
 TIME = np.arange(0.0, 4 * 3600.0, 60.0)
 
 
-def a_run(rest: float = 1800.0, rounded: int = 2, **offsets: float) -> Run:
+def a_run(rest: float = 1800.0, **offsets: float) -> Run:
     """Six temperatures of a machine that is driven after a rest [s]; offsets [K] by name."""
     rng = np.random.default_rng(4)
     heat = np.clip(TIME - rest, 0.0, None) / 3600.0
     columns = {
-        n: np.round(21.0 + 0.2 * k + (1.0 + k) * heat + offsets.get(n, 0.0) + 0.02 * rng.standard_normal(len(TIME)), rounded)
+        n: 21.0 + 0.2 * k + (1.0 + k) * heat + offsets.get(n, 0.0) + 0.02 * rng.standard_normal(len(TIME))
         for k, n in enumerate("abcdef")
-    }  # fmt: skip
-    loads = {"speed": np.where(TIME > rest, 50.0, 0.0), "air": np.full(len(TIME), 21.0), "x": 0.1 * np.ones(len(TIME))}
+    }
+    loads = {"speed": np.where(rest < TIME, 50.0, 0.0), "air": np.full(len(TIME), 21.0), "x": 0.1 * np.ones(len(TIME))}
     return Run(
         Table(TIME, loads, {"speed": "1/s", "air": "degC", "x": "m"}),
         Table(TIME, columns, dict.fromkeys(columns, "degC")),

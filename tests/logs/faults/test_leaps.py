@@ -48,7 +48,7 @@ def test_a_leap_on_the_way_up_has_its_row_and_size(size, rounded):
 def test_several_leaps_of_one_channel_are_all_found():
     values = noise(0.05)
     for row in (60, 130, 200, 290, 360):
-        values = values + np.where(ROWS >= row, 4.0 if row != 200 else -9.0, 0.0)
+        values = values + np.where(row <= ROWS, 4.0 if row != 200 else -9.0, 0.0)
     assert [row for row, _ in leaps_of(values)] == [60, 130, 200, 290, 360]
 
 

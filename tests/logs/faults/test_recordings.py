@@ -1,4 +1,4 @@
-"""Faults of real recordings, and planted into them: a lathe on 23 days, a spindle for 32 hours. Skipped without the data."""
+"""Faults of real recordings, and planted into them: 23 days of a lathe, 32 hours of a spindle. Skipped without them."""
 
 from __future__ import annotations
 

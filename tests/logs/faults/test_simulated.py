@@ -1,4 +1,4 @@
-"""Faults planted into simulated measurements of the ball screw axis: each is told once, with its channel and its row."""
+"""Faults planted into simulated measurements of the ball screw axis: each told once, with its channel and its row."""
 
 from __future__ import annotations
 

@@ -49,6 +49,8 @@ def _rows(time: np.ndarray, d: Damage) -> tuple[np.ndarray, int]:
     first = int(np.searchsorted(time, d.start))
     later = int(np.searchsorted(time, d.start + d.size))
     if first >= len(time) or later >= len(time):
-        raise LogError(f"no row {d.size:g} s after {d.start:g} s", "--from, SIZE", "give times within what was measured")
+        raise LogError(
+            f"no row {d.size:g} s after {d.start:g} s", "--from, SIZE", "give times within what was measured"
+        )
     rows = np.concatenate([np.arange(first), np.arange(later, len(time))])
     return rows, len(rows)

@@ -13,8 +13,8 @@ _FEWEST = 10  # rows of a block
 # Departures elsewhere, from which on they say what is usual: a rounded temperature has few in slow air, and heat is
 # never noise; a probe may have some while nothing turns, and is louder when something does
 _CALM = {"degC": 5, "m": 20}
-# Of the typical departure from the neighbours in noise, to what 99 % of the rows do not exceed elsewhere, or to the last
-# digit: in 12 clean days of a lathe and 16 h of a spindle no block of rows reaches 1
+# Of the typical departure from the neighbours in noise, to what 99 % of the rows do not exceed elsewhere, or to the
+# last digit: in 12 clean days of a lathe and 16 h of a spindle no block of rows reaches 1
 _NOISE = 3.0
 # The same, to what the sound readings span: a sensor beside a winding flickers with each cut by a per cent of its rise
 _SPAN = 0.05
@@ -38,8 +38,8 @@ class Stretch:
 def noise(s: Series) -> list[Stretch]:
     """Stretches in which readings depart from the mean of their two neighbours far more than anywhere else.
 
-    Heat moves a reading and its neighbours alike. Blocks of rows are parted into calm and loud ones wherever that leaves
-    the loud ones far above all others. Rows without any departure are no measure of what is usual: probes stand still
+    Heat moves a reading and its neighbours alike. Blocks of rows are parted into calm and loud ones wherever that
+    leaves the loud ones far above all others. Rows without any departure are no measure of what is usual: probes stand still
     while nothing turns.
     """
     away = np.abs(s.values[1:-1] - 0.5 * (s.values[:-2] + s.values[2:]))  # (n - 2,) of the rows from the second on

@@ -71,7 +71,7 @@ def rest_at_start(run: Run) -> float:
 
 
 def _cold(series: list[Series], rest: float, size: float) -> bool:
-    """Whether all channels stay where they begin for so long that a place as warm as `size` [K] would be seen to fall."""
+    """Whether all channels stay where they begin so long that a place as warm as `size` [K] would be seen to fall."""
     for s in series:
         during = s.values[s.time <= s.time[0] + rest]
         third = len(during) // 3

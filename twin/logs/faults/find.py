@@ -180,7 +180,7 @@ def _within(fault: Fault, others: Iterable[Fault]) -> bool:
 
 
 def _at_once(a: Fault, b: Fault, near: float) -> bool:
-    """Whether two faults of a kind are one event: they begin and end together, or stand still for much the same time."""
+    """Whether two faults of a kind are one event: they begin and end together, or both stand still most of the time."""
     if a.kind == "stuck":
         both = min(a.last_time, b.last_time) - max(a.first_time, b.first_time)
         return both >= _SAME * max(a.last_time - a.first_time, b.last_time - b.first_time)

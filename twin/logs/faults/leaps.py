@@ -7,6 +7,7 @@ between those of its neighbours, so nothing of it counts, and single wrong value
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,8 +29,8 @@ _TOGETHER = 2.0
 _ZEROED = 1.5
 _FAR = 10.0  # last digits from zero, before
 _MOST = 8  # leaps in one channel; with more of them no change is unusual
-# A leap is over in its row: of the change to the median of three rows, a first-order lag makes at most 73 % in the first
-# row if its time constant is a row or more. Faster ones look like leaps.
+# A leap is over in its row: of the change to the median of three rows, a first-order lag makes at most 73 % in the
+# first row if its time constant is a row or more. Faster ones look like leaps.
 _AT_ONCE = 0.8
 _PACE = 10  # rows over which the fastest change of a channel is taken, to judge a gap by
 _GAP = 1.5  # usual steps
@@ -85,7 +86,7 @@ def set_to_zero(s: Series, c: Changes) -> tuple[int, float] | None:
     return (at, size) if size != 0.0 and exact and abs(size) >= _ZEROED * other else None
 
 
-def leapt_together(series: list[Series], all_changes: list[Changes]) -> dict[int, dict[str, float]]:
+def leapt_together(series: Sequence[Series], all_changes: Sequence[Changes]) -> dict[int, dict[str, float]]:
     """Rows of the table in which most channels leap, three at least: their leaps by name."""
     rows: dict[int, dict[str, float]] = {}
     for s, c in zip(series, all_changes, strict=True):
@@ -103,7 +104,7 @@ def leapt_together(series: list[Series], all_changes: list[Changes]) -> dict[int
 
 
 def _located(s: Series, c: Changes, peak: int) -> tuple[int, float]:
-    """The row of a leap, and its size; a size of zero where the change takes several rows. Medians blur it by one row."""
+    """The row of a leap, and its size: zero where the change takes several rows. Medians blur it by one row."""
     near = np.arange(peak - 1, peak + 2)
     steps = s.values[near] - s.values[near - 1]
     best = int(np.argmax(steps * np.sign(c.excess[peak])))

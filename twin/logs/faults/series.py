@@ -62,7 +62,7 @@ def tcp_series(run: Run) -> list[Series]:
 
 
 def beside(series: Series, others: Table | None) -> dict[str, np.ndarray]:
-    """The columns of another table (n,) at the times of a series: the last reading before each; none without a table."""
+    """The columns of another table (n,) at the times of a series, the last row before each; none without a table."""
     if others is None or not len(others.time):
         return {}
     at = np.clip(np.searchsorted(others.time, series.time, side="right") - 1, 0, None)

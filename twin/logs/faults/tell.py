@@ -41,12 +41,16 @@ def _problem(run: Run, same: Sequence[Fault]) -> Problem:
         return _leaps(run, same, path)
     if f.kind == "rezero":
         what = f"{_do(f, 'leap')} by {_size(f)} to zero at {_hours(f.first_time)}"
-        return warning(what, at(path, [f.first_row]), "was the probe set to zero? add what was lost, or split the run there")
+        return warning(
+            what, at(path, [f.first_row]), "was the probe set to zero? add what was lost, or split the run there"
+        )
     during = f"from {_hours(f.first_time)} to {_hours(f.last_time)}"
     lines = span(path, f.first_row, f.last_row)
     if f.kind == "stuck":
         what = f"{_do(f, 'stand')} still at {_size(f)} while others go on, {during}"
-        remedy = "a frozen channel" if f.table == "temperatures" else "a frozen probe, or one that is read in motion only"
+        remedy = (
+            "a frozen channel" if f.table == "temperatures" else "a frozen probe, or one that is read in motion only"
+        )
         return warning(what, lines, f"{remedy}? leave its cells empty if so")
     if f.kind == "rail":
         what = f"{_do(f, 'leap')} to {_size(f)} and {'stay' if len(f.channels) > 1 else 'stays'} there, {during}"
@@ -63,7 +67,9 @@ def _leaps(run: Run, same: Sequence[Fault], path: str) -> Problem:
     else:
         ends = f.last_row < len(tables_of(run)[f.table].time) - 1
         what += f" at {_hours(f.first_time)}" + (f" and back after {_hours(f.last_time)}" if ends else "")
-    remedy = "a loose sensor, or a probe that was moved? leave its cells empty where it is wrong, or split the run there"
+    remedy = (
+        "a loose sensor, or a probe that was moved? leave its cells empty where it is wrong, or split the run there"
+    )
     if len(f.channels) > 2:
         remedy = "rows of another time, or a module that they share? look at the plot, and split the run there if so"
     return warning(what, at(path, [s.first_row for s in same]), remedy)
