@@ -1,7 +1,8 @@
 """Faults planted into real recordings: how many `twin check` finds in the right channel, and what else it says.
 
 Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. The thresholds were chosen on one half of
-the recordings, days 1, 3, 5 ... of a lathe and hours 0 to 16 of a spindle; the other half was looked at afterwards.
+the recordings, days 1, 3, 5 ... of a lathe and hours 0 to 16 of a spindle; the other half was looked at afterwards, and
+one rule added for what it showed (docs/run_folder.md).
 """
 
 from __future__ import annotations

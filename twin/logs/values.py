@@ -54,7 +54,7 @@ def value_problems(
             continue
         problems += _plausible(column, low, high, unit, where, name)
         if low < high:
-            problems += _outliers(column, held(values), unit, where)
+            problems += _outliers(column, held(values), unit, where, leaps=name == "loads")
     if constant:
         listed = ", ".join(f"'{c}'" for c in constant)
         what = f"{'column' if len(constant) == 1 else 'columns'} {listed} {'is' if len(constant) == 1 else 'are'}"
@@ -86,8 +86,8 @@ def _plausible(column: str, low: float, high: float, unit: str, where: str, name
     return []
 
 
-def _outliers(column: str, values: np.ndarray, unit: str, where: str) -> list[Problem]:
-    """Single values far from all others, and leaps of temperatures."""
+def _outliers(column: str, values: np.ndarray, unit: str, where: str, leaps: bool) -> list[Problem]:
+    """Single values far from all others, and leaps of temperatures among loads: `twin.logs.faults` finds the measured."""
     if len(values) < _LEAST:
         return []
     low, high = np.quantile(values, (0.005, 0.995)) if len(values) >= 400 else np.sort(values)[[1, -2]]
@@ -103,11 +103,11 @@ def _outliers(column: str, values: np.ndarray, unit: str, where: str) -> list[Pr
     there = np.diff(values)
     back = np.where(there[:-1] * there[1:] < 0.0, np.minimum(change[:-1], change[1:]), 0.0)  # of rows 1 .. n - 2
     spikes = np.flatnonzero(back > max(_LEAP, 8.0 * float(np.quantile(back, 0.98)))) + 1
-    leaps = np.flatnonzero(change > max(_LEAP, 20.0 * float(np.quantile(change, 0.98)))) + 1
+    stay = np.flatnonzero(change > max(_LEAP, 20.0 * float(np.quantile(change, 0.98)))) + 1
     if len(spikes):
         what = f"'{column}' leaps by {back[spikes[0] - 1]:.3g} K and back, {times(len(spikes))}"
         return [warning(what, at(where, spikes), "a single wrong value? leave the cell empty if so")]
-    if not len(leaps):
+    if not leaps or not len(stay):
         return []
-    what = f"'{column}' leaps by {change[leaps[0] - 1]:.3g} K, {times(len(leaps))}"
-    return [warning(what, at(where, leaps), "a wrong value, rows of another time, or a loose sensor? look at the plot")]
+    what = f"'{column}' leaps by {change[stay[0] - 1]:.3g} K, {times(len(stay))}"
+    return [warning(what, at(where, stay), "a wrong value, rows of another time, or a loose sensor? look at the plot")]

@@ -17,7 +17,7 @@ from twin.logs.check import check_run
 from twin.logs.faults.fault import MEANS, Fault
 from twin.logs.faults.find import faults_of
 from twin.logs.faults.tell import fault_problems
-from twin.logs.run import Run, Table, Tcp
+from twin.logs.run import Run, Segment, Table, Tcp
 from twin.logs.write import write_run
 
 TIME = np.arange(0.0, 6 * 3600.0, 60.0)
@@ -83,6 +83,13 @@ def test_several_leaps_of_one_channel_are_one_line(sound):
     (told,) = check_run(run)
     assert ", 3 times, first at 2.00 h" in told.what
     assert told.where.endswith("(lines 122, 202, 252)")
+
+
+def test_tests_glued_into_one_log_are_no_splice_where_its_segments_say_so(sound):
+    glued = damaged(sound, Damage("signal", "run", 5400.0, "splice", start=3600.0))
+    assert len(check_run(glued)) == 1
+    halves = (Segment("first", 0.0, 3600.0), Segment("second", 3600.0, 4 * 3600.0))
+    assert check_run(replace(glued, segments=halves)) == []
 
 
 def test_many_names_are_cut_short(sound):

@@ -39,10 +39,10 @@ def noise(s: Series) -> list[Stretch]:
     """Stretches in which readings depart from the mean of their two neighbours far more than anywhere else.
 
     Heat moves a reading and its neighbours alike. Blocks of rows are parted into calm and loud ones wherever that
-    leaves the loud ones far above all others. Rows without any departure are no measure of what is usual: probes stand still
-    while nothing turns.
+    leaves the loud ones far above all others. Rows without any departure are no measure of what is usual: probes stand
+    still while nothing turns.
     """
-    away = np.abs(s.values[1:-1] - 0.5 * (s.values[:-2] + s.values[2:]))  # (n - 2,) of the rows from the second on
+    away = np.abs(s.values[1:-1] - 0.5 * (s.values[:-2] + s.values[2:]))  # (n - 2,) of the second row on
     width = max(_FEWEST, len(away) // _BLOCKS)
     blocks = [away[e : e + width] for e in range(0, len(away) - width + 1, width)]
     levels = sorted({max(float(np.quantile(b, 0.9)), s.resolution) for b in blocks})

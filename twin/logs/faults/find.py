@@ -10,7 +10,7 @@ import numpy as np
 from twin.logs.faults.breaks import noise, rail, rest_before, rests_by_rounding
 from twin.logs.faults.cold_start import begins_apart
 from twin.logs.faults.fault import Fault, Kind
-from twin.logs.faults.leaps import changes, leaps, leapt_together, set_to_zero
+from twin.logs.faults.leaps import Changes, changes, leaps, leapt_together, set_to_zero
 from twin.logs.faults.series import Series, beside, long_enough, tcp_series, temperature_series
 from twin.logs.run import Run, Table
 from twin.logs.stuck import Standstill, standstills
@@ -34,15 +34,17 @@ def faults_of(run: Run) -> list[Fault]:
     """The faults of temperatures.csv and tcp.csv, in the order of table and time.
 
     Each channel is judged by what it does itself elsewhere; series of less than 20 readings, and leaps within six
-    readings of an end, are not. Times must increase, as `read_run` demands. Nothing is changed in the run.
+    readings of an end, are not. Where a segment of the run begins or ends, channels may leap: tests glued into one log.
+    Times must increase, as `read_run` demands. Nothing is changed in the run.
     """
     temperatures, tcp = temperature_series(run), tcp_series(run)
     noisy = [_fault("noise", s, n.first, n.last, n.size) for s in (*temperatures, *tcp) for n in noise(s)]
     temperatures, tcp = (long_enough(_without(s, noisy) for s in series) for series in (temperatures, tcp))
-    found = [*noisy, *_splices(temperatures), *_stuck(run, temperatures), *_stuck_probes(run, tcp)]
+    borders = [t for segment in run.segments for t in (segment.start, segment.end)]
+    found = [*noisy, *_splices(temperatures, borders), *_stuck(run, temperatures), *_stuck_probes(run, tcp)]
     for s in (*temperatures, *tcp):
         known = [f for f in found if f.fault.kind == "splice" or _of(f.fault, s)]
-        leapt = _rails_and_leaps(s, known)
+        leapt = _rails_and_leaps(s, known, borders)
         rails = [f.fault for f in leapt if f.fault.kind == "rail"]
         found = [f for f in found if not _within(f.fault, rails)] + leapt
     if apart := begins_apart(run, temperatures):
@@ -53,8 +55,9 @@ def faults_of(run: Run) -> list[Fault]:
     return sorted(_together(found, order), key=lambda f: (f.table != "temperatures", f.first_row))
 
 
-def _splices(series: Sequence[Series]) -> list[_Found]:
-    together = leapt_together(series, [changes(s) for s in series])
+def _splices(series: Sequence[Series], borders: Sequence[float]) -> list[_Found]:
+    """Rows in which most temperatures leap, but at the borders of segments [s]."""
+    together = leapt_together(series, [_away_from(s, changes(s), borders) for s in series])
     found = []
     for row, sizes in together.items():
         s = next(s for s in series if s.name in sizes and (s.row == row).any())
@@ -65,13 +68,18 @@ def _splices(series: Sequence[Series]) -> list[_Found]:
     return found
 
 
-def _rails_and_leaps(s: Series, known: Sequence[_Found]) -> list[_Found]:
-    """Leaps of one series beside what is known: what begins or ends there is told already."""
-    near = 2.0 * _near(s)
+def _away_from(s: Series, change: Changes, times: Sequence[float]) -> Changes:
+    """The changes of a series, with nothing in excess near some times [s]."""
+    near = np.zeros(len(s.time), dtype=bool)
+    for t in times:
+        near |= np.abs(s.time - t) <= 2.0 * _near(s)
+    return replace(change, excess=np.where(near, 0.0, change.excess))
+
+
+def _rails_and_leaps(s: Series, known: Sequence[_Found], borders: Sequence[float]) -> list[_Found]:
+    """Leaps of one series beside what is known, and the borders of segments [s]: what ends there is told already."""
     ends = [f.fault.first_time if f.fault.kind == "splice" else f.fault.last_time for f in known]
-    told = np.any([np.abs(s.time - t) <= near for t in ends], axis=0) if ends else np.zeros(len(s.time), dtype=bool)
-    change = changes(s)
-    change = replace(change, excess=np.where(told, 0.0, change.excess))
+    change = _away_from(s, changes(s), [*ends, *borders])
     found: list[_Found] = []
     at = leaps(s, change)
     if not at and s.table == "tcp" and (zero := set_to_zero(s, change)) is not None:
@@ -82,7 +90,7 @@ def _rails_and_leaps(s: Series, known: Sequence[_Found]) -> list[_Found]:
         if (stays := rail(s, i)) is not None:
             found.append(_fault("rail", s, i, stays.last, stays.size))
             at = [(k, z) for k, z in at if k > stays.last + 1]
-        elif _told(float(s.time[i]), near, (*known, *found), float(s.time[-1])):
+        elif _told(float(s.time[i]), 2.0 * _near(s), (*known, *found), float(s.time[-1])):
             continue
         elif back:
             found.append(_fault("leap", s, i, at[0][0] - 1, size))

@@ -34,7 +34,9 @@ def _problem(run: Run, same: Sequence[Fault]) -> Problem:
     if f.kind == "splice":
         n, when = len(f.channels), _hours(f.first_time)
         what = f"rows of another time from line {f.first_row + 2} on: at {when} {n} temperatures leap, by {_size(f)}"
-        return warning(what, at(path, [f.first_row]), "split the log there into two runs, or leave the later rows out")
+        return warning(
+            what, at(path, [f.first_row]), "split the log there into two runs, or name its segments in run.toml"
+        )
     if f.kind in ("offset", "offset_or_warm"):
         return _apart(f, path)
     if f.kind == "leap":
