@@ -87,7 +87,7 @@ def _plausible(column: str, low: float, high: float, unit: str, where: str, name
 
 
 def _outliers(column: str, values: np.ndarray, unit: str, where: str, leaps: bool) -> list[Problem]:
-    """Single values far from all others, and leaps of temperatures among loads: `twin.logs.faults` finds the measured."""
+    """Single values far from all others; and leaps of temperatures, which `twin.logs.faults` finds where measured."""
     if len(values) < _LEAST:
         return []
     low, high = np.quantile(values, (0.005, 0.995)) if len(values) >= 400 else np.sort(values)[[1, -2]]

@@ -76,6 +76,18 @@ def test_what_several_channels_do_at_once_is_one_line(sound):
     assert told[1].startswith("'dx', 'dz' stand still at ")
 
 
+def test_rows_at_several_places_are_each_their_own_history(sound):
+    place = np.arange(len(TIME))[:, None] % 3 * 0.1  # m
+    shown = sound.tcp.displacement + np.hstack([200e-6 * place, np.zeros((len(TIME), 2))])
+    run = replace(sound, tcp=replace(sound.tcp, position=place, displacement=shown))
+    assert check_run(run) == []
+    moved = damaged(run, Damage("not_thermal", "tcp.dx", 60e-6, "step", start=7200.0))
+    (fault,) = faults_of(moved)
+    assert (fault.kind, fault.channels, fault.first_row, fault.first_time) == ("leap", ("dx",), 120, 7200.0)
+    scattered = replace(moved, tcp=replace(moved.tcp, position=TIME[:, None] * 1e-5))  # no place twice
+    assert faults_of(scattered) == []
+
+
 def test_several_leaps_of_one_channel_are_one_line(sound):
     run = sound
     for start in (7200.0, 12000.0, 15000.0):

@@ -204,9 +204,11 @@ def _together(found: Sequence[_Found], order: Sequence[str]) -> list[Fault]:
             o = other.fault
             if (f.kind, f.table) == (o.kind, o.table) and _at_once(f, o, max(one.near, other.near)):
                 channels = tuple(sorted({*f.channels, *o.channels}, key=order.index))
-                larger = max(o, f, key=lambda x: abs(x.size))
-                first, last = min(f.first_row, o.first_row), max(f.last_row, o.last_row)
-                both = replace(larger, channels=channels, first_row=first, last_row=last)
+                first, last = min(f, o, key=lambda x: x.first_row), max(f, o, key=lambda x: x.last_row)
+                both = Fault(
+                    f.kind, f.table, channels, first.first_row, last.last_row, first.first_time, last.last_time,
+                    max(f.size, o.size, key=abs), f.unit,
+                )  # fmt: skip
                 merged[k] = replace(other, fault=both)
                 break
         else:
