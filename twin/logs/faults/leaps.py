@@ -17,9 +17,9 @@ from twin.logs.faults.series import Series
 
 # rows on each side of a leap: the fewest of which a median ignores a single wrong value
 _SIDE = 3
-# Of the next two: 12 clean days of a lathe and 16 h of a spindle, 331 channels, reach 2.9 and 5.2, at the start of the
-# spindle and in one channel only; without it 2.1 and 3.5. Tails are far heavier than a normal distribution's, so that
-# the largest other change counts, and not a multiple of a standard deviation alone.
+# Of the next two: 12 clean days of a lathe and 16 h of a spindle, 333 channels, reach 2.9 and 5.2, both one probe at the
+# start of the spindle; all others 2.1 and 3.5, where no probe comes from a rest. Tails are far heavier than a normal
+# distribution's, so that the largest other change counts, and not a multiple of a standard deviation alone.
 _RATIO = 4.0  # of the smallest leap of a channel to its largest other change
 _SCALE = 5.0  # of a leap to what 98 % of the rows do not exceed, or to the last digit
 # The same, where most channels do it in one row: in the recordings above at most 3 of 16 do
