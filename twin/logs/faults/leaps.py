@@ -17,7 +17,7 @@ from twin.logs.faults.series import Series
 
 # rows on each side of a leap: the fewest of which a median ignores a single wrong value
 _SIDE = 3
-# Of the next two: 12 clean days of a lathe and 16 h of a spindle, 333 channels, reach 2.9 and 5.2, both one probe at the
+# Of the next two: 12 clean days of a lathe and 16 h of a spindle, 333 channels, reach 2.9 and 5.2, one probe at the
 # start of the spindle; all others 2.1 and 3.5, where no probe comes from a rest. Tails are far heavier than a normal
 # distribution's, so that the largest other change counts, and not a multiple of a standard deviation alone.
 _RATIO = 4.0  # of the smallest leap of a channel to its largest other change
