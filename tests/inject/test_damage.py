@@ -51,7 +51,7 @@ RUN = a_run()
 A, B = (RUN.temperatures.columns[n] for n in "ab")
 LATE, EARLY = TIME >= 14400.0, TIME < 14400.0
 SETS = replace(RUN, tcp=replace(RUN.tcp, time=(ROWS[::4, None] + [0.0, 60.0, 300.0, 960.0]).ravel()))  # of 4 rows
-SIZES = {"K": 0.6, "s": 1200.0, "1": 0.5, "": math.nan, "m": 4e-6}
+SIZES = {"K": 0.6, "degC": 850.0, "s": 1200.0, "1": 0.5, "": math.nan, "m": 4e-6}
 PLACES = {"sensor": "sensors.a", "signal": "signals.current", "initial_state": "run"}
 
 
@@ -60,6 +60,8 @@ def of_kind(family: str, history: str, **more) -> Damage:
     place = PLACES.get(family, "tcp.dx:x" if history == "frame" else "tcp.dx")
     signal = {"detached": "air", "load": "current"}.get(history, "")
     other = "sensors.b" if history == "swapped" else ""
+    if history == "splice":
+        place, more = "run", {"start": 14400.0, **more}
     return Damage(family, place, SIZES[unit], history, signal, other, **more)
 
 
@@ -72,10 +74,11 @@ def test_one_table_changes_and_is_told_to_be_computed(family, history):
     given = SETS if history == "heating" else RUN
     before = replace(a_run(), tcp=given.tcp)
     after = damaged(given, of_kind(family, history))
-    table = {"sensor": "temperatures", "signal": "loads", "initial_state": "initial_temperature"}.get(family, "tcp")
+    tables = {"sensor": ("temperatures",), "signal": ("loads",), "initial_state": ()}.get(family, ("tcp",))
+    tables = ("temperatures", "tcp") if history == "splice" else tables
     for name in ("loads", "temperatures", "tcp"):
-        assert (getattr(after, name) is getattr(given, name)) == (name != table)
-    assert after.synthetic == (() if family == "initial_state" else (table,))
+        assert (getattr(after, name) is getattr(given, name)) == (name not in tables)
+    assert after.synthetic == tables
     for name in ("a", "b"):  # pure: the run that is given stays
         assert np.array_equal(RUN.temperatures.columns[name], before.temperatures.columns[name])
     assert np.array_equal(RUN.loads.columns["current"], before.loads.columns["current"])
@@ -119,6 +122,42 @@ def test_a_stuck_sensor_keeps_its_value_for_a_time():
     stuck = LATE & (TIME < 15600.0)
     assert set(after[stuck]) == {A[TIME == 14400.0][0]}
     assert np.array_equal(after[~stuck], A[~stuck])
+
+
+def test_a_broken_sensor_is_noise_and_every_copy_of_it_the_same():
+    d = of_kind("sensor", "noise", start=14400.0)
+    wrong = sensor("a", d) - A
+    assert not wrong[EARLY].any()
+    assert np.mean(wrong[LATE]) == pytest.approx(1.2, abs=0.1)
+    assert np.std(wrong[LATE]) == pytest.approx(0.6, abs=0.1)
+    assert np.array_equal(sensor("a", d), sensor("a", d))
+
+
+def test_a_sensor_at_a_rail_shows_one_value():
+    after = sensor("a", of_kind("sensor", "rail", start=14400.0))
+    assert set(after[LATE]) == {850.0}
+    assert np.array_equal(after[EARLY], A[EARLY])
+
+
+def test_spliced_rows_are_of_a_later_time_under_stamps_that_go_on():
+    d = replace(of_kind("signal", "splice"), size=3600.0)
+    after = damaged(RUN, d)
+    first, lost = int(np.argmax(LATE)), 60  # rows of temperatures
+    assert np.array_equal(after.temperatures.time, TIME[:-lost])
+    assert np.array_equal(after.temperatures.columns["a"], np.concatenate([A[:first], A[first + lost :]]))
+    kept = np.delete(np.arange(len(ROWS)), [8, 9])  # measured from 4 h on, every half hour
+    assert np.array_equal(after.tcp.time, ROWS[:-2])
+    assert np.array_equal(after.tcp.displacement, RUN.tcp.displacement[kept])
+    assert np.array_equal(after.tcp.position, RUN.tcp.position[kept])
+    for wrong, told in (
+        (replace(d, start=-math.inf), "begin somewhere"),
+        (replace(d, size=1e6), "no row"),
+        (replace(d, place="signals.current"), "no such place"),
+    ):
+        with pytest.raises(LogError, match=told):
+            damaged(RUN, wrong)
+    with pytest.raises(LogError, match="nothing is measured"):
+        damaged(replace(RUN, temperatures=None, tcp=None), d)
 
 
 def test_swapped_sensors():
@@ -165,6 +204,22 @@ def test_a_stuck_sensor_is_free_again_at_the_end_of_the_fault():
 def displacement(d: Damage, run: Run = RUN) -> np.ndarray:
     """um, what has been added."""
     return 1e6 * (damaged(run, d).tcp.displacement - run.tcp.displacement)
+
+
+def test_a_device_that_is_set_to_zero_counts_from_there():
+    d = replace(of_kind("measurement", "rezero", start=14400.0), size=0.0)
+    shown = damaged(RUN, d).tcp.displacement[:, 0]
+    before, late = RUN.tcp.displacement[:, 0], ROWS >= 14400.0
+    assert shown[late][0] == 0.0
+    assert np.diff(shown[late]) == pytest.approx(np.diff(before[late]))
+    assert np.array_equal(shown[~late], before[~late])
+
+
+def test_a_stuck_device_keeps_its_value_for_a_time():
+    shown = damaged(RUN, replace(of_kind("measurement", "stuck", start=14400.0), size=7200.0)).tcp.displacement[:, 0]
+    before, stuck = RUN.tcp.displacement[:, 0], (ROWS >= 14400.0) & (ROWS < 21600.0)
+    assert shown[stuck] == pytest.approx(before[stuck][0])
+    assert np.array_equal(shown[~stuck], before[~stuck])
 
 
 def test_a_play_stays_behind_until_it_is_used_up():

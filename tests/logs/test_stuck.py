@@ -90,6 +90,14 @@ def test_a_leap_that_stays_is_found():
     assert found.where.endswith("(line 402)")
 
 
+def test_an_air_temperature_among_the_loads_that_leaps():
+    time = np.arange(600.0)
+    air = np.round(20.0 + 0.5 * np.sin(time / 90.0), 2)
+    for leap, says in ((0.0, []), (5.0, ["'air' leaps by 5 K, once"])):
+        loads = Table(time, {"air": air + np.where(time >= 400.0, leap, 0.0)}, {"air": "degC"})
+        assert [p.what for p in check_run(Run(loads))] == says
+
+
 def test_outlier_of_a_load():
     run = loaded(RAM)[0]
     power = run.loads.columns["spindle_power"].copy()

@@ -9,6 +9,8 @@ import numpy as np
 from twin.errors import Problem
 from twin.logs.clocks import clock_problems
 from twin.logs.currents import current_problems
+from twin.logs.faults.find import faults_of
+from twin.logs.faults.tell import fault_problems
 from twin.logs.found import warning
 from twin.logs.motion import motion_problems
 from twin.logs.refuse import refusals, tables_of, usual_step
@@ -17,7 +19,7 @@ from twin.logs.sampling_rule import Needed
 from twin.logs.shift import drive_shifts, table_shifts
 from twin.logs.signals import SignalLike, signal_problems
 from twin.logs.slips import range_problems, slip_problems, stroke_problems, temperature_slips
-from twin.logs.stuck import stuck_loads, stuck_temperatures
+from twin.logs.stuck import stuck_loads
 from twin.logs.values import value_problems
 from twin.nearest import did_you_mean
 
@@ -54,10 +56,12 @@ def _check(
     refused = refusals(run)
     problems = [*signal_problems(run, signals), *refused]
     wanted = {s.column for s in signals}
+    faults = [] if refused else faults_of(run)
     for name, table in tables_of(run).items():
         where = str(run.folder / f"{name}.csv")
         problems += clock_problems(run, name, table, where)
-        problems += value_problems(table, where, name, wanted if name == "loads" else ())
+        told = {c for f in faults if f.table == name and not f.kind.startswith("offset") for c in f.channels}
+        problems += value_problems(table, where, name, wanted if name == "loads" else (), told)
     problems += range_problems(run, signals)
     problems += temperature_slips(run)
     problems += current_problems(run, signals)
@@ -69,8 +73,7 @@ def _check(
         problems += slip_problems(run, signals, where)
         problems += drive_shifts(run.loads, where)
         problems += stuck_loads(run.loads, where)
-        if run.temperatures is not None:
-            problems += stuck_temperatures(run.temperatures, str(run.folder / "temperatures.csv"))
+        problems += fault_problems(run, faults)
         problems += table_shifts(run)
     return [*problems, *_names(run, axes, sensors)]
 

@@ -156,15 +156,20 @@ def temperature_slips(run: Run) -> list[Problem]:
     for (name, column), first in begin.items():
         where = str(run.folder / f"{name}.csv")
         others = usual if len(known) > 1 else 20.0
-        fahrenheit = {"degF, not degC": (first - 32.0) / 1.8, "degC, not degF": first * 1.8 + 32.0}
-        near = [text for text, value in fahrenheit.items() if abs(value - others) < 6.0]
-        if abs(first - others) > 20.0 and near:
-            what = f"'{column}' begins at {first:.1f} degC, the others at {others:.1f}: it may be in {near[0]}"
+        if near := other_scale(first, others):
+            what = f"'{column}' begins at {first:.1f} degC, the others at {others:.1f}: it may be in {near}"
             problems.append(warning(what, where, "fix the unit in the header"))
         elif not _START[0] < usual < _START[1] and first == usual:
             what = f"'{column}' begins at {first:.1f} degC, and half of the temperatures are no lower"
             problems.append(warning(what, where, "check the unit: degC, degF or K?"))
     return problems
+
+
+def other_scale(first: float, others: float) -> str:
+    """The scale that a temperature [degC] far from others [degC] may be in: "degF, not degC"; "" where none fits."""
+    fahrenheit = {"degF, not degC": (first - 32.0) / 1.8, "degC, not degF": first * 1.8 + 32.0}
+    near = [text for text, value in fahrenheit.items() if abs(value - others) < 6.0]
+    return near[0] if abs(first - others) > 20.0 and near else ""
 
 
 def range_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:

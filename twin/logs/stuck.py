@@ -80,16 +80,6 @@ def frozen_throughout(tables: Sequence[Table]) -> list[tuple[int, Standstill]]:
     return found
 
 
-def stuck_temperatures(table: Table, where: str) -> list[Problem]:
-    """Warnings about temperatures that stand still."""
-    problems = []
-    for s in standstills(table):
-        what = f"'{s.name}' stands still at {s.value:g} degC while others go on"
-        remedy = f"about {s.expected:.0f} changes were to be expected: a frozen channel? leave its cells empty if so"
-        problems.append(warning(what, span(where, s.first, s.last), remedy))
-    return problems
-
-
 def stuck_loads(loads: Table, where: str) -> list[Problem]:
     """Warnings about channels of one drive that contradict each other: speed without motion, motion without speed,
     currents, torques and powers to the last digit the same while the drive turns."""

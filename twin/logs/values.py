@@ -21,10 +21,13 @@ _LEAP = 2.0  # K from one row to the next, in a channel that usually changes by 
 _LEAST = 20
 
 
-def value_problems(table: Table, where: str, name: str, wanted: Collection[str] = ()) -> list[Problem]:
+def value_problems(
+    table: Table, where: str, name: str, wanted: Collection[str] = (), told: Collection[str] = ()
+) -> list[Problem]:
     """Warnings about the values of one table: "loads", "temperatures" or "tcp".
 
-    wanted: columns that a machine reads; without any value they are errors, as they are on running.
+    wanted: columns that a machine reads; without any value they are errors, as they are on running. told: columns
+    whose large values other findings tell already.
     """
     problems = []
     constant: list[str] = []
@@ -47,9 +50,11 @@ def value_problems(table: Table, where: str, name: str, wanted: Collection[str] 
             elif len(values) >= 100 and (name == "temperatures" or _siblings_change(table, column)):
                 what = f"column '{column}' never changes ({low:g} {unit})"
                 problems.append(warning(what, where, "a stuck or detached sensor? leave it out if so"))
+        if column in told:
+            continue
         problems += _plausible(column, low, high, unit, where, name)
         if low < high:
-            problems += _outliers(column, held(values), unit, where)
+            problems += _outliers(column, held(values), unit, where, leaps=name == "loads")
     if constant:
         listed = ", ".join(f"'{c}'" for c in constant)
         what = f"{'column' if len(constant) == 1 else 'columns'} {listed} {'is' if len(constant) == 1 else 'are'}"
@@ -81,8 +86,8 @@ def _plausible(column: str, low: float, high: float, unit: str, where: str, name
     return []
 
 
-def _outliers(column: str, values: np.ndarray, unit: str, where: str) -> list[Problem]:
-    """Single values far from all others, and leaps of temperatures."""
+def _outliers(column: str, values: np.ndarray, unit: str, where: str, leaps: bool) -> list[Problem]:
+    """Single values far from all others; and leaps of temperatures, which `twin.logs.faults` finds where measured."""
     if len(values) < _LEAST:
         return []
     low, high = np.quantile(values, (0.005, 0.995)) if len(values) >= 400 else np.sort(values)[[1, -2]]
@@ -98,11 +103,11 @@ def _outliers(column: str, values: np.ndarray, unit: str, where: str) -> list[Pr
     there = np.diff(values)
     back = np.where(there[:-1] * there[1:] < 0.0, np.minimum(change[:-1], change[1:]), 0.0)  # of rows 1 .. n - 2
     spikes = np.flatnonzero(back > max(_LEAP, 8.0 * float(np.quantile(back, 0.98)))) + 1
-    leaps = np.flatnonzero(change > max(_LEAP, 20.0 * float(np.quantile(change, 0.98)))) + 1
+    stay = np.flatnonzero(change > max(_LEAP, 20.0 * float(np.quantile(change, 0.98)))) + 1
     if len(spikes):
         what = f"'{column}' leaps by {back[spikes[0] - 1]:.3g} K and back, {times(len(spikes))}"
         return [warning(what, at(where, spikes), "a single wrong value? leave the cell empty if so")]
-    if not len(leaps):
+    if not leaps or not len(stay):
         return []
-    what = f"'{column}' leaps by {change[leaps[0] - 1]:.3g} K, {times(len(leaps))}"
-    return [warning(what, at(where, leaps), "a wrong value, rows of another time, or a loose sensor? look at the plot")]
+    what = f"'{column}' leaps by {change[stay[0] - 1]:.3g} K, {times(len(stay))}"
+    return [warning(what, at(where, stay), "a wrong value, rows of another time, or a loose sensor? look at the plot")]

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from twin.errors import LogError
-from twin.inject.damage import sensors, signals, tcp
+from twin.inject.damage import rows, sensors, signals, tcp
 from twin.inject.damage.channels import Damage
 from twin.logs.run import Run
 from twin.nearest import did_you_mean
@@ -49,18 +49,23 @@ DAMAGES: dict[str, dict[str, Kind]] = {
         "lag": Kind(sensors.lag, "s", "follows with this time constant"),
         "detached": Kind(sensors.detached, "1", "shows its surroundings (--signal) by this share", True),
         "stuck": Kind(sensors.stuck, "s", "keeps its value for this time"),
+        "noise": Kind(sensors.noise, "K", "reads too much by twice this, with noise of this"),
+        "rail": Kind(sensors.rail, "degC", "shows this, whatever it measures"),
         "swapped": Kind(sensors.swapped, "", "has the name of this sensor, which has its name"),
     },
     "signal": {
         "factor": Kind(signals.factor, "1", "is logged too large by this factor"),
         "averaged": Kind(signals.averaged, "s", "is logged as means over this time"),
         "clock": Kind(signals.clock, "s", "is stamped too late by this"),
+        "splice": Kind(rows.splice, "s", "holds rows of a time later by this from its start on"),
     },
     "slip": {"play": Kind(tcp.slip, "m", "a support has this play")},
     "initial_state": {"offset": Kind(signals.initial_state, "K", "the stated temperature is too high by this")},
     "measurement": {
         "drift": Kind(tcp.drift, "m", "the device drifts linearly, in all by this"),
         "frame": Kind(tcp.frame, "1", "reads more in proportion to the axis position, by this per metre"),
+        "stuck": Kind(tcp.stuck, "s", "keeps its value for this time"),
+        "rezero": Kind(tcp.rezero, "m", "is set to this at its start"),
         "heating": Kind(tcp.heating, "m", "grows by this from the first to the last row of every measurement"),
     },
     "not_thermal": {

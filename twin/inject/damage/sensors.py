@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 
 import numpy as np
 
@@ -54,6 +55,24 @@ def stuck(run: Run, d: Damage) -> Run:
     if kept.any():
         values[kept] = values[np.flatnonzero(kept)[0]]
     return with_sensors(run, {name: values})
+
+
+def noise(run: Run, d: Damage) -> Run:
+    """Its wire breaks: reads too much by twice the size, with noise of the size as its standard deviation.
+
+    The noise is that of the sensor's name: the same in every copy.
+    """
+    table, name = sensor_of(run, d.place)
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    wrong = d.size * (2.0 + rng.standard_normal(len(table.time)))
+    return with_sensors(run, {name: table.columns[name] + wrong * acts(table.time, d)})
+
+
+def rail(run: Run, d: Damage) -> Run:
+    """Shows the size [degC], whatever it measures: an open or a short circuit."""
+    table, name = sensor_of(run, d.place)
+    values = table.columns[name]
+    return with_sensors(run, {name: np.where(acts(table.time, d) & np.isfinite(values), d.size, values)})
 
 
 def swapped(run: Run, d: Damage) -> Run:

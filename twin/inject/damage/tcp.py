@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +47,26 @@ def slip(run: Run, d: Damage) -> Run:
 def drift(run: Run, d: Damage) -> Run:
     """The measuring device drifts linearly."""
     return with_tcp(run, d, grown(tcp_time(run), d))
+
+
+def rezero(run: Run, d: Damage) -> Run:
+    """The measuring device is set to the size at the start of the fault, and counts from there."""
+    time, c = tcp_time(run), component(d.place)
+    assert run.tcp is not None
+    during = acts(time, d) & np.isfinite(run.tcp.displacement[:, c])
+    lost = d.size - run.tcp.displacement[np.argmax(during), c] if during.any() else 0.0
+    return with_tcp(run, replace(d, size=1.0), lost * acts(time, d))
+
+
+def stuck(run: Run, d: Damage) -> Run:
+    """The measuring device keeps, for the size [s], what it shows at the start of the fault."""
+    time, c = tcp_time(run), component(d.place)
+    assert run.tcp is not None
+    shows = run.tcp.displacement[:, c]
+    first = time[0] if d.start == -math.inf else d.start
+    kept = (time >= first) & (time < min(first + d.size, d.end)) & np.isfinite(shows)
+    lost = np.where(kept, shows[np.argmax(kept)] - shows, 0.0)
+    return with_tcp(run, replace(d, size=1.0), lost)
 
 
 def heating(run: Run, d: Damage) -> Run:
