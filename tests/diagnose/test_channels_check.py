@@ -89,3 +89,21 @@ def test_a_run_at_rest_is_not_a_frozen_channel():
     work, rest = temperatures(resolution=0.1), {name: np.full(len(TIME), 21.0) for name in NAMES}
     runs = [Run(Table(TIME, {}, {}), Table(TIME, own, dict.fromkeys(own, "degC"))) for own in (work, rest)]
     assert stuck_sensors(runs, NAMES, ["work", "rest"])[1] == []
+
+
+def test_a_sensor_that_breaks_is_named_and_left_out_of_what_is_fitted():
+    from tests.logs.faults.test_usable import changed, made
+    from twin.diagnose.channels_check import broken_sensors
+
+    run = made()
+    broken = run.temperatures.columns["t3"].copy()
+    broken[200:] = 850.0
+    leapt = run.temperatures.columns["t1"].copy()
+    leapt[300:] += 7.0
+    runs = [changed(changed(run, "t3", broken), "t1", leapt), made(2)]
+    causes = broken_sensors(runs, ("t1", "t3"), ("monday", "tuesday"))
+    assert {(c.place, c.history) for c in causes} == {("sensors.t1", "leap"), ("sensors.t3", "broken")}
+    assert {w.run for c in causes for w in c.windows} == {"monday"}
+    (leap,) = (c for c in causes if c.history == "leap")
+    assert abs(leap.amplitude - 7.0) < 0.5
+    assert broken_sensors(runs, ("t0",), ("monday", "tuesday")) == []

@@ -1,4 +1,4 @@
-"""Temperature channels that are at fault without any model: stuck ones, found before anything is fitted."""
+"""Temperature channels that are at fault without any model: stuck and broken ones, found before anything is fitted."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnose.diagnosis import Cause, Window
+from twin.logs.faults.usable import BROKEN, usable
 from twin.logs.run import Run, Table
 from twin.logs.stuck import Standstill, frozen_throughout, standstills
 
@@ -24,6 +25,25 @@ def stuck_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[s
     tables, more = _emptied(tables, whole, sensors, names)
     causes = sorted([*causes, *more], key=lambda c: names.index(c.windows[0].run))
     return [replace(run, temperatures=tables.get(k)) for k, run in enumerate(runs)], causes
+
+
+def broken_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[str]) -> list[Cause]:
+    """A cause for each sensor that breaks or leaps within a run, of the size of its first leap: `measured` leaves out
+    what it shows from then on."""
+    causes = []
+    for run, name in zip(runs, names, strict=True):
+        told = set[str]()
+        for f in usable(run)[1]:
+            for channel in (c for c in f.channels if f.kind in BROKEN and c in sensors and c not in told):
+                told.add(channel)
+                window = Window(name, f.first_time, f.last_time)
+                history = "leap" if f.kind == "leap" else "broken"
+                size = f.size if f.kind == "leap" else float("nan")
+                causes.append(
+                    Cause("sensor", f"sensors.{channel}", "", size, (size, size), "K", float("inf"), 0.0,
+                          history=history, windows=(window,))
+                )  # fmt: skip
+    return causes
 
 
 def _emptied(

@@ -13,7 +13,7 @@ from twin.build.cache import arrays_hash, cached, machine_hash
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
 from twin.diagnose.catalogue import FAMILIES, VERSION, Family
-from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.channels_check import broken_sensors, stuck_sensors
 from twin.diagnose.coarse import too_coarse
 from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
@@ -154,6 +154,7 @@ def diagnose(
     names = run_names([*runs, *sealed])
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
+    faults += broken_sensors(usable, sensors, names[: len(runs)])
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     found = search(detector, measured_of(study))
     verdict, causes = verdict_of(found, settings.families)

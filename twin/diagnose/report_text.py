@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,6 +34,7 @@ WHAT: dict[str, str] = {
     "misplaced_source": "a source declared at the wrong surface",
     "not_thermal": "a deviation that is not thermal",
 }
+SEEN = ("stuck", "leap", "broken")  # histories of sensors at fault that are seen before anything is fitted
 _KINDS = {
     "sensors": "sensor", "signals": "signal", "films": "film", "contacts": "contact", "environment": "surroundings",
     "sources": "source", "materials": "material", "parts": "part", "scales": "scale", "runs": "run", "tanks": "tank",
@@ -171,7 +173,10 @@ def verdict_sentence(d: Diagnosis) -> str:
 
 
 def _strained_words(d: Diagnosis) -> str:
-    numbers = {c.place: pull_words(p, c.ci95) for c in d.causes if (p := pull_of(d, c))}
+    numbers = {
+        c.place: pull_words(replace(p, value=p.nominal * c.amplitude), c.ci95)
+        for c in d.causes if (p := pull_of(d, c))
+    }  # fmt: skip
     besides = [cause_words(c) for c in d.causes if c.place not in numbers]
     if not numbers:
         return joined(besides or [pull_words(p) for p in beyond(d.pulls, 3.0)[:3]]) or "see the pulls"
@@ -253,9 +258,15 @@ def evidence_sentence(d: Diagnosis, family: str, statistic: float, threshold: fl
 
 def cause_evidence(d: Diagnosis, c: Cause) -> str:
     """What speaks for a cause; a rate of chance only where it was judged by what synthetic measurements gave."""
-    if c.history == "stuck":  # seen before anything was fitted
+    if c.history in SEEN:  # before anything was fitted
         longest = max((w.end - w.start for w in c.windows), default=math.nan)
-        return f"Its reading stood still for {number(longest / 3600.0)} h; no statistic is needed to see that."
+        at = min((w.start for w in c.windows), default=math.nan)
+        what = {
+            "stuck": f"Its reading stood still for {number(longest / 3600.0)} h",
+            "leap": f"Its reading leapt by {number(c.amplitude)} K at {number(at / 3600.0)} h, faster than heat can",
+            "broken": f"Its reading is noise, or at a limit, from {number(at / 3600.0)} h on",
+        }[c.history]
+        return f"{what}; no statistic is needed to see that."
     if c.threshold == d.thresholds.get(c.family, c.threshold):
         return evidence_sentence(d, c.family, c.statistic, c.threshold)
     # a declared number: both are squares of standard deviations, of the fit where it was freed of its tolerance

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.errors import LogError
+from twin.logs.faults.usable import aside_words, usable
 from twin.logs.run import Run, Table
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
@@ -77,9 +78,11 @@ def measured(
 ) -> Measured:
     """The measurements of a run beside a drive of it. exclude: sensors left out.
 
-    Raises LogError where a run holds nothing that the model predicts.
+    What `twin.logs.faults.usable` sets aside is missing. Raises LogError where a run holds nothing that the model
+    predicts.
     """
-    skipped: list[str] = []
+    run, aside = usable(run)
+    skipped = [f"set aside: {aside_words(f)}" for f in aside]
     edges = drive.time
     table = run.temperatures
     sensors = [s for s in model.sensors if table is not None and s in table.columns and s not in exclude]
