@@ -148,7 +148,8 @@ def checked_artefact(path: Path) -> tuple[Artefact, tuple[str, ...]]:
 
 def _plain(e: Exception) -> str:
     text = str(e.args[0] if e.args else e)
-    return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'" else text
+    quoted = len(text) > 1 and text[0] == text[-1] and text[0] in "\"'" and text[0] not in text[1:-1]
+    return text[1:-1] if quoted else text or type(e).__name__
 
 
 def _as_written(f: h5py.File, path: Path) -> tuple[str, tuple[str, ...]]:

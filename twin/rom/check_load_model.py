@@ -1,6 +1,7 @@
-"""Does everything in a load model point to something: signals, environments, ports, laws, and are its numbers possible?
+"""Does everything in a load model point to something: signals, environments, ports, and are its numbers possible?
 
-Types are checked where the JSON is read (`twin.rom.from_json`); here what needs more than one entry to be seen.
+Types are checked where the JSON is read (`twin.rom.from_json`), laws where they are evaluated (`twin.rom.check_laws`:
+who reads an artefact must not wait for JAX); here what needs more than one entry to be seen.
 """
 
 from __future__ import annotations
@@ -10,8 +11,7 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 from twin.nearest import did_you_mean
-from twin.physics.laws import LAWS
-from twin.rom.load_model import Film, Joint, LawUse, LoadModel, Pair, Source
+from twin.rom.load_model import Film, Joint, LoadModel, Pair, Source
 from twin.rom.model import AffineBody
 from twin.rom.parameter import Parameter
 
@@ -43,7 +43,7 @@ def check_load_model(load: LoadModel) -> str:
         _pair(pair, f"pairs[{k}]", load, signals)
     return (
         f"{len(load.signals)} signals, {len(load.sources)} sources, {len(load.films)} films, {len(load.joints)} "
-        f"joints, {len(load.pairs)} pairs on {len(load.rails)} rails: laws, names, indices and bounds of values"
+        f"joints, {len(load.pairs)} pairs on {len(load.rails)} rails: types, names, indices and bounds"
     )
 
 
@@ -85,29 +85,9 @@ def _known(names: Iterable[str], signals: set[str], where: str) -> None:
             raise KeyError(f"'load_model.{where}' reads '{name}': {did_you_mean(name, signals, 'signals')}")
 
 
-def _law(use: LawUse, kind: str, where: str, signals: set[str]) -> None:
-    """A law of this kind, all its arguments given, none that it does not have, parameters within their bounds."""
-    law = LAWS.get(use.law)
-    if law is None or law.kind != kind:
-        known = [name for name, other in LAWS.items() if other.kind == kind]
-        raise KeyError(f"'load_model.{where}': unknown law '{use.law}': {did_you_mean(use.law, known, 'laws')}")
-    lacking = [n for n, a in law.parameters.items() if a.default is None and n not in use.parameters]
-    lacking += [name for name in law.signals if name not in use.signals]
-    foreign = [name for name in use.parameters if name not in law.parameters]
-    foreign += [name for name in use.signals if name not in law.signals and name not in law.states]
-    if lacking or foreign:
-        what = f"lacks '{lacking[0]}'" if lacking else f"has no '{foreign[0]}'"
-        raise KeyError(f"'load_model.{where}': the law '{use.law}' {what}")
-    for name, value in use.parameters.items():
-        bounds = law.parameters[name]
-        if not bounds.low <= value <= bounds.high:
-            raise KeyError(f"'load_model.{where}.{name}' is {value:g}, not {bounds.low:g} .. {bounds.high:g}")
-    _known(use.signals.values(), signals, where)
-
-
 def _source(source: Source, load: LoadModel, signals: set[str]) -> None:
     where = f"sources.{source.name}"
-    _law(source.use, "loss", where, signals)
+    _known(source.use.signals.values(), signals, where)
     if source.contact and source.contact not in load.contacts:
         raise KeyError(f"'load_model.{where}' heats the contact '{source.contact}', which no pair has")
     if not 0.0 <= source.rail_share <= 1.0:
@@ -116,7 +96,7 @@ def _source(source: Source, load: LoadModel, signals: set[str]) -> None:
 
 def _film(film: Film, environments: int, signals: set[str]) -> None:
     where = f"films.{film.name}"
-    _law(film.use, "film", where, signals)
+    _known(film.use.signals.values(), signals, where)
     check_index(film.environment, environments, f"load_model.{where}.environment")
     check_index(film.radiant, environments, f"load_model.{where}.radiant")
     if film.gain < 0.0 or not 0.0 <= film.emissivity <= 1.0 or not 0.0 <= film.low <= film.high:
