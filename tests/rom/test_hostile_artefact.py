@@ -145,7 +145,10 @@ EDITS = {
     "NUL in a port": (told("load_model", "ports", 0, value="x\0y"), "holds control characters"),
     "an unknown key": (told("load_model", "sources", 0, "gian", value=2.0), "a Source has no 'gian'"),
     "a negative conductance": (told("load_model", "pairs", 0, "conductance", value=-1.0), "a conductance below 0"),
-    "a reference in kelvin": (put("reference_temperature", lambda t: t + 273.15), "reference_temperature' is 293.15"),
+    "a reference in kelvin": (
+        put("reference_temperature", lambda t: t + 273.15),
+        "reference_temperature': 293.15 degC is no temperature of a machine: in kelvin?",
+    ),
     "substeps by the billion": (told("certificate/json", "substeps", value=10**9), "1e+09 substeps"),
     "poses of another grid": (put("pose_position", lambda p: p[::-1].copy()), "'pose_position' is not that of"),
     "an unknown law": (

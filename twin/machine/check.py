@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from twin.errors import Problem
 from twin.machine.check_lumped import lumped_oddities
 from twin.machine.description import Machine, Material
+from twin.machine.size import asked
 from twin.machine.wiring import law_use
 from twin.physics.laws import LAWS
 
@@ -40,6 +41,7 @@ def check_machine(machine: Machine) -> list[Problem]:
     problems += _joints(machine)
     problems += _encoders(machine)
     problems += _unused(machine)
+    problems += asked(machine)
     return problems
 
 

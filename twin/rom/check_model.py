@@ -14,18 +14,20 @@ import numpy as np
 
 from twin.rom.check_load_model import check_index
 from twin.rom.model import AffineBody, MachineModel
+from twin.units import machine_temperature
 
 EXACT = 1e-9  # of the terms of a sum: shipped machines are within 1e-13, and a wrong matrix is off by its own size
 SLACK = 1e-9  # of the largest entry: a semidefinite matrix has eigenvalues of -1e-17 of it, by rounding
 SOLVABLE = 1e12  # condition of an oblique capacity: four digits of a solution are left
-COLDEST, HOTTEST = -60.0, 200.0  # degC of a reference: 293.15 is kelvin, and 0 K is nowhere
 
 
 def check_model(model: MachineModel) -> tuple[str, ...]:
     """One line per body that says what was checked. Raises KeyError for the first thing that cannot be."""
     load = model.load_model
-    if not COLDEST <= model.reference_temperature <= HOTTEST:
-        raise KeyError(f"'reference_temperature' is {model.reference_temperature:g} degC")
+    try:
+        machine_temperature(model.reference_temperature)
+    except ValueError as e:
+        raise KeyError(f"'reference_temperature': {e}") from None
     _indices(model)
     _poses(model)
     return tuple(_body(body, len(load.films)) for body in model.bodies)

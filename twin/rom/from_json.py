@@ -13,10 +13,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from twin.rom.names import has_control_characters
-
-# No quantity that an artefact holds as JSON comes near in SI: spring stiffnesses reach 1e10 N/m. Beyond it a product of
-# a few overflows, and sums lose what they are added to.
-LARGEST = 1e15
+from twin.units import LARGEST
 
 
 def filled(kind: Any, value: Any, where: str) -> Any:
@@ -98,7 +95,7 @@ def _plain(kind: Any, value: Any, where: str) -> Any:
 
 
 def _of(kind: type, value: Any, where: str) -> Any:
-    if not isinstance(value, kind):
+    if not isinstance(value, (list, tuple) if kind is list else kind):  # tuples: what is not yet written
         raise TypeError(f"'{where}': {_shown(value)} is no {'object' if kind is dict else 'list'}")
     return value
 
