@@ -89,7 +89,7 @@ def _nodes(machine: Machine, part: str) -> float:
     """Nodes of quadratic tetrahedra."""
     entry = machine.parts[part]
     if entry.box is not None:
-        return math.prod(2.0 * n + 1.0 for n in entry.box.divisions)
+        return math.prod(2.0 * max(n, 0) + 1.0 for n in entry.box.divisions)
     path = machine.folder / str(entry.mesh)
     return path.stat().st_size * NODES_PER_BYTE if path.is_file() else 0.0
 

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from twin.rom.hdf5_file import floats, put, scale, text
+from twin.units import LARGEST
 
 MOST_SUBSTEPS = 10_000  # of a step: builds choose up to some tens, and a step of a day would still be one of 9 s
 
@@ -60,7 +61,7 @@ def read_certificate(group: h5py.Group) -> dict[str, Any]:
         raise KeyError("'certificate/json' is no object")
     for name in ("step", "finest_step", "substeps"):
         value = told.get(name, 1)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= LARGEST:
             raise KeyError(f"'certificate/json' has a {name} that is no number above 0")
     substeps = told.get("substeps", 1)
     if substeps != int(substeps) or substeps > MOST_SUBSTEPS:

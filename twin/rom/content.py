@@ -145,8 +145,10 @@ def _texts(value: Any) -> Any:
 def _targets(value: Any, file: h5py.h5g.GroupID, paths: dict[int, str]) -> Any:
     """References (nested, beside numbers) as JSON values: the paths of what they point to."""
     if isinstance(value, h5py.Reference):
-        # what was removed from the file is pointed to still
-        return paths.get(h5py.h5o.get_info(h5py.h5r.dereference(value, file)).addr, "")
+        try:
+            return paths.get(h5py.h5o.get_info(h5py.h5r.dereference(value, file)).addr, "")
+        except (KeyError, OSError, RuntimeError, ValueError):  # to what was removed from the file
+            return ""
     if isinstance(value, np.integer):
         return int(value)
     return [_targets(v, file, paths) for v in value]

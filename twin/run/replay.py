@@ -23,6 +23,7 @@ from twin.rom.tcp import by_body, is_exact, tcp_at
 from twin.run.checkpoint import CheckpointFolder, Steps, chain
 from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalanced
 from twin.run.results import Result
+from twin.run.step_length import refuse_step_length
 from twin.run.stepping import Inputs, advance, inputs_of, observe
 from twin.run.system import Prepared, prepare
 
@@ -47,10 +48,11 @@ def replay(
     `twin.run.results.read_final_state`); by default the run's own initial temperature, else the first mean of its
     surroundings.
 
-    Raises LogError for missing signals and bad times, TwinError for checkpoints of another run, FailedCheck for results
-    that cannot be (`twin.run.plausible`).
+    Raises LogError for missing signals and bad times, TwinError for checkpoints of another run, and steps longer than
+    the log or too many, FailedCheck for results that cannot be (`twin.run.plausible`).
     """
     model = artefact.model
+    refuse_step_length(run.loads.time, dt, model.n + 3 * len(model.poses) + len(model.sensors))
     signals = signal_values(run, model.load_model.signals)
     drive = evaluate(model.load_model, run.loads.time, signals, dt)
     if initial is None:
