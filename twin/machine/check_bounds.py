@@ -40,8 +40,9 @@ def _corners(machine: Machine, signals: tuple[str, ...], at_top: Load) -> tuple[
     """A load with one sample per corner of the ranges of these signals, all others at their upper bounds."""
     names = tuple(dict.fromkeys(signals))[:MOST_SIGNALS]
     ends = [(_low(machine, name, at_top), float(at_top.signals[name][0])) for name in names]
-    corners = np.array(list(itertools.product(*ends))).reshape(-1, len(names))
-    n = len(corners)
+    visited = list(itertools.product(*ends))
+    n = len(visited)
+    corners = np.array(visited, dtype=float).reshape(n, len(names))
     values = {name: np.full(n, float(value[0])) for name, value in at_top.signals.items()}
     values |= {name: corners[:, k] for k, name in enumerate(names)}
     return Load(np.arange(float(n)), values, at_top.told, at_top.states), names
