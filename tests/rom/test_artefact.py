@@ -3,9 +3,6 @@
 import dataclasses
 import hashlib
 import re
-import resource
-import signal
-from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 import synthetic
+from full_disk import full_disk
 
 from twin.errors import ArtefactError, TwinError
 from twin.rom.artefact import SurfaceField, read_artefact, write_artefact
@@ -191,23 +189,6 @@ def test_a_matrix_that_does_not_fit_is_named(path):
         f["bodies/body_2/P"] = np.zeros((2, 2))
 
     assert "bodies/body_2/P" in refuse(damaged(path, replace)).what
-
-
-@contextmanager
-def full_disk():
-    """Files cannot grow beyond 10 kB, as on a disk that is full.
-
-    Not a fixture: the limit holds for the process, and pytest reports a test before it tears its fixtures down, so a
-    session whose output goes to a file of more than 10 kB would die of it.
-    """
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-        signal.signal(signal.SIGXFSZ, handler)
 
 
 def test_a_full_disk_leaves_the_old_file_and_nothing_else(path):
