@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from twin.atomic import atomic_path
 from twin.errors import DescriptionError, Problem
@@ -205,6 +205,4 @@ def _partial(data: dict[str, Any], sound: dict[str, Any], folder: Path) -> Machi
 
 
 def _entry(kind: Any, value: Any) -> Any:
-    if value is None or not (isinstance(kind, type) and issubclass(kind, BaseModel)):
-        return value
-    return kind.model_validate(value)
+    return None if value is None else TypeAdapter(kind).validate_python(value)
