@@ -59,7 +59,7 @@ def read_body(group: h5py.Group, name: str, n_poses: int) -> AffineBody:
     values that are not finite.
     """
     where = f"bodies/{name}"
-    indices = {part: tuple(int(i) for i in integers(group, part, where)) for part in _INDICES}
+    indices: dict[str, Any] = {part: tuple(int(i) for i in integers(group, part, where)) for part in _INDICES}
     members = texts(group, "member", where) if "member" in group else ()
     n, inputs = len(floats(group, "one", where)), len(floats(group, "W", where)) if "W" in group else 0
     sizes = {"equation": n, "state": n, "pose": n_poses, "component": 3, "member": len(members)}
@@ -72,4 +72,4 @@ def read_body(group: h5py.Group, name: str, n_poses: int) -> AffineBody:
         wanted = tuple(sizes[dim] for dim in dims)
         if value.shape != wanted:
             raise KeyError(f"'{where}/{part}' has shape {value.shape}, not {wanted} ({', '.join(dims)})")
-    return AffineBody(name=name, members=members, **indices, **{**values, "A": tuple(values["A"])})
+    return AffineBody(name=name, members=members, **(indices | values | {"A": tuple(values["A"])}))
