@@ -296,3 +296,21 @@ def test_the_check_of_a_certificate_that_failed(tmp_path, capsys):
     write_artefact(tmp_path / "a.h5", MODEL, certificate={"passed": False, "step": 60.0})
     assert run(["info", "--check", str(tmp_path / "a.h5")]) == 1
     assert "errors above the limits of the machine" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("edit", "what"),
+    [
+        (put(A0, lambda a: -a), "body_0/A0' lets temperatures grow: a rate of "),
+        (put("bodies/body_0/A", lambda a: -a), "body_0/A' lets temperatures grow: a rate of "),
+        (put(E, lambda e: 0.0 * e), "body_0/E' cannot be solved with"),
+        (put("bodies/body_0/P_out", lambda p: 2.0 * p), "body_0/P' is not 1 K of a body that is 1 K warm"),
+    ],
+)
+def test_an_oblique_projection_is_checked_too(tmp_path, edit, what):
+    path = synthetic_run.artefact(tmp_path / "a.h5", synthetic.oblique(MODEL))
+    assert read_artefact(path).model.bodies[0].symmetric is False
+    with h5py.File(path, "r+") as f:
+        edit(f)
+        stamp(f)
+    assert what in str(refusal(path))

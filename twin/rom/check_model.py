@@ -3,7 +3,7 @@
 Every projection keeps the field that is 1 K everywhere, so these hold to rounding whatever the machine: conduction
 does not see it, films see their area, sensors and ports read 1 K, a watt fed in is a watt. A Galerkin projection
 besides keeps symmetry and definiteness, which make the model stable for every film, conductance and position; an
-oblique one does not, and is held to a capacity that can be solved with.
+oblique one does not, and is held to a capacity that can be solved with and to rates that do not grow.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ def _body(body: AffineBody, n_films: int) -> str:
     if body.symmetric:
         for name, matrix in zip(names, terms, strict=True):
             _semidefinite(matrix, f"{where}/{name}", strictly=name == "E")
-    elif not np.linalg.cond(body.E) < SOLVABLE:
-        raise KeyError(f"'{where}/E' cannot be solved with")
+    else:
+        _stable(body, where)
     left = body.left_one
     worst = max(
         _equal(body.E.T @ left, body.energy, body.E.T, left, f"{where}/energy", "the heat capacity E of 1 K"),
@@ -94,8 +94,22 @@ def _body(body: AffineBody, n_films: int) -> str:
         _equal(body.C @ body.one, 1.0, body.C, body.one, f"{where}/C", "1 K of a body that is 1 K warm"),
         *(_shares(body, name, where) for name in ("E", "G", "W")),
     )
-    kind = "E symmetric and positive definite, A0, A symmetric and semidefinite" if body.symmetric else "E solvable"
+    kind = (
+        "E symmetric and positive definite, A0, A symmetric and semidefinite"
+        if body.symmetric
+        else "E solvable, no rate that grows"
+    )
     return f"{body.name}: {body.n} states; {kind}; 1 K and 1 W kept to {worst:.0e}"
+
+
+def _stable(body: AffineBody, where: str) -> None:
+    """An oblique body: E can be solved with, and nothing grows while conduction and all terms (at 1 each) are there."""
+    if not np.linalg.cond(body.E) < SOLVABLE:
+        raise KeyError(f"'{where}/E' cannot be solved with")
+    for name, matrix in (("A0", body.A0), ("A", body.A0 + sum(body.A, np.zeros_like(body.A0)))):
+        rates = np.linalg.eigvals(np.linalg.solve(body.E, matrix))
+        if rates.real.min(initial=0.0) < -SLACK * np.abs(rates).max(initial=0.0):
+            raise KeyError(f"'{where}/{name}' lets temperatures grow: a rate of {-rates.real.min():.2g} 1/s")
 
 
 def _film(body: AffineBody, k: int, n_films: int, where: str) -> float:
