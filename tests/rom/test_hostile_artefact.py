@@ -301,8 +301,8 @@ def test_the_check_of_a_certificate_that_failed(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("edit", "what"),
     [
-        (put(A0, lambda a: -a), "body_0/A0' lets temperatures grow: a rate of "),
-        (put("bodies/body_0/A", lambda a: -a), "body_0/A' lets temperatures grow: a rate of "),
+        (put(A0, lambda a: -a), "body_0/A0' and 'A' let temperatures grow: a rate of "),
+        (put("bodies/body_0/A", lambda a: -a), "body_0/A0' and 'A' let temperatures grow: a rate of "),
         (put(E, lambda e: 0.0 * e), "body_0/E' cannot be solved with"),
         (put("bodies/body_0/P_out", lambda p: 2.0 * p), "body_0/P' is not 1 K of a body that is 1 K warm"),
     ],

@@ -9,6 +9,7 @@ oblique one does not, and is held to a capacity that can be solved with and to r
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -30,7 +31,9 @@ def check_model(model: MachineModel) -> tuple[str, ...]:
         raise KeyError(f"'reference_temperature': {e}") from None
     _indices(model)
     _poses(model)
-    return tuple(_body(body, len(load.films)) for body in model.bodies)
+    joints = [joint.conductance for joint in load.joints]
+    ends = [np.array([*(getattr(film, end) for film in load.films), *joints]) for end in ("low", "high")]
+    return tuple(_body(body, len(load.films), ends) for body in model.bodies)
 
 
 def _indices(model: MachineModel) -> None:
@@ -71,7 +74,8 @@ def _poses(model: MachineModel) -> None:
         raise KeyError("'pose_position' is not that of the grids")
 
 
-def _body(body: AffineBody, n_films: int) -> str:
+def _body(body: AffineBody, n_films: int, ends: Sequence[np.ndarray]) -> str:
+    """ends: coefficients (n_theta,) that the model is certified for."""
     where = f"bodies/{body.name}"
     terms = [body.E, body.A0, *body.A]
     names = ["E", "A0", *(f"A[{k}]" for k in range(len(body.A)))]
@@ -79,7 +83,7 @@ def _body(body: AffineBody, n_films: int) -> str:
         for name, matrix in zip(names, terms, strict=True):
             _semidefinite(matrix, f"{where}/{name}", strictly=name == "E")
     else:
-        _stable(body, where)
+        _stable(body, ends, where)
     left = body.left_one
     worst = max(
         _equal(body.E.T @ left, body.energy, body.E.T, left, f"{where}/energy", "the heat capacity E of 1 K"),
@@ -102,14 +106,15 @@ def _body(body: AffineBody, n_films: int) -> str:
     return f"{body.name}: {body.n} states; {kind}; 1 K and 1 W kept to {worst:.0e}"
 
 
-def _stable(body: AffineBody, where: str) -> None:
-    """An oblique body: E can be solved with, and nothing grows while conduction and all terms (at 1 each) are there."""
+def _stable(body: AffineBody, ends: Sequence[np.ndarray], where: str) -> None:
+    """An oblique body: E can be solved with, and nothing grows at certified coefficients; without its joints it may."""
     if not np.linalg.cond(body.E) < SOLVABLE:
         raise KeyError(f"'{where}/E' cannot be solved with")
-    for name, matrix in (("A0", body.A0), ("A", body.A0 + sum(body.A, np.zeros_like(body.A0)))):
-        rates = np.linalg.eigvals(np.linalg.solve(body.E, matrix))
+    for theta in ends:
+        terms = sum((theta[k] * a for k, a in zip(body.theta, body.A, strict=True)), np.zeros_like(body.A0))
+        rates = np.linalg.eigvals(np.linalg.solve(body.E, body.A0 + terms))
         if rates.real.min(initial=0.0) < -SLACK * np.abs(rates).max(initial=0.0):
-            raise KeyError(f"'{where}/{name}' lets temperatures grow: a rate of {-rates.real.min():.2g} 1/s")
+            raise KeyError(f"'{where}/A0' and 'A' let temperatures grow: a rate of {-rates.real.min():.2g} 1/s")
 
 
 def _film(body: AffineBody, k: int, n_films: int, where: str) -> float:
