@@ -143,6 +143,8 @@ EDITS = {
     "a truth value as gain": (told("load_model", "sources", 0, "gain", value=True), "True is no number"),
     "NUL in a name": (told("load_model", "sources", 0, "name", value="x\0y"), "holds control characters"),
     "NUL in a port": (told("load_model", "ports", 0, value="x\0y"), "holds control characters"),
+    "a date as a number": (lambda f: f.attrs.__setitem__("created", 1), "attribute 'created' is no bytes"),
+    "an escape in the machine's name": (lambda f: f.attrs.__setitem__("name", "\x1b[2J"), "attribute 'name' is no str"),
     "an unknown key": (told("load_model", "sources", 0, "gian", value=2.0), "a Source has no 'gian'"),
     "a negative conductance": (told("load_model", "pairs", 0, "conductance", value=-1.0), "a conductance below 0"),
     "a reference in kelvin": (

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
@@ -24,6 +24,7 @@ from twin.rom.field_file import SurfaceField, read_field, write_field
 from twin.rom.hdf5_file import floats, integers, member, put, put_attributes, scale, text, texts, writing
 from twin.rom.load_model import LoadModel
 from twin.rom.model import AffineBody, MachineModel
+from twin.rom.names import has_control_characters
 from twin.rom.parameter import Parameter
 from twin.rom.structure_file import read_structure, write_structure
 from twin.rom.tcp import is_exact, refuse_other_structure
@@ -31,6 +32,7 @@ from twin.rom.tcp import is_exact, refuse_other_structure
 FORMAT = "twin artefact"
 SCHEMA_VERSION = 3
 
+_Text = TypeVar("_Text", str, bytes)
 _PAPERS = ("certificate", "fields", "description", "parameters")  # what results do not depend on
 
 
@@ -211,7 +213,7 @@ def _read(f: h5py.File, digest: str) -> tuple[Artefact, tuple[str, ...]]:
     environments = integers(f, "ambient_sensor_environment").tolist()
     bodies = member(f, "bodies")
     model = MachineModel(
-        name=str(f.attrs["name"]),
+        name=_attribute(f, "name", str),
         bodies=tuple(read_body(member(bodies, name, "bodies"), name, len(poses)) for name in names),
         load_model=load,
         reference_temperature=float(floats(f, "reference_temperature")),
@@ -233,10 +235,18 @@ def _read(f: h5py.File, digest: str) -> tuple[Artefact, tuple[str, ...]]:
         provenance={str(k): str(v) for k, v in member(f, "provenance").attrs.items()},
         fields=_fields(member(f, "fields"), model),
         parameters=_parameters(f, load, model.bodies),
-        created=f.attrs["created"].decode(),
+        created=_attribute(f, "created", bytes).decode("ascii"),
         digest=digest,
     )
     return artefact, tuple(told)
+
+
+def _attribute(f: h5py.File, name: str, kind: type[_Text]) -> _Text:
+    """An attribute of the root. Raises KeyError where it is of another type, or holds control characters."""
+    value = f.attrs[name]
+    if not isinstance(value, kind) or (isinstance(value, str) and has_control_characters(value)):
+        raise KeyError(f"attribute '{name}' is no {kind.__name__} without control characters")
+    return value
 
 
 def _fields(group: h5py.Group, model: MachineModel) -> tuple[SurfaceField, ...]:
