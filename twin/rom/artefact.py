@@ -26,6 +26,7 @@ from twin.rom.load_model import LoadModel
 from twin.rom.model import AffineBody, MachineModel
 from twin.rom.names import has_control_characters
 from twin.rom.parameter import Parameter
+from twin.rom.seal import is_broken, sealed
 from twin.rom.structure_file import read_structure, write_structure
 from twin.rom.tcp import is_exact, refuse_other_structure
 
@@ -67,7 +68,7 @@ def write_artefact(
     Raises TwinError if the file cannot be written.
     """
     created = created or datetime.now(UTC)
-    with writing(Path(path)) as f:
+    with writing(Path(path), sealed) as f:
         put_attributes(f, {"format": FORMAT, "schema_version": SCHEMA_VERSION, "name": model.name})
         f.attrs["created"] = np.bytes_(created.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))  # fixed length
         put(f, "reference_temperature", float(model.reference_temperature), "degC")
@@ -133,11 +134,14 @@ def checked_artefact(path: Path) -> tuple[Artefact, tuple[str, ...]]:
     if not path.is_file():
         what = "is a folder, not an artefact" if path.is_dir() else "no such file"
         raise ArtefactError(what, str(path), f"check the path, or {rebuild}")
-    with path.open("rb") as start:
-        signature = start.read(8)
-    if signature != b"\x89HDF\r\n\x1a\n":
-        raise ArtefactError("not an HDF5 file", str(path), "give an artefact written by `twin build`")
     try:
+        content = path.read_bytes()
+        if not content.startswith(b"\x89HDF\r\n\x1a\n"):
+            raise ArtefactError("not an HDF5 file", str(path), "give an artefact written by `twin build`")
+        if is_broken(content):
+            what = "damaged: its bytes have changed since it was written"
+            raise ArtefactError(what, str(path), f"copy it again, or {rebuild}")
+        del content
         with h5py.File(path, "r") as f:
             digest, told = _as_written(f, path)
             artefact, more = _read(f, digest)

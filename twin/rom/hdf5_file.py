@@ -6,7 +6,7 @@ while closing. Default library version bounds: files with libver="latest" are un
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,10 @@ from twin.rom.names import has_control_characters
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[h5py.File]:
+def writing(path: Path, finish: Callable[[bytes], bytes] = bytes) -> Iterator[h5py.File]:
     """An open, empty HDF5 file that is written to `path` when the block ends without an error.
+
+    finish: what becomes of its bytes before.
 
     Raises TwinError if the disk is full or the folder cannot be written.
     """
@@ -29,7 +31,7 @@ def writing(path: Path) -> Iterator[h5py.File]:
         f.flush()
         image = f.id.get_file_image()
     with atomic_path(path) as temporary:
-        temporary.write_bytes(image)
+        temporary.write_bytes(finish(image))
 
 
 def put(
