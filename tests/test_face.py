@@ -207,3 +207,13 @@ def test_check_lists_mistakes_instead_of_raising(tmp_path):
     assert not findings.ok
     assert "nodes.housing.area" in findings.problems[0].where
     assert twin.check(twin.load(SPINDLE)).ok
+
+
+def test_a_simulated_run_names_the_machine_it_was_made_for(tmp_path):
+    folder = tmp_path / "below" / "truth"
+    simulated = twin.simulate(SPINDLE, WARM_UP, folder)
+    assert (folder / simulated.machine).resolve() == SPINDLE / "machine.toml"
+    assert not Path(simulated.machine).is_absolute()
+    findings = twin.check(folder)
+    assert findings.ok
+    assert findings.facts["machine"] == "spindle"

@@ -1,6 +1,7 @@
 """Errors a user can act on: what is wrong, where, and the remedy.
 
-The command line prints them in one block and exits with status 2; no traceback.
+The command line prints them in one block and exits with their status: 2 where the input is bad, 1 where a check of what
+was computed has failed; no traceback.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ class Problem:
 class TwinError(Exception):
     """An error with a remedy; `problems` holds one entry per independent mistake."""
 
+    status = 2  # of the command
+
     def __init__(self, what: str, where: str = "", remedy: str = "", problems: tuple[Problem, ...] = ()):
         self.problems = problems or (Problem(what, where, remedy),)
         super().__init__(what)
@@ -49,6 +52,12 @@ class LogError(TwinError):
 
 class ArtefactError(TwinError):
     """An artefact cannot be read."""
+
+
+class FailedCheck(TwinError):
+    """What was computed cannot be: it is not given out."""
+
+    status = 1
 
 
 class ModelError(TwinError):

@@ -18,6 +18,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pint
 
+# No quantity of a machine comes near in SI: stiffnesses reach 1e10 N/m, Young's moduli 1e12 Pa. Beyond it a product
+# of a few overflows, and sums lose what they are added to.
+LARGEST = 1e15
+# degC of a machine and what surrounds it: 293.15 is 20 degC in kelvin, and below absolute zero there is nothing.
+COLDEST, HOTTEST = -60.0, 200.0
+_ABSOLUTE_ZERO = -273.15  # degC
+
 _ANGLES = {
     "radian",
     "degree",
@@ -167,6 +174,8 @@ def to_si(value: float | int | str, unit: str) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a number or a string with a unit of {unit or '1'}")
+    if isinstance(value, int) and abs(value) > LARGEST:
+        raise ValueError(f"a whole number of {value.bit_length()} bits is beyond all reason")
     if not isinstance(value, str):
         number = float(value)
     elif match := _QUANTITY.fullmatch(value):
@@ -175,7 +184,23 @@ def to_si(value: float | int | str, unit: str) -> float:
         raise ValueError(f"'{value}' is not a quantity in {unit or '1'}")
     if not math.isfinite(number):
         raise ValueError(f"'{value}' is not a finite number")
+    if abs(number) > LARGEST:
+        raise ValueError(f"{number:g} {unit} is beyond all reason")
     return number
+
+
+def machine_temperature(value: float) -> float:
+    """The value [degC], where a machine or its surroundings can have it.
+
+    Raises ValueError with what was probably meant.
+    """
+    if COLDEST <= value <= HOTTEST:
+        return value
+    celsius = value + _ABSOLUTE_ZERO
+    if value > HOTTEST and COLDEST <= celsius <= HOTTEST:
+        raise ValueError(f"{value:g} degC is no temperature of a machine: in kelvin? write '{value:g} K'")
+    below = ": it is below absolute zero" if value < _ABSOLUTE_ZERO else ""
+    raise ValueError(f"{value:g} degC is no temperature of a machine, {COLDEST:g} .. {HOTTEST:g} degC{below}")
 
 
 def _convert(number: float, written: str, unit: str, whole: str) -> float:

@@ -12,6 +12,7 @@ from twin.cli.main import run as twin
 from twin.logs.write import write_run
 from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact, write_artefact
+from twin.rom.content import stamp
 
 
 @pytest.fixture(scope="module")
@@ -150,5 +151,6 @@ def test_an_old_artefact_without_parameters_says_what_to_do(folder, tmp_path, ca
     write_artefact(old, bare, a.description, {"step": 60.0}, a.provenance)
     with h5py.File(old, "a") as f:
         del f["parameters"]
+        stamp(f)
     assert twin(["calibrate", str(old), str(folder / "truth"), "-o", str(tmp_path / "B.h5")]) == 2
     assert "build it again" in capsys.readouterr().err

@@ -227,3 +227,9 @@ def test_key_lines_number_arrays_of_tables():
 def test_copy_of_folder_reads_alike(tmp_path):
     shutil.copytree(SLIDE.parent, tmp_path / "copy")
     assert load_machine(tmp_path / "copy").parts == load_machine(SLIDE).parts
+
+
+@pytest.mark.parametrize(("written", "positions"), [("5.0", 5), ('["-200 mm", 0, "0.1 m"]', (-0.2, 0.0, 0.1))])
+def test_poses_as_whole_floats_and_with_units(tmp_path, written, positions):
+    machine = load_machine(edited(tmp_path, ("x = 5", f"x = {written}")))
+    assert machine.poses == {"x": positions}

@@ -14,6 +14,7 @@ import pytest
 
 from twin.errors import ArtefactError
 from twin.rom.artefact import read_artefact
+from twin.rom.content import stamp
 from twin.rom.tcp import by_body, tcp_at, tcp_over, tcp_rows
 
 
@@ -58,6 +59,7 @@ def test_a_damaged_structure_is_refused(slide_artefact, tmp_path: Path, damage: 
     path = Path(shutil.copy(slide_artefact, tmp_path / "a.h5"))
     with h5py.File(path, "r+") as f:
         DAMAGE[damage](f)
+        stamp(f)
     with pytest.raises(ArtefactError, match=r"structure") as refused:
         read_artefact(path)
     assert "a.h5" in str(refused.value)

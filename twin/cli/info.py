@@ -10,14 +10,28 @@ import click
 @click.command(epilog="Example: twin info out/five_axis.h5 --json")
 @click.argument("artefact", type=click.Path())
 @click.option("--json", "as_json", is_flag=True, help="machine-readable")
-def command(artefact: str, as_json: bool) -> None:
-    """Show orders, poses, parameters with their certified ranges, certificate and provenance of ARTEFACT."""
+@click.option("--check", is_flag=True, help="check the file and say what was checked, instead")
+def command(artefact: str, as_json: bool, check: bool) -> int:
+    """Show orders, poses, parameters with their certified ranges, certificate and provenance of ARTEFACT.
+
+    --check: exit status 0 if it is as it was written and its model can be, 1 if its certificate says that it failed,
+    2 if it is damaged. Every command that reads an artefact makes the same checks.
+    """
     import json
 
-    from twin.face.model import read
+    from twin.face.model import check_artefact, read
 
-    told = read(artefact).facts()
-    click.echo(json.dumps(told, indent=2) if as_json else text(told))
+    if check:
+        told = check_artefact(artefact)
+        certificate = read(artefact).certificate
+        failed = certificate.get("passed") is False
+        verdict = "above" if failed else "within"
+        told = (*told, f"certificate: {f'errors {verdict} the limits of the machine' if certificate else 'none'}")
+        click.echo(json.dumps({"checked": told, "failed": failed}, indent=2) if as_json else "\n".join(told))
+        return int(failed)
+    facts = read(artefact).facts()
+    click.echo(json.dumps(facts, indent=2) if as_json else text(facts))
+    return 0
 
 
 def text(told: dict[str, Any]) -> str:

@@ -113,7 +113,9 @@ def run(arguments: list[str]) -> int:
         if "--traceback" in arguments:
             traceback.print_exc()
         click.echo(message, err=True)
-        return 130 if isinstance(e, KeyboardInterrupt | click.Abort) else 2
+        if isinstance(e, KeyboardInterrupt | click.Abort):
+            return 130
+        return e.status if isinstance(e, TwinError) else 2
 
 
 def _message(e: BaseException) -> str | None:

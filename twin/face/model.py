@@ -156,6 +156,25 @@ def read(model: Model | str | Path) -> Model:
     return Model(read_artefact(Path(model)), str(model))
 
 
+def check_artefact(path: str | Path) -> tuple[str, ...]:
+    """One line per check that the artefact in a file passes, with what was found.
+
+    Raises ArtefactError, or DescriptionError for its laws, at the first that it does not.
+
+    >>> import twin
+    >>> from twin.face.model import check_artefact
+    >>> twin.build("tests/machines/spindle").save("out/spindle.h5")
+    Model(source='out/spindle.h5')
+    >>> check_artefact("out/spindle.h5")[-1]
+    'laws: 4 losses, 3 films: laws known, arguments given, parameters within bounds'
+    """
+    from twin.rom.artefact import checked_artefact
+    from twin.rom.check_laws import check_laws
+
+    artefact, told = checked_artefact(Path(path))
+    return (*told, f"laws: {check_laws(artefact.model.load_model)}")
+
+
 def refuse_other_files(path: Path) -> None:
     """Raises TwinError where `path` is no place for an artefact: no file, not writable, or a file of another kind."""
     import h5py

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from twin.face.result import Result
     from twin.logs.run import Run
 
-COLDEST, HOTTEST = -60.0, 200.0  # degC at a start; 20 K and 293 degC are slips
-
 
 @dataclass(frozen=True)
 class Checkpoints:
@@ -100,6 +98,7 @@ def _start(model: Model, initial: Result | np.ndarray | Quantity | None) -> floa
     """The temperature [degC] or state (N,) that `initial` means."""
     from twin.face.result import Result
     from twin.run.results import read_final_state
+    from twin.units import machine_temperature
 
     if isinstance(initial, Result):
         if initial.numbers.artefact != model.artefact.digest:
@@ -110,6 +109,7 @@ def _start(model: Model, initial: Result | np.ndarray | Quantity | None) -> floa
     if not isinstance(initial, str | float | int):
         return initial
     start = quantity("--initial", initial, "degC")
-    if not COLDEST <= start <= HOTTEST:
-        raise TwinError(f"{initial} is no temperature", "--initial", "write --initial '20 degC', for example")
-    return start
+    try:
+        return machine_temperature(start)
+    except ValueError as e:
+        raise TwinError(f"{initial}: {e}", "--initial", "write --initial '20 degC', for example") from e

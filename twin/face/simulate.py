@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -98,13 +99,15 @@ def simulation(
         if isinstance(run, str | Path) and Path(output).resolve() == Path(run).resolve():
             raise LogError("is the run that is read", str(output), "choose another folder with -o")
         refuse_to_destroy(Path(output))  # now, not after hours
-    described = warn(machine).description
+    loaded = warn(machine)
+    described = loaded.description
     if size is not None:
         described = remesh(described, size)
     made, balance = simulate_run(
         described, run_of(run), step, o.substeps, o.hours, every, noise=noise, progress=reporter(progress)
     )
-    if output is not None:
+    if output is not None:  # what it was made for, so that `twin check` knows its signals
+        named = Path(os.path.relpath(loaded.path.resolve(), Path(output).resolve())).as_posix()
+        made = replace(made, machine=named, folder=Path(output))
         write_run(Path(output), made)
-        made = replace(made, folder=Path(output))
     return Simulation(made, balance)

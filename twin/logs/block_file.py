@@ -26,6 +26,7 @@ import numpy as np
 
 from twin.errors import LogError
 from twin.logs.blocks import Block, Damaged
+from twin.ordinary import ordinary
 
 LATEST = 253402300800.0  # s, POSIX: the year 10000, beyond which calendars end
 MARK = b"TWB1"
@@ -71,7 +72,7 @@ def read_blocks(path: Path) -> Iterator[Block | Damaged]:
     """The blocks of a file as they stand in it, in bounded memory. Raises LogError where it is no file of blocks."""
     path = Path(path)
     try:
-        with path.open("rb") as f:
+        with ordinary(path).open("rb") as f:
             if os.fstat(f.fileno()).st_size == 0:
                 raise LogError("the file is empty", str(path), "log at least one block")
             with mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:

@@ -15,6 +15,7 @@ import numpy as np
 from twin.errors import LogError, Problem
 from twin.logs.decimal_marks import mark_problems
 from twin.logs.times import parse_iso
+from twin.ordinary import ordinary
 from twin.units import Unit, parse_unit
 
 _HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
@@ -69,7 +70,7 @@ def read_csv(path: Path, zone: tzinfo | None = None) -> CsvTable:
 def _lines(path: Path) -> list[str]:
     """Lines of the file, the header first, without blank lines at the end."""
     try:
-        raw = path.read_bytes()
+        raw = ordinary(path).read_bytes()
     except OSError as e:
         raise LogError(f"cannot read: {e.strerror or e}", str(path), "check the path and its permissions") from e
     try:

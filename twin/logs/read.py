@@ -18,7 +18,8 @@ from twin.logs.run import Run, Table, Tcp
 from twin.logs.segments import read_segments
 from twin.logs.times import in_zone, zone_of
 from twin.nearest import did_you_mean
-from twin.units import to_si
+from twin.ordinary import ordinary
+from twin.units import machine_temperature, to_si
 
 TABLES = ("loads", "temperatures", "tcp")
 _KEYS = (
@@ -75,10 +76,10 @@ def parse_run(folder: Path) -> Run:
         tcp=_tcp(tcp, zero, folder / "tcp.csv") if tcp else None,
         start=start,
         zone=zone,
-        sampling=_quantity(facts, "sampling", "s", where, also="sampling_s"),
+        sampling=_sampling(facts, where),
         provenance=str(facts.get("provenance", facts.get("source", ""))),
         synthetic=_synthetic(facts.get("synthetic", False), where),
-        initial_temperature=_quantity(facts, "initial_temperature", "degC", where),
+        initial_temperature=_initial(facts, where),
         machine=_text(facts, "machine", where),
         folder=folder,
         segments=read_segments(facts.get("segments", []), str(where), loads_table.time.min(), loads_table.time.max()),
@@ -101,7 +102,7 @@ def _tcp_reference(value: Any, where: Path) -> Literal["absolute", "first"]:
 def _facts(folder: Path) -> dict[str, Any]:
     path = folder / "run.toml"
     try:
-        facts = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        facts = tomllib.loads(ordinary(path).read_bytes().decode("utf-8-sig"))
     except (FileNotFoundError, NotADirectoryError) as e:
         raise LogError(
             "no run.toml",
@@ -159,6 +160,21 @@ def _quantity(facts: Mapping[str, Any], key: str, unit: str, where: Path, also: 
         return to_si(value, unit)
     except ValueError as e:
         raise LogError(f"{key}: {e}", str(where), f"give a number in {unit} or a string with a unit") from e
+
+
+def _sampling(facts: Mapping[str, Any], where: Path) -> float | None:
+    value = _quantity(facts, "sampling", "s", where, also="sampling_s")
+    if value is not None and value <= 0.0:
+        raise LogError(f"sampling is {value:g} s", str(where), 'give the time between rows: sampling = "5 s"')
+    return value
+
+
+def _initial(facts: Mapping[str, Any], where: Path) -> float | None:
+    value = _quantity(facts, "initial_temperature", "degC", where)
+    try:
+        return None if value is None else machine_temperature(value)
+    except ValueError as e:
+        raise LogError(f"initial_temperature: {e}", str(where), 'write initial_temperature = "20 degC"') from e
 
 
 def _text(facts: Mapping[str, Any], key: str, where: Path) -> str | None:

@@ -7,6 +7,7 @@ import numpy as np
 from twin.errors import Problem
 from twin.logs.found import at, times
 from twin.logs.run import Run, Table
+from twin.units import LARGEST
 
 _LEAST = 10  # rows before their distance is compared with the stated sampling
 _CLOCK_SLIPS = (60.0, 1000.0, 3600.0, 6e4, 1e6)  # minutes, milliseconds, hours, ms for min, microseconds
@@ -17,7 +18,8 @@ _COUNTERS = {  # s after which a clock of 32 bit starts again
 
 
 def refusals(run: Run) -> list[Problem]:
-    """Errors, each with file and line: times that do not increase, tables of other times, rates 60 or 1000 off.
+    """Errors, each with file and line: times that do not increase, tables of other times, rates 60 or 1000 off, values
+    beyond all reason.
 
     What can be refused without the numbers is refused on reading already: times without a zone or in the hour of a
     clock change, mixed decimal marks, rows cut short.
@@ -26,6 +28,7 @@ def refusals(run: Run) -> list[Problem]:
     for name, table in tables_of(run).items():
         where = str(run.folder / f"{name}.csv")
         problems += _order(table, where, run.tcp.axes if run.tcp is not None and name == "tcp" else ())
+        problems += _beyond(table, where)
         if name != "loads":
             problems += _overlap(table, run.loads, where)
     problems += rate_problems(run)
@@ -70,6 +73,19 @@ def _order(table: Table, where: str, axes: tuple[str, ...]) -> list[Problem]:
         rows = "with equal values" if alike == len(same) else f"{len(same) - alike} with other values"
         what = f"the same time twice, {times(len(same))}, {rows}"
         problems.append(Problem(what, at(where, same), "remove duplicated rows; log times fine enough to differ"))
+    return problems
+
+
+def _beyond(table: Table, where: str) -> list[Problem]:
+    """Values that no quantity has: the square of one is no number any more."""
+    problems = []
+    for name, values in table.columns.items():
+        rows = np.flatnonzero(np.abs(values) > LARGEST)  # NaN, a missing value, is not
+        if len(rows):
+            what = f"'{name}' is {values[rows[0]]:g} {table.units.get(name, '')}, {times(len(rows))}".replace(" ,", ",")
+            problems.append(
+                Problem(f"{what}: beyond all reason", at(where, rows), "correct the cell, or leave it empty")
+            )
     return problems
 
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from twin.errors import Problem
+from twin.machine.check_bounds import beyond_at_bounds
 from twin.machine.check_lumped import lumped_oddities
 from twin.machine.description import Machine, Material
+from twin.machine.size import asked
 from twin.machine.wiring import law_use
 from twin.physics.laws import LAWS
 
@@ -40,6 +42,8 @@ def check_machine(machine: Machine) -> list[Problem]:
     problems += _joints(machine)
     problems += _encoders(machine)
     problems += _unused(machine)
+    problems += asked(machine)
+    problems += beyond_at_bounds(machine)
     return problems
 
 

@@ -12,11 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import core_schema
 
-from twin.units import to_si
+from twin.units import machine_temperature, to_si
 
+# W/(m^2 K), and W/K of lumped machines: a micrometre of copper has 4e8. Tighter contacts are one part, and beside them
+# whatever else conducts is lost to rounding.
+TIGHTEST = 1e9
 BOX_SURFACES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
 
@@ -36,7 +39,7 @@ class _Quantity:
 
 
 Length = Annotated[float, _Quantity("m")]
-Temperature = Annotated[float, _Quantity("degC")]  # a point on the scale, degC
+Temperature = Annotated[float, AfterValidator(machine_temperature), _Quantity("degC")]  # a point on the scale, degC
 TemperatureDifference = Annotated[float, _Quantity("K")]
 Conductivity = Annotated[float, _Quantity("W/(m*K)")]
 Density = Annotated[float, _Quantity("kg/m^3")]
@@ -176,9 +179,11 @@ class Contact(Entry):
     pairs: tuple[tuple[str, str], ...] = ()  # moving: (rail "part.surface", pad "part.surface")
     segments: int = Field(12, ge=2)  # moving: stations along each rail
     assignment: Literal["interpolated", "segment"] = "interpolated"  # moving: between stations, or to the segment below
-    conductance: FilmCoefficient | None = Field(None, gt=0)  # of the joint, or per pad area
+    conductance: FilmCoefficient | None = Field(None, gt=0, le=TIGHTEST)  # of the joint, or per pad area
     area: Area | None = Field(None, gt=0)  # lumped machines: of the joint, or of each pad
-    total: Conductance | None = Field(None, gt=0)  # lumped machines: of the joint or each pad, instead of both
+    total: Conductance | None = Field(
+        None, gt=0, le=TIGHTEST
+    )  # lumped machines: of the joint or each pad, instead of both
     joint: JointLaw | None = None  # fixed: instead of `conductance`
     # fixed: the surfaces face each other, up to this far apart, and pass heat alone: an air gap, a shim
     gap: Length | None = Field(None, gt=0)

@@ -9,15 +9,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from twin.atomic import atomic_path
 from twin.errors import DescriptionError, Problem
 from twin.machine.description import Machine, MachineEntry, ParameterEntry
+from twin.machine.reason import unreasonable
 from twin.machine.references import reference_problems
 from twin.machine.schema_errors import Keys, known_keys, missing_section, schema_problem
 from twin.machine.toml_lines import key_lines, line_of
 from twin.nearest import nearest
+from twin.ordinary import ordinary
+
+SHOWN = 20  # of values beyond all reason, of which a file may be full
 
 
 def load_machine(path: Path, text: str | None = None) -> Machine:
@@ -33,11 +37,13 @@ def load_machine(path: Path, text: str | None = None) -> Machine:
     text = read_text(path) if text is None else text
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as e:
+    except ValueError as e:  # a TOMLDecodeError, or of whole numbers of more than 4300 digits
         raise DescriptionError(f"not valid TOML: {e}", str(path), _syntax_remedy(text, str(e))) from e
     except RecursionError as e:
         raise DescriptionError("not valid TOML: nested too deeply", str(path), "close the brackets") from e
     lines = key_lines(text)
+    if far := list(unreasonable(data)):
+        raise DescriptionError.collect([_placed(path, lines, keys, problem) for keys, problem in far[:SHOWN]])
     found, sound = _schema_problems(data)
     partial = _partial(data, sound, path.parent)
     if partial is not None:
@@ -47,14 +53,16 @@ def load_machine(path: Path, text: str | None = None) -> Machine:
             keys = tuple(problem.where.split("."))
             if keys not in reported | mistyped:  # what follows from a mistake is not another mistake
                 found.append((keys, problem))
-    problems = {
-        replace(problem, where=f"{path}: {'.'.join(keys)}" + (f" (line {line})" if line else "")): line or 0
-        for keys, problem in found
-        for line in [line_of(lines, keys)]
-    }
+    problems = {_placed(path, lines, keys, problem): line_of(lines, keys) or 0 for keys, problem in found}
     if any(not p.warning for p in problems):
         raise DescriptionError.collect(sorted(problems, key=problems.__getitem__))
     return Machine.model_validate({**data, "folder": path.parent})
+
+
+def _placed(path: Path, lines: dict[Keys, int], keys: Keys, problem: Problem) -> Problem:
+    """The problem with the file, the key and its line as its place."""
+    line = line_of(lines, keys)
+    return replace(problem, where=f"{path}: {'.'.join(keys)}" + (f" (line {line})" if line else ""))
 
 
 def json_schema() -> dict[str, Any]:
@@ -74,7 +82,7 @@ def write_schema(path: Path) -> None:
 def read_text(path: Path) -> str:
     """The text of a description, its line ends as in Unix. Raises DescriptionError where it cannot be read."""
     try:
-        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+        return ordinary(path).read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError as e:
         raise DescriptionError("no such file", str(path), "give the path of a machine.toml, or of its folder") from e
     except UnicodeDecodeError as e:
@@ -197,6 +205,4 @@ def _partial(data: dict[str, Any], sound: dict[str, Any], folder: Path) -> Machi
 
 
 def _entry(kind: Any, value: Any) -> Any:
-    if value is None or not (isinstance(kind, type) and issubclass(kind, BaseModel)):
-        return value
-    return kind.model_validate(value)
+    return None if value is None else TypeAdapter(kind).validate_python(value)

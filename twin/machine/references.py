@@ -29,6 +29,7 @@ from twin.machine.lumped_references import (
     misplaced,
 )
 from twin.machine.parameters import parameter_problems
+from twin.machine.size import refused
 from twin.nearest import did_you_mean, nearest
 from twin.units import parse_unit
 
@@ -43,7 +44,11 @@ def reference_problems(machine: Machine) -> list[Problem]:
     """All problems that need more than one entry, or more than its type, to be seen."""
     problems = [*_names(machine)]
     of_meshes = (_parts, _axes, _contacts, _laws, _films, _sensors, _watched, _tcp, _supports, misplaced, _added)
-    for check in (*((lumped_problems, _axes, _laws, _sensors, _added) if machine.lumped else of_meshes), _poses):
+    for check in (
+        *((lumped_problems, _axes, _laws, _sensors, _added) if machine.lumped else of_meshes),
+        _poses,
+        refused,
+    ):
         problems += check(machine)
     whole = not any(entry is None for section in _NAMED for entry in getattr(machine, section).values())
     return problems or (list(_motion(machine)) if whole else [])

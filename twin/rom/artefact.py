@@ -1,63 +1,40 @@
-"""The artefact: one HDF5 file with everything the runtime needs (schema version 2, docs/artefact.md)."""
+"""The artefact: one HDF5 file with everything the runtime needs (schema version 3, docs/artefact.md)."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
 
-from twin.errors import ArtefactError
-from twin.rom.hdf5_file import put, put_attributes, scale, strings, writing
+from twin.errors import ArtefactError, TwinError
+from twin.rom.body_file import read_body, write_body
+from twin.rom.certificate_file import read_certificate, write_certificate
+from twin.rom.check_load_model import check_load_model, check_parameters
+from twin.rom.check_model import check_model
+from twin.rom.content import HASH, ForeignContent, Item, items, stamp
+from twin.rom.field_file import SurfaceField, read_field, write_field
+from twin.rom.hdf5_file import floats, integers, member, put, put_attributes, scale, text, texts, writing
 from twin.rom.load_model import LoadModel
 from twin.rom.model import AffineBody, MachineModel
+from twin.rom.names import has_control_characters
 from twin.rom.parameter import Parameter
+from twin.rom.seal import is_broken, sealed
 from twin.rom.structure_file import read_structure, write_structure
-from twin.rom.tcp import refuse_other_structure
+from twin.rom.tcp import is_exact, refuse_other_structure
 
 FORMAT = "twin artefact"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
+_Text = TypeVar("_Text", str, bytes)
 _PAPERS = ("certificate", "fields", "description", "parameters")  # what results do not depend on
-
-# Dataset of a body -> (unit, dimensions). `equation` counts rows, `state` columns: they differ for oblique projections.
-_MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
-    "E": ("J/K", ("equation", "state")),
-    "A0": ("W/K", ("equation", "state")),
-    "A": ("m^2", ("theta", "equation", "state")),
-    "M": ("m^2", ("equation", "theta")),
-    "H": ("m^3", ("equation", "theta")),
-    "B": ("1", ("equation", "sources")),
-    "B_out": ("1", ("state", "sources")),
-    "P": ("1", ("equation", "ports")),
-    "P_out": ("1", ("state", "ports")),
-    "C": ("1", ("sensors", "state")),
-    "G": ("m/K", ("pose", "component", "state")),
-    "one": ("K", ("state",)),
-    "energy": ("J/K", ("state",)),
-    "E_members": ("J/K", ("member", "equation", "state")),
-    "G_members": ("m/K", ("member", "pose", "component", "state")),
-    "W": ("m/K", ("elastic_input", "state")),
-    "W_members": ("m/K", ("member", "elastic_input", "state")),
-}
-_OPTIONAL = ("H", "B_out", "P_out", "E_members", "G_members", "W", "W_members")
-_INDICES = {"theta": "theta", "sources": "source", "ports": "port", "sensors": "sensor"}  # into root coordinates
-
-
-@dataclass(frozen=True)
-class SurfaceField:
-    """The temperature field of a body on its surface mesh, for pictures: T - T_ref = basis @ x."""
-
-    body: str
-    nodes: np.ndarray  # (m, 3) m, machine coordinates at axis positions zero
-    triangles: np.ndarray  # (t, 3) int
-    basis: np.ndarray  # (m, n) K per unit of state
 
 
 @dataclass(frozen=True)
@@ -84,14 +61,14 @@ def write_artefact(
     created: datetime | None = None,
     parameters: Sequence[Parameter] = (),
 ) -> None:
-    """Write a dense model. Equal input gives equal bytes apart from the attribute `created` (now by default).
+    """Write a dense model. Equal input gives equal bytes but for `created` (now by default) and the hash.
 
     certificate: JSON-compatible values; (nested) sequences of numbers are stored as arrays, with K or m as their unit
     where their name contains "temperature" or "displacement".
     Raises TwinError if the file cannot be written.
     """
     created = created or datetime.now(UTC)
-    with writing(Path(path)) as f:
+    with writing(Path(path), sealed) as f:
         put_attributes(f, {"format": FORMAT, "schema_version": SCHEMA_VERSION, "name": model.name})
         f.attrs["created"] = np.bytes_(created.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))  # fixed length
         put(f, "reference_temperature", float(model.reference_temperature), "degC")
@@ -110,15 +87,16 @@ def write_artefact(
             write_structure(f.create_group("structure"), model.structure)
         bodies = f.create_group("bodies")
         for body in model.bodies:
-            _write_body(bodies.create_group(body.name), body)
-        _write_certificate(f.create_group("certificate"), dict(certificate or {}))
+            write_body(bodies.create_group(body.name), body)
+        write_certificate(f.create_group("certificate"), certificate or {})
         put_attributes(f.create_group("provenance"), dict(sorted((provenance or {}).items())))
         pictures = f.create_group("fields")
         sizes = {body.name: body.n for body in model.bodies}
         for field in sorted(fields, key=lambda s: s.body):
             if field.basis.shape != (len(field.nodes), sizes[field.body]):
                 raise ValueError(f"field basis of {field.body}: {field.basis.shape}")
-            _write_field(pictures.create_group(field.body), field)
+            write_field(pictures.create_group(field.body), field)
+        stamp(f)
 
 
 def _write_coordinates(f: h5py.File, model: MachineModel) -> None:
@@ -139,207 +117,153 @@ def _write_coordinates(f: h5py.File, model: MachineModel) -> None:
         scale(f, f"pose_grid_{axis}", np.asarray(nodes, dtype=float), "m", f"grid positions of axis {axis}")
 
 
-def _write_body(group: h5py.Group, body: AffineBody) -> None:
-    scale(group, "state", np.arange(body.n), "", "modal coordinates [K]")
-    scale(group, "equation", np.arange(body.n), "", "rows")
-    if body.members:
-        scale(group, "member", body.members, "", "parts, or nodes and bars: shares of E, G and W")
-    if body.W is not None:
-        scale(group, "elastic_input", np.arange(len(body.W)), "", "what the structure reads of the temperatures")
-    for name, root in _INDICES.items():
-        scale(group, name, np.array(getattr(body, name), dtype=np.int64), "", f"index of each {root} in /{root}")
-    values = {name: getattr(body, name) for name in _MATRICES} | {
-        "A": np.array(body.A).reshape(len(body.theta), body.n, body.n)
-    }
-    for name, (unit, dims) in _MATRICES.items():
-        if values[name] is not None:
-            put(group, name, np.asarray(values[name], dtype=float), unit, dims)
-
-
-def _numbers(value: object) -> np.ndarray | None:
-    """Arrays and non-empty (nested) sequences of numbers as a float array, else None."""
-    if isinstance(value, np.ndarray):
-        return value.astype(float)
-    if not isinstance(value, list | tuple) or not value:
-        return None
-    try:
-        table = np.array(value)
-    except ValueError:
-        return None
-    return table.astype(float) if table.dtype.kind in "fi" else None
-
-
-# Tables of a certificate by the scales that artefacts have anyway; others get their own.
-_CERTIFIED: dict[str, tuple[str, ...]] = dict.fromkeys(
-    ("temperature_error", "temperature_range", "temperature_error_in_case", "temperature_range_in_case"), ("sensor",)
-) | dict.fromkeys(
-    ("displacement_error", "displacement_range", "displacement_error_in_case", "displacement_range_in_case"),
-    ("pose", "component"),
-)
-
-
-def _write_certificate(group: h5py.Group, certificate: dict[str, Any]) -> None:
-    tables = {name: _numbers(value) for name, value in sorted(certificate.items())}
-    rest = {name: value for name, value in certificate.items() if tables[name] is None}
-    put(group, "json", json.dumps(rest, sort_keys=True), "")
-    for name, table in tables.items():
-        if table is None:
-            continue
-        unit = "K" if "temperature" in name else "m" if "displacement" in name or name == "positions" else ""
-        dims = _CERTIFIED.get(name)
-        if dims is None:
-            dims = tuple(f"{name}_{axis}" for axis in range(table.ndim))
-            for dim, size in zip(dims, table.shape, strict=True):
-                scale(group, dim, np.arange(size))
-        put(group, name, table, unit, dims)
-
-
-def _write_field(group: h5py.Group, field: SurfaceField) -> None:
-    for dim, size in (("node", len(field.nodes)), ("triangle", len(field.triangles)), ("corner", 3),
-                      ("coordinate", 3), ("state", field.basis.shape[1])):  # fmt: skip
-        scale(group, dim, np.arange(size))
-    put(group, "nodes", np.asarray(field.nodes, dtype=float), "m", ("node", "coordinate"))
-    put(group, "triangles", np.asarray(field.triangles, dtype=np.int32), "", ("triangle", "corner"))
-    put(group, "basis", np.asarray(field.basis, dtype=np.float32), "1", ("node", "state"))
-
-
 def read_artefact(path: Path) -> Artefact:
-    """Read and check an artefact.
+    """Read and check an artefact: see `checked_artefact`, which says besides what was checked."""
+    return checked_artefact(path)[0]
+
+
+def checked_artefact(path: Path) -> tuple[Artefact, tuple[str, ...]]:
+    """The artefact in a file, and one line per thing that was checked.
 
     Raises ArtefactError where the file is missing, is no HDF5 file, is cut off, is no artefact, has a schema version
-    this program does not know, or lacks something.
+    this program does not know, holds something else than it was written with, links to something, lacks something, or
+    holds a model that cannot be: `twin.rom.check_load_model`, `twin.rom.check_model`.
     """
     path = Path(path)
     rebuild = "build the artefact again with `twin build`"
     if not path.is_file():
         what = "is a folder, not an artefact" if path.is_dir() else "no such file"
         raise ArtefactError(what, str(path), f"check the path, or {rebuild}")
-    with path.open("rb") as start:
-        signature = start.read(8)
-    if signature != b"\x89HDF\r\n\x1a\n":
-        raise ArtefactError("not an HDF5 file", str(path), "give an artefact written by `twin build`")
     try:
+        content = path.read_bytes()
+        if not content.startswith(b"\x89HDF\r\n\x1a\n"):
+            raise ArtefactError("not an HDF5 file", str(path), "give an artefact written by `twin build`")
+        if is_broken(content):
+            what = "damaged: its bytes have changed since it was written"
+            raise ArtefactError(what, str(path), f"copy it again, or {rebuild}")
+        del content
         with h5py.File(path, "r") as f:
-            return _read(f, path)
+            digest, told = _as_written(f, path)
+            artefact, more = _read(f, digest)
+        return artefact, (*told, *more)
     except KeyError as e:
         raise ArtefactError(f"damaged artefact: {_plain(e)}", str(path), rebuild) from e
-    except (OSError, RuntimeError, ValueError, TypeError) as e:
+    except (OSError, RuntimeError, ValueError, TypeError, ArithmeticError) as e:
         raise ArtefactError(f"truncated or damaged file: {_plain(e)}", str(path), f"copy it again, or {rebuild}") from e
 
 
 def _plain(e: Exception) -> str:
     text = str(e.args[0] if e.args else e)
-    return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'" else text
+    quoted = len(text) > 1 and text[0] == text[-1] and text[0] in "\"'" and text[0] not in text[1:-1]
+    return text[1:-1] if quoted else text or type(e).__name__
 
 
-def _digest(f: h5py.File) -> str:
-    """Hash of all datasets the model consists of: certifying an artefact again does not make it another one."""
-    digest = hashlib.sha256()
-    names: list[str] = []
-    f.visit(names.append)
-    for name in sorted(names):
-        item = f[name]
-        if not isinstance(item, h5py.Dataset) or name.split("/")[0] in _PAPERS:
-            continue
-        digest.update(f"{name} {item.shape}".encode())
-        text = h5py.check_string_dtype(item.dtype) is not None
-        digest.update(repr(np.asarray(item.asstr()[...]).tolist()).encode() if text else item[...].tobytes())
-    return digest.hexdigest()
-
-
-def _read(f: h5py.File, path: Path) -> Artefact:
-    if f.attrs.get("format") != FORMAT:
-        raise ArtefactError("an HDF5 file, but no artefact", str(path), "give an artefact written by `twin build`")
-    version = int(f.attrs["schema_version"])
-    if version != SCHEMA_VERSION:
+def _as_written(f: h5py.File, path: Path) -> tuple[str, tuple[str, ...]]:
+    """The hash of the model in a file, and what was checked: that all in it is what was written, and stored in it."""
+    again = "copy it again, or build the artefact again with `twin build`"
+    try:
+        if f.attrs.get("format") != FORMAT:
+            raise ArtefactError("an HDF5 file, but no artefact", str(path), "give an artefact written by `twin build`")
+        version = int(f.attrs["schema_version"])
+        if version != SCHEMA_VERSION:
+            what = f"schema version {version}; this program reads version {SCHEMA_VERSION}"
+            remedy = "update twin" if version > SCHEMA_VERSION else "build the artefact again with `twin build`"
+            raise ArtefactError(what, str(path), remedy)
+        content, model, counts = _hashes(f)
+        stored = f.attrs[HASH]
+    except ForeignContent as e:
         raise ArtefactError(
-            f"schema version {version}; this program reads version {SCHEMA_VERSION}",
-            str(path),
-            "update twin" if version > SCHEMA_VERSION else "build the artefact again with `twin build`",
-        )
-    load = LoadModel.from_json(json.loads(_dataset(f, "load_model").asstr()[()]))
-    axes = strings(_dataset(f, "pose_axis"))
-    environments = _dataset(f, "ambient_sensor_environment")[...]
+            f"'{e.args[1]}' is {e.args[0]}", str(path), f"an artefact holds all it needs: {again}"
+        ) from e
+    except TwinError:
+        raise
+    except Exception as e:  # of a damaged file h5py may raise anything, AttributeError and MemoryError among it
+        raise ArtefactError(f"truncated or damaged file: {_plain(e)}", str(path), again) from e
+    if not isinstance(stored, bytes) or stored.decode("ascii", "replace") != content:
+        what = f"changed since it was written: its content is {content[:12]}..., not what its {HASH} says"
+        raise ArtefactError(what, str(path), again)
+    return model, (
+        f"content: {counts['dataset']} datasets, {counts['group']} groups and {counts['attribute']} attributes "
+        f"have the SHA-256 {content[:16]}... that they were written with",
+        "storage: no soft or external links, no data in other files, nothing gathered or compressed",
+    )
+
+
+def _hashes(f: h5py.File) -> tuple[str, str, Counter[str]]:
+    """Hash of all content, hash of the datasets the model consists of, and how many objects there are of each kind.
+
+    The second names the model: certifying an artefact again does not make it another one.
+    """
+    content, model, counts = hashlib.sha256(), hashlib.sha256(), Counter[str]()
+    for item in items(f):
+        counts[item.kind] += 1
+        for digest in (content, model) if item.kind == "dataset" and _is_model(item) else (content,):
+            digest.update(item.head)
+            digest.update(item.data)
+    return content.hexdigest(), model.hexdigest(), counts
+
+
+def _is_model(item: Item) -> bool:
+    return item.path.split("/")[1] not in _PAPERS
+
+
+def _read(f: h5py.File, digest: str) -> tuple[Artefact, tuple[str, ...]]:
+    load = LoadModel.from_json(json.loads(text(f, "load_model")))
+    told = [f"load model: {check_load_model(load)}"]
+    for name, wanted in (("theta", load.theta_names), ("port", load.ports), ("source", [s.name for s in load.sources])):
+        if texts(f, name) != tuple(wanted):
+            raise KeyError(f"'{name}' does not name what load_model does")
+    axes, names, poses = texts(f, "pose_axis"), texts(f, "body"), floats(f, "pose_position")
+    environments = integers(f, "ambient_sensor_environment").tolist()
+    bodies = member(f, "bodies")
     model = MachineModel(
-        name=str(f.attrs["name"]),
-        bodies=tuple(_read_body(f, name, len(_dataset(f, "pose"))) for name in strings(_dataset(f, "body"))),
+        name=_attribute(f, "name", str),
+        bodies=tuple(read_body(member(bodies, name, "bodies"), name, len(poses)) for name in names),
         load_model=load,
-        reference_temperature=float(_dataset(f, "reference_temperature")[()]),
-        sensors=strings(_dataset(f, "sensor")),
-        ambient_sensors=tuple(zip(strings(_dataset(f, "ambient_sensor")), map(int, environments), strict=True)),
+        reference_temperature=float(floats(f, "reference_temperature")),
+        sensors=texts(f, "sensor"),
+        ambient_sensors=tuple(zip(texts(f, "ambient_sensor"), environments, strict=True)),
         pose_axes=axes,
-        pose_grid=tuple(_dataset(f, f"pose_grid_{axis}")[...] for axis in axes),
-        poses=_dataset(f, "pose_position")[...],
-        structure=read_structure(f["structure"], strings(_dataset(f, "body"))) if "structure" in f else None,
+        pose_grid=tuple(floats(f, f"pose_grid_{axis}") for axis in axes),
+        poses=poses,
+        structure=read_structure(f["structure"], names) if "structure" in f else None,
     )
+    told += [f"body {line}" for line in check_model(model)]
     refuse_other_structure(model)
-    certificate = dict(json.loads(_dataset(f, "certificate/json").asstr()[()]))
-    for name, dataset in _dataset(f, "certificate").items():
-        if name != "json" and not dataset.is_scale:
-            certificate[name] = dataset[...]
-    return Artefact(
+    if is_exact(model):
+        told.append("structure: solved at the first pose, gives the TCP rows that are stored")
+    artefact = Artefact(
         model=model,
-        description=str(_dataset(f, "description").asstr()[()]),
-        certificate=certificate,
-        provenance={str(k): str(v) for k, v in _dataset(f, "provenance").attrs.items()},
-        fields=tuple(
-            SurfaceField(name, *(_dataset(f, f"fields/{name}/{part}")[...] for part in ("nodes", "triangles", "basis")))
-            for name in _dataset(f, "fields")
-        ),
-        parameters=_parameters(f),
-        created=f.attrs["created"].decode(),
-        digest=_digest(f),
+        description=text(f, "description"),
+        certificate=read_certificate(member(f, "certificate")),
+        provenance={str(k): str(v) for k, v in member(f, "provenance").attrs.items()},
+        fields=_fields(member(f, "fields"), model),
+        parameters=_parameters(f, load, model.bodies),
+        created=_attribute(f, "created", bytes).decode("ascii"),
+        digest=digest,
     )
+    return artefact, tuple(told)
 
 
-def _parameters(f: h5py.File) -> tuple[Parameter, ...]:
-    if "parameters" not in f:  # written before there were any
+def _attribute(f: h5py.File, name: str, kind: type[_Text]) -> _Text:
+    """An attribute of the root. Raises KeyError where it is of another type, or holds control characters."""
+    value = f.attrs[name]
+    if not isinstance(value, kind) or (isinstance(value, str) and has_control_characters(value)):
+        raise KeyError(f"attribute '{name}' is no {kind.__name__} without control characters")
+    return value
+
+
+def _fields(group: h5py.Group, model: MachineModel) -> tuple[SurfaceField, ...]:
+    sizes = {body.name: body.n for body in model.bodies}
+    foreign = [name for name in group if name not in sizes]
+    if foreign:
+        raise KeyError(f"'fields/{foreign[0]}' is of no body")
+    return tuple(read_field(group[name], name, sizes[name]) for name in group)
+
+
+def _parameters(f: h5py.File, load: LoadModel, bodies: Sequence[AffineBody]) -> tuple[Parameter, ...]:
+    if "parameters" not in f:  # it is optional
         return ()
-    return tuple(Parameter.from_json(p) for p in json.loads(f["parameters"].asstr()[()]))
-
-
-def _dataset(f: h5py.File, name: str) -> Any:
-    if name not in f:
-        raise KeyError(f"'{name}' is missing")
-    return f[name]
-
-
-def _read_body(f: h5py.File, name: str, n_poses: int) -> AffineBody:
-    def get(part: str) -> np.ndarray:
-        return np.asarray(_dataset(f, f"bodies/{name}/{part}")[...])
-
-    indices = {part: tuple(int(i) for i in get(part)) for part in _INDICES}
-    values = {part: get(part) for part in _MATRICES if part not in _OPTIONAL or f"bodies/{name}/{part}" in f}
-    members = strings(f[f"bodies/{name}/member"]) if f"bodies/{name}/member" in f else ()
-    n = len(values["one"])
-    sizes = {"equation": n, "state": n, "pose": n_poses, "component": 3, "member": len(members)}
-    sizes["elastic_input"] = len(values.get("W", ()))
-    sizes |= {k: len(v) for k, v in indices.items()}
-    for part, value in values.items():
-        if value.shape != tuple(sizes[dim] for dim in _MATRICES[part][1]) or not np.all(np.isfinite(value)):
-            raise KeyError(f"'bodies/{name}/{part}' has shape {value.shape} or values that do not fit")
-    return AffineBody(
-        name=name,
-        E=values["E"],
-        A0=values["A0"],
-        A=tuple(values["A"]),
-        theta=indices["theta"],
-        M=values["M"],
-        B=values["B"],
-        sources=indices["sources"],
-        P=values["P"],
-        ports=indices["ports"],
-        C=values["C"],
-        sensors=indices["sensors"],
-        G=values["G"],
-        one=values["one"],
-        energy=values["energy"],
-        P_out=values.get("P_out"),
-        B_out=values.get("B_out"),
-        H=values.get("H"),
-        members=members,
-        E_members=values.get("E_members"),
-        G_members=values.get("G_members"),
-        W=values.get("W"),
-        W_members=values.get("W_members"),
-    )
+    parameters = tuple(Parameter.from_json(p) for p in json.loads(text(f, "parameters")))
+    check_parameters(parameters, load, bodies)
+    return parameters

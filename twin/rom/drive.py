@@ -16,6 +16,7 @@ import numpy as np
 
 from twin.errors import LogError
 from twin.physics.laws import LAWS
+from twin.rom.check_laws import check_laws
 from twin.rom.contact import dwell, dwell_by_segment, segment_borders
 from twin.rom.following import Following
 from twin.rom.law_values import law_values, laws_hold, states_of
@@ -85,8 +86,10 @@ def evaluate(
     source is shared equally by the pairs of its contact, `rail_share` of it by the segments under the moving pad, each
     by the heat made while the pad dwells there.
 
-    Raises LogError for missing or empty signals and for times that do not increase.
+    Raises LogError for missing or empty signals and for times that do not increase, DescriptionError for laws that
+    cannot be evaluated.
     """
+    check_laws(load_model)
     time, values, missing, absent = _clean(load_model, time, signals)
     if n_steps is None:
         n_steps = max(1, int(np.ceil((time[-1] - time[0]) / dt - 1e-9)))

@@ -6,19 +6,23 @@ while closing. Default library version bounds: files with libver="latest" are un
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
 from twin.atomic import atomic_path
+from twin.rom.names import has_control_characters
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[h5py.File]:
+def writing(path: Path, finish: Callable[[bytes], bytes] = bytes) -> Iterator[h5py.File]:
     """An open, empty HDF5 file that is written to `path` when the block ends without an error.
+
+    finish: what becomes of its bytes before.
 
     Raises TwinError if the disk is full or the folder cannot be written.
     """
@@ -27,7 +31,7 @@ def writing(path: Path) -> Iterator[h5py.File]:
         f.flush()
         image = f.id.get_file_image()
     with atomic_path(path) as temporary:
-        temporary.write_bytes(image)
+        temporary.write_bytes(finish(image))
 
 
 def put(
@@ -80,3 +84,58 @@ def put_attributes(group: h5py.Group, attributes: Mapping[str, str | int | float
 def strings(dataset: h5py.Dataset) -> tuple[str, ...]:
     """A string dataset (n,) as Python strings."""
     return tuple(str(s) for s in dataset.asstr()[...])
+
+
+def floats(group: h5py.Group, name: str, where: str = "", bits: int = 64) -> np.ndarray:
+    """A dataset of finite floating-point numbers of so many bits; `where` names the group in messages.
+
+    Raises KeyError where it is missing, of another type, or not finite.
+    """
+    values = _array(group, name, where, np.dtype(f"f{bits // 8}"))
+    if not np.isfinite(values).all():
+        raise KeyError(f"'{_path(where, name)}' holds values that are not finite")
+    return values
+
+
+def integers(group: h5py.Group, name: str, where: str = "", bits: int = 64) -> np.ndarray:
+    """A dataset of whole numbers of so many bits. Raises KeyError where it is missing or of another type."""
+    return _array(group, name, where, np.dtype(f"i{bits // 8}"))
+
+
+def texts(group: h5py.Group, name: str, where: str = "") -> tuple[str, ...]:
+    """A dataset (n,) of text. Raises KeyError where it is missing, of another type, or holds control characters."""
+    dataset = member(group, name, where)
+    if not isinstance(dataset, h5py.Dataset) or h5py.check_string_dtype(dataset.dtype) is None or dataset.ndim != 1:
+        raise KeyError(f"'{_path(where, name)}' is no list of text")
+    values = strings(dataset)
+    if any(has_control_characters(value) for value in values):
+        raise KeyError(f"'{_path(where, name)}' holds a name with control characters")
+    return values
+
+
+def text(group: h5py.Group, name: str, where: str = "") -> str:
+    """A dataset () of text. Raises KeyError where it is missing or of another type."""
+    dataset = member(group, name, where)
+    if not isinstance(dataset, h5py.Dataset) or h5py.check_string_dtype(dataset.dtype) is None or dataset.ndim:
+        raise KeyError(f"'{_path(where, name)}' is no text")
+    return str(dataset.asstr()[()])
+
+
+def member(group: h5py.Group, name: str, where: str = "") -> Any:
+    """The object of this name in a group. Raises KeyError where it is missing."""
+    if name not in group:
+        raise KeyError(f"'{_path(where, name)}' is missing")
+    return group[name]
+
+
+def _array(group: h5py.Group, name: str, where: str, dtype: np.dtype) -> np.ndarray:
+    dataset = member(group, name, where)
+    if not isinstance(dataset, h5py.Dataset):
+        raise KeyError(f"'{_path(where, name)}' is a group, not numbers")
+    if dataset.dtype != dtype:
+        raise KeyError(f"'{_path(where, name)}' is of type {dataset.dtype}, not {dtype}")
+    return np.asarray(dataset[()])
+
+
+def _path(where: str, name: str) -> str:
+    return f"{where}/{name}" if where else name

@@ -7,6 +7,9 @@ All values SI, temperatures degC (differences K).
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from typing import Any
+
+from twin.rom.from_json import filled
 
 
 @dataclass(frozen=True)
@@ -163,18 +166,6 @@ class LoadModel:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, d: dict) -> LoadModel:
-        def use(u: dict) -> LawUse:
-            return LawUse(u["law"], dict(u["parameters"]), dict(u["signals"]))
-
-        return cls(
-            signals=tuple(Signal(**s) for s in d["signals"]),
-            axes=tuple(AxisWiring(**{**a, "direction": tuple(a["direction"])}) for a in d["axes"]),
-            environments=tuple(EnvironmentWiring(**e) for e in d["environments"]),
-            sources=tuple(Source(**{**s, "use": use(s["use"])}) for s in d["sources"]),
-            films=tuple(Film(**{**f, "use": use(f["use"])}) for f in d["films"]),
-            joints=tuple(Joint(**j) for j in d["joints"]),
-            ports=tuple(d["ports"]),
-            rails=tuple(Rail(**{**r, "stations": tuple(r["stations"])}) for r in d["rails"]),
-            pairs=tuple(Pair(**p) for p in d["pairs"]),
-        )
+    def from_json(cls, d: Any) -> LoadModel:
+        """The inverse of `to_json`. Raises TypeError and ValueError as `twin.rom.from_json.filled`."""
+        return filled(cls, d, "load_model")

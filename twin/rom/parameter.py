@@ -10,6 +10,8 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from twin.rom.from_json import filled
+
 Kind = Literal["source", "film", "joint", "contact", "capacity", "expansion", "environment"]
 Scale = Literal["log", "linear"]
 
@@ -44,5 +46,6 @@ class Parameter:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, d: dict[str, Any]) -> Parameter:
-        return cls(**{**d, "targets": tuple(d["targets"])})
+    def from_json(cls, d: Any) -> Parameter:
+        """The inverse of `to_json`. Raises TypeError and ValueError as `twin.rom.from_json.filled`."""
+        return filled(cls, d, "parameters")

@@ -7,16 +7,15 @@ that reading gives the same bits again.
 from __future__ import annotations
 
 import json
-import types
-from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any
 
 import h5py
 import numpy as np
 
 from twin.rom.elastic_structure import ElasticStructure, PortFlexibility
-from twin.rom.hdf5_file import put, scale
+from twin.rom.from_json import filled
+from twin.rom.hdf5_file import floats, member, put, scale, text
 from twin.rom.lumped_structure import LumpedStructure
 
 KINDS = {"meshed": ElasticStructure, "lumped": LumpedStructure}
@@ -43,17 +42,25 @@ def read_structure(group: h5py.Group, bodies: tuple[str, ...]) -> ElasticStructu
 
     Raises KeyError where something is missing or does not fit, ValueError or TypeError for damaged JSON.
     """
-    told = json.loads(group["json"].asstr()[()])
-    structure = _filled(KINDS[told.pop("kind")], told)
+    told = json.loads(text(group, "json", "structure"))
+    kind = told.pop("kind", None) if isinstance(told, dict) else None
+    if kind not in KINDS:
+        raise KeyError(f"'structure/json' is of no kind of {', '.join(KINDS)}")
+    structure = filled(KINDS[kind], told, "structure/json")
     if isinstance(structure, LumpedStructure):
         return structure
     assert isinstance(structure, ElasticStructure)
-    own = [(name, group[f"bodies/{name}"]) for name in bodies]
-    flexible = tuple(PortFlexibility(name, of["F"][...], of["R"][...]) for name, of in own)
+    flexible = tuple(_flexibility(group, name) for name in bodies)
     for body, n in zip(flexible, np.diff(structure.system.offsets), strict=True):
-        if body.F.shape != (n, n) or body.R.shape != (n, 6) or not np.isfinite(body.F).all():
+        if body.F.shape != (n, n) or body.R.shape != (n, 6):
             raise KeyError(f"'structure/{body.name}' has matrices that do not fit")
     return replace(structure, bodies=flexible)
+
+
+def _flexibility(group: h5py.Group, name: str) -> PortFlexibility:
+    where = f"structure/bodies/{name}"
+    own = member(group, f"bodies/{name}", "structure")
+    return PortFlexibility(name, floats(own, "F", where), floats(own, "R", where))
 
 
 def _plain(value: Any) -> Any:
@@ -63,22 +70,3 @@ def _plain(value: Any) -> Any:
     if is_dataclass(value):
         return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
     return [_plain(v) for v in value] if isinstance(value, tuple) else value
-
-
-def _filled(kind: Any, value: Any) -> Any:
-    """The value of a type that `_plain` was given."""
-    if kind is np.ndarray:
-        values = np.array(value["values"], dtype=None if value["values"] else float)
-        return values.reshape(value["shape"])
-    if is_dataclass(kind) and isinstance(kind, type):
-        if not isinstance(value, Mapping):
-            raise TypeError(f"'structure/json': no {kind.__name__}")
-        hints = get_type_hints(kind)
-        return kind(**{field.name: _filled(hints[field.name], value[field.name]) for field in fields(kind)})
-    if get_origin(kind) is tuple:
-        return tuple(_filled(get_args(kind)[0], v) for v in value)
-    if kind is float and isinstance(value, int):
-        return float(value)
-    if isinstance(kind, types.GenericAlias) or not isinstance(value, kind):
-        raise TypeError(f"'structure/json': {value!r} is no {kind}")
-    return value

@@ -13,6 +13,7 @@ import numpy as np
 
 from twin.atomic import atomic_path
 from twin.errors import TwinError
+from twin.ordinary import ordinary
 from twin.rom.hdf5_file import strings
 from twin.run.correction import Correction, PoseErrors, Quality
 from twin.run.correction_polynomial import NormalisedAxis, Polynomial
@@ -35,7 +36,7 @@ def read_pose_errors(path: Path, artefact: str, time: float | None = None) -> tu
     path = path / "result.h5" if path.is_dir() else path
     remedy = "give the folder of `twin run -o`, made with this artefact"
     try:
-        with h5py.File(path, "r") as f:
+        with h5py.File(ordinary(path), "r") as f:
             if f.attrs.get("format") != RESULT_FORMAT:
                 raise TwinError("not a result of `twin run`", str(path), remedy)
             if f.attrs["artefact"] != artefact:
@@ -91,7 +92,7 @@ def read_correction(path: Path) -> Correction:
     """The correction in a file, ready to be evaluated. Raises TwinError for other files and unknown versions."""
     remedy = "give a file written by `twin correction`"
     try:
-        told = json.loads(Path(path).read_text(encoding="utf-8"))
+        told = json.loads(ordinary(Path(path)).read_text(encoding="utf-8"))
         if told["format"] != FORMAT:
             raise TwinError("not a correction", str(path), remedy)
         if told["version"] != VERSION:

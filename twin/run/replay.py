@@ -5,6 +5,7 @@ from __future__ import annotations
 import twin.run.jax_setup  # noqa: F401  isort: skip
 
 from dataclasses import replace
+from itertools import pairwise
 
 import jax
 import numpy as np
@@ -16,10 +17,13 @@ from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.following_flags import following_flags
+from twin.rom.model import MachineModel
 from twin.rom.poses import outside_grid
 from twin.rom.tcp import by_body, is_exact, tcp_at
 from twin.run.checkpoint import CheckpointFolder, Steps, chain
+from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalanced
 from twin.run.results import Result
+from twin.run.step_length import refuse_step_length
 from twin.run.stepping import Inputs, advance, inputs_of, observe
 from twin.run.system import Prepared, prepare
 
@@ -44,9 +48,11 @@ def replay(
     `twin.run.results.read_final_state`); by default the run's own initial temperature, else the first mean of its
     surroundings.
 
-    Raises LogError for missing signals and bad times, TwinError for checkpoints of another run.
+    Raises LogError for missing signals and bad times, TwinError for checkpoints of another run, and steps longer than
+    the log or too many, FailedCheck for results that cannot be (`twin.run.plausible`).
     """
     model = artefact.model
+    refuse_step_length(run.loads.time, dt, model.n + 3 * len(model.poses) + len(model.sensors))
     signals = signal_values(run, model.load_model.signals)
     drive = evaluate(model.load_model, run.loads.time, signals, dt)
     if initial is None:
@@ -80,11 +86,9 @@ def replay_drive(
         prepared, inputs_of(model.load_model, drive, substeps), start, artefact.digest, checkpoints, progress
     )
     states = np.concatenate([start[None], steps.z])
-    if not np.isfinite(states).all():
-        step = int(np.argmin(np.isfinite(states).all(axis=1)))
-        what = f"the temperatures are not finite after {drive.time[step]:g} s"
-        raise TwinError(what, "loads", "a value in the loads is beyond all reason: run `twin check` on the run folder")
+    refuse_not_finite(drive.time, states)
     temperature, tcp = _observe(prepared, states)
+    _refuse_glowing(prepared, model, drive.time, states, temperature)
     air = measured_air(model.load_model, drive)[:, [i for _, i in model.ambient_sensors]]
     positions = np.concatenate([position[None], drive.position])
     axes = [a.name for a in model.load_model.axes]
@@ -106,6 +110,8 @@ def replay_drive(
     flags |= following_flags(model.load_model, drive, steps.theta, steps.surface, height, steps.winding)
     throughput = np.diff(drive.time) * (np.abs(steps.power).sum(axis=1) + steps.gross)
     residual = steps.stored - np.diff(drive.time) * (steps.power.sum(axis=1) + steps.film.sum(axis=1))
+    balance_error = np.abs(residual) / np.maximum(throughput, 1e-6 * prepared.heat_capacity)
+    refuse_unbalanced(drive.time, balance_error)
     return Result(
         time=drive.time,
         sensors=(*model.sensors, *(name for name, _ in model.ambient_sensors)),
@@ -123,7 +129,7 @@ def replay_drive(
         film_coefficient=steps.theta[:, : len(model.load_model.films)],
         film_surface=steps.surface,
         stored=steps.stored,
-        balance_error=np.abs(residual) / np.maximum(throughput, 1e-6 * prepared.heat_capacity),
+        balance_error=balance_error,
         flags=np.column_stack([drive.flags, *flags.values()]),
         flag_names=(*drive.flag_names, *flags),
         states=modal,
@@ -132,6 +138,18 @@ def replay_drive(
         moves=model.moves,
         exact=is_exact(model),
     )
+
+
+def _refuse_glowing(
+    prepared: Prepared, model: MachineModel, time: np.ndarray, states: np.ndarray, temperature: np.ndarray
+) -> None:
+    """Sensors, and the mean of every body: a machine may have none."""
+    system, offsets = prepared.system, prepared.layout.offsets
+    energy, one = np.asarray(system.energy), np.asarray(system.one)
+    own = [slice(a, b) for a, b in pairwise(offsets)]
+    means = [states[:, rows] @ energy[rows] / (one[rows] @ energy[rows]) for rows in own]
+    names = (*(f"body {body.name}" for body in model.bodies), *(f"sensor {name}" for name in model.sensors))
+    refuse_glowing(time, np.column_stack([*means, temperature - model.reference_temperature]), names)
 
 
 def integrate(

@@ -15,6 +15,7 @@ from twin.atomic import atomic_path
 from twin.errors import TwinError
 from twin.logs.run import Table, Tcp
 from twin.logs.write import write_table, write_tcp
+from twin.ordinary import ordinary
 from twin.rom.hdf5_file import put, put_attributes, scale, writing
 
 FORMAT = "twin result"
@@ -165,7 +166,7 @@ def read_final_state(path: Path, artefact: str) -> np.ndarray:
     """
     remedy = "give a temperature in degC or the result.h5 of a run of this artefact"
     try:
-        with h5py.File(path, "r") as f:
+        with h5py.File(ordinary(path), "r") as f:
             if f.attrs.get("format") != FORMAT:
                 raise TwinError("not a result of `twin run`", str(path), remedy)
             if f.attrs["artefact"] != artefact:

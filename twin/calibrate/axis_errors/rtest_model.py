@@ -15,6 +15,7 @@ from twin.calibrate.axis_errors.field import FieldShares, field_shares
 from twin.calibrate.axis_errors.fit import AxisErrorFit, fit_axis_errors
 from twin.calibrate.axis_errors.rtest import Measurement, Readings
 from twin.errors import TwinError
+from twin.ordinary import ordinary
 from twin.rom.hdf5_file import strings
 from twin.rom.poses import pose_weights
 from twin.run.results import FORMAT
@@ -56,7 +57,7 @@ def read_pose_history(path: Path) -> PoseHistory:
     path = path / "result.h5" if path.is_dir() else path
     remedy = "give the folder of: twin run ARTEFACT RUN -o FOLDER"
     try:
-        with h5py.File(path, "r") as f:
+        with h5py.File(ordinary(path), "r") as f:
             if f.attrs.get("format") != FORMAT:
                 raise TwinError("not a result of `twin run`", str(path), remedy)
             return PoseHistory(

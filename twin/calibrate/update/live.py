@@ -21,6 +21,7 @@ from twin.calibrate.update.state import StateUpdater
 from twin.calibrate.update.state_filter import Machine, StateEstimate, begin
 from twin.calibrate.update.state_tangent import UncertainLoads
 from twin.errors import TwinError
+from twin.ordinary import ordinary
 from twin.rom.hdf5_file import put, put_attributes, writing
 from twin.run.stepping import State
 
@@ -54,7 +55,7 @@ def read_gains(path: Path) -> Live[At] | Live[PaperAt]:
     """The state that `write_gains` wrote. Raises TwinError for other files."""
     remedy = "start afresh, or give the state.json of a run with --method gain or paper"
     try:
-        d = json.loads(Path(path).read_text(encoding="utf-8"))
+        d = json.loads(ordinary(Path(path)).read_text(encoding="utf-8"))
         if d.get("format") != FORMAT:
             raise TwinError("not a state of `twin update`", str(path), remedy)
         time, base, held = float(d["time_s"]), np.array(d["base_m"]), np.array(d["held_m"])
@@ -94,7 +95,7 @@ def read_state(path: Path, machine: Machine, first: UncertainLoads) -> Live[Stat
     shape = begin(machine, 0.0, 0.0, first)
     remedy = "start afresh, or with the artefact and parameters that the file was written with"
     try:
-        with h5py.File(path, "r") as f:
+        with h5py.File(ordinary(path), "r") as f:
             if f.attrs.get("format") != FORMAT:
                 raise TwinError("not a state of `twin update`", str(path), remedy)
             paths = tuple(str(s) for s in f["parameter"].asstr()[...])
