@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnose.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival, Series, Unknown, Verdict, Window
+from twin.diagnose.plan_result import Apart, Foresight, Plan, Proposal, Separation
 
 FAMILIES = ("heat_source", "film_gain", "forced_convection", "joint", "zone", "sensor", "signal", "coolant", "sun")
 
@@ -136,3 +137,20 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
         catalogue="1",
         provenance={"artefact": "0123abc", "runs": ["run_1", "sealed_run"], "seconds": 412.0},
     )  # fmt: skip
+
+
+def planned() -> Plan:
+    """Of two suspicions and a pair."""
+    proposals = (
+        Proposal("sensor at bed.left", "the longest run again, with a temperature sensor at bed.left", 5.0, 8.0),
+        Proposal("again", "the longest run again", 20.0, 2.0),
+    )
+    apart = Apart("heat_source bed.left", "film_gain bed.left", 4.0, 10.0, (Separation("again", "the same", 8.0),))
+    return Plan(
+        (
+            Foresight("heat_source", "bed.left", "W", 40.0, 20.0, 500.0, 36.0, False, proposals),
+            Foresight("loss_law", "sources.motor", "1", 9.0, 8.0, 5.0, 36.0, False, proposals[1:]),
+        ),
+        (apart,),
+        ("the same noise",),
+    )

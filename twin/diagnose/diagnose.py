@@ -19,11 +19,14 @@ from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_d
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
 from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
+from twin.diagnose.plan import make_plan
+from twin.diagnose.plan_result import Plan
 from twin.diagnose.probed_model import ProbedModel, drive_arrays, make_probed_model
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
 from twin.diagnose.settled import settled
 from twin.diagnose.study import Study, make_study
+from twin.diagnose.suspicion import Suspicion, named, pairs_of, suspicions_in, worst_of_machine
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
 from twin.errors import ArtefactError, LogError
@@ -48,6 +51,7 @@ class Settings:
     form: int = FORM  # synthetic measurements for model discrepancy
     nulls: int = NULLS  # and for thresholds
     seed: int = 1
+    plan: str | None = None  # a suspicion to plan the next experiment for; "": what the verdict leaves open
 
 
 @dataclass(frozen=True)
@@ -148,6 +152,7 @@ def diagnose(
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
+    asked = named(settings.plan, detector) if settings.plan else []  # now, not after the search
     found = search(detector, measured_of(study))
     verdict, causes = verdict_of(found, settings.families)
     shown = found
@@ -209,8 +214,22 @@ def diagnose(
             "window_error_K": study.probed.reduction[0],
             "window_error_m": study.probed.reduction[1],
         },
+        plan=None if settings.plan is None else _plan(found, verdict, machine, usable, settings, asked, progress),
     )
     return Result(diagnosis, found, extension)
+
+
+def _plan(
+    found: Search, verdict: Verdict, machine: Machine, runs: Sequence[Run], settings: Settings,
+    asked: Sequence[Suspicion], progress: Progress,
+) -> Plan:  # fmt: skip
+    """The next experiments for what was asked; else for what an ambiguous verdict leaves open, else for what is seen
+    worst in each family."""
+    detector = found.detector
+    pairs = pairs_of(found) if verdict == "ambiguous" and not asked else []
+    open_ones = [h for pair in pairs for h in pair]
+    chosen = asked or suspicions_in(open_ones, detector) or worst_of_machine(detector, settings.families)
+    return make_plan(detector, machine, runs, chosen, pairs, settings.temperature_sigma, progress)
 
 
 def _floors(detector: Detector, m: Measured) -> tuple[np.ndarray, np.ndarray]:

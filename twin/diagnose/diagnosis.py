@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from twin.diagnose.plan_result import Plan
 from twin.machine.effects.effect import Window
 
 Verdict = Literal["named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing"]
@@ -149,6 +150,7 @@ class Diagnosis:
     seed: int
     catalogue: str  # version
     provenance: Mapping[str, Any]
+    plan: Plan | None = None  # of the next experiment, where one was asked for
 
     def to_json(self) -> dict[str, Any]:
         """What report.json holds: everything but the series."""

@@ -16,6 +16,7 @@ from twin.diagnose.diagnosis import Diagnosis
 from twin.diagnose.report_evidence import candidates_picture, cosine_picture, nulls_picture, pulls_picture
 from twin.diagnose.report_gain import gain_picture, overlay_picture, unknown_picture
 from twin.diagnose.report_pictures import Picture, inline_svg, rms
+from twin.diagnose.report_plan import plan_section
 from twin.diagnose.report_residuals import RUNS, by_load_state, residual_map, whiteness_picture
 from twin.diagnose.report_style import STYLE
 from twin.diagnose.report_tables import (
@@ -118,6 +119,8 @@ def page(d: Diagnosis) -> str:
         ("limits", "Detection limits", _limits(d)),
         ("notes", "Notes and provenance", _notes(d)),
     ]
+    if d.plan:
+        sections.insert(1, ("plan", "The next experiment", plan_section(d.plan)))
     if d.verdict == "nothing":  # what would have been seen is the result then
         sections.insert(0, sections.pop([name for name, _, _ in sections].index("limits")))
     contents = " ".join(f'<a href="#{name}">{title}</a>' for name, title, _ in sections)
