@@ -157,6 +157,7 @@ def test_report_json_has_the_keys_that_its_page_explains(written):
         found = json.load(f)
     found["causes"] = plain(diagnosis("named").to_json())["causes"]
     found["causes"][0]["windows"] = plain(replace(diagnosis("named"), causes=(STEP,)).to_json())["causes"][0]["windows"]
+    found["support"] = plain(diagnosis("named").to_json())["support"]
     found["plan"] = plain(replace(diagnosis("nothing"), plan=planned()).to_json())["plan"]
     assert {"place", "part", "surface", "history", "correlated_signals"} < found["unknown"].keys()
     assert found["unknown"]["place"] == "column.top"

@@ -16,16 +16,19 @@ from twin.diagnose.catalogue import FAMILIES, VERSION, Family
 from twin.diagnose.channels_check import stuck_sensors
 from twin.diagnose.coarse import too_coarse
 from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
-from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
+from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Unknown, Verdict
 from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
 from twin.diagnose.plan import make_plan
 from twin.diagnose.plan_result import Plan
 from twin.diagnose.probed_model import ProbedModel, drive_arrays, make_probed_model
+from twin.diagnose.scene import scene_of
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
 from twin.diagnose.settled import settled
+from twin.diagnose.shown_place import Scene
 from twin.diagnose.study import Study, make_study
+from twin.diagnose.support import support_of
 from twin.diagnose.suspicion import Suspicion, named, pairs_of, suspicions_in, worst_of_machine
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
@@ -214,9 +217,20 @@ def diagnose(
             "window_error_K": study.probed.reduction[0],
             "window_error_m": study.probed.reduction[1],
         },
+        support=support_of(found) if causes else None,
+        scene=_scene(machine, study.probed, causes, unknown_of(found) if verdict == "unknown" else None),
         plan=None if settings.plan is None else _plan(found, verdict, machine, usable, settings, asked, progress),
     )
     return Result(diagnosis, found, extension)
+
+
+def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unknown: Unknown | None) -> Scene | None:
+    """Where the first cause is, or the heat that nothing explains."""
+    if unknown is not None:
+        return scene_of(machine, probed, unknown.surface)
+    if not causes:
+        return None
+    return scene_of(machine, probed, causes[0].place, str(causes[0].settings.get("surface", "")))
 
 
 def _plan(
