@@ -12,10 +12,10 @@ from tests.diagnose.made_up import planned
 from tests.diagnose.small_case import NOISE, machine, made_detector, runs
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.plan import _Basis, make_plan
+from twin.diagnose.plan import Basis, make_plan
 from twin.diagnose.plan_result import Foresight, Plan
 from twin.diagnose.report_plan import plan_lines, plan_section
-from twin.diagnose.suspicion import known_suspicions, named, worst_of_machine
+from twin.diagnose.suspicion import known_family, known_suspicions, named, worst_of_machine
 from twin.diagnose.verdict import limits_of
 from twin.errors import TwinError
 
@@ -77,7 +77,7 @@ def test_what_switches_is_seen_in_the_hours_that_the_new_run_has_of_it():
 
 def test_an_hour_of_the_new_run_is_one_in_however_many_runs_something_acts():
     first, other = ("heat", "bed", 0), ("heat", "bed", 60)
-    basis = _Basis((4, 5, 6, 7), (first, other, first, None))
+    basis = Basis((4, 5, 6, 7), (first, other, first, None))
     spread = basis.spread(np.array([[1.0, 0.0, 2.0, 3.0], [0.0, 5.0, 1.0, 0.0]]))
     assert spread[:, :4].tolist() == [[1.0, 0.0, 2.0, 3.0], [0.0, 5.0, 1.0, 0.0]]
     assert spread[0, 4:].tolist() == [0.0, 0.0, 2.0, 0.0]  # the stronger one; what goes on has no hour
@@ -104,6 +104,8 @@ def test_names_are_those_of_report_json_and_the_nearest_one_is_told():
         named("heat_sorce bed", detector)
     with pytest.raises(TwinError, match="did you mean 'bearing_front'"):
         named("heat_source bearing_fron", detector)
+    with pytest.raises(TwinError, match="did you mean 'heat_source'"):
+        known_family("heat_sorce", FAMILIES)
     with pytest.raises(TwinError, match="no detection limit"):
         named("coarse_model", detector)  # which is no cause
 

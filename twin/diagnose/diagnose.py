@@ -20,7 +20,6 @@ from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Unknown, Verdict
 from twin.diagnose.gain import gains, predicted
 from twin.diagnose.nulls import Form
 from twin.diagnose.plan import make_plan
-from twin.diagnose.plan_result import Plan
 from twin.diagnose.probed_model import ProbedModel, drive_arrays, make_probed_model
 from twin.diagnose.scene import scene_of
 from twin.diagnose.search import search
@@ -29,7 +28,7 @@ from twin.diagnose.settled import settled
 from twin.diagnose.shown_place import Scene
 from twin.diagnose.study import Study, make_study
 from twin.diagnose.support import support_of
-from twin.diagnose.suspicion import Suspicion, named, pairs_of, suspicions_in, worst_of_machine
+from twin.diagnose.suspicion import known_family, named, pairs_of, suspicions_in, worst_of_machine
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
 from twin.errors import ArtefactError, LogError
@@ -154,8 +153,10 @@ def diagnose(
     names = run_names([*runs, *sealed])
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
+    if settings.plan:
+        known_family(settings.plan, settings.families)  # now, not after minutes
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
-    asked = named(settings.plan, detector) if settings.plan else []  # now, not after the search
+    asked = named(settings.plan, detector) if settings.plan else []
     found = search(detector, measured_of(study))
     verdict, causes = verdict_of(found, settings.families)
     shown = found
@@ -167,6 +168,7 @@ def diagnose(
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
+    searched = causes  # what was seen before any search has no statistic that channels could share
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED]
     extension = (
@@ -188,6 +190,13 @@ def diagnose(
         )
         extension = ()
     first = found.steps[0]
+    heat = unknown_of(found) if verdict == "unknown" else None
+    planned = None
+    if settings.plan is not None:
+        pairs = pairs_of(found) if verdict == "ambiguous" and not asked else []
+        chosen = asked or suspicions_in([h for pair in pairs for h in pair], detector)
+        chosen = chosen or worst_of_machine(detector, settings.families)
+        planned = make_plan(detector, machine, usable, chosen, pairs, settings.temperature_sigma, progress)
     diagnosis = Diagnosis(
         machine=machine.machine.name,
         verdict=verdict,
@@ -195,7 +204,7 @@ def diagnose(
         causes=causes,
         pulls=pulls_of(shown),
         detection_limits=limits_of(detector),
-        unknown=unknown_of(found) if verdict == "unknown" else None,
+        unknown=heat,
         gain=table,
         ranked=tuple(rival_of(h, float(first.cosine[0, i])) for i, h in enumerate(first.ranked)),
         cosine=first.cosine,
@@ -217,9 +226,9 @@ def diagnose(
             "window_error_K": study.probed.reduction[0],
             "window_error_m": study.probed.reduction[1],
         },
-        support=support_of(found) if causes else None,
-        scene=_scene(machine, study.probed, causes, unknown_of(found) if verdict == "unknown" else None),
-        plan=None if settings.plan is None else _plan(found, verdict, machine, usable, settings, asked, progress),
+        support=support_of(found) if searched and heat is None else None,
+        scene=_scene(machine, study.probed, searched or causes, heat),
+        plan=planned,
     )
     return Result(diagnosis, found, extension)
 
@@ -231,19 +240,6 @@ def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unkno
     if not causes:
         return None
     return scene_of(machine, probed, causes[0].place, str(causes[0].settings.get("surface", "")))
-
-
-def _plan(
-    found: Search, verdict: Verdict, machine: Machine, runs: Sequence[Run], settings: Settings,
-    asked: Sequence[Suspicion], progress: Progress,
-) -> Plan:  # fmt: skip
-    """The next experiments for what was asked; else for what an ambiguous verdict leaves open, else for what is seen
-    worst in each family."""
-    detector = found.detector
-    pairs = pairs_of(found) if verdict == "ambiguous" and not asked else []
-    open_ones = [h for pair in pairs for h in pair]
-    chosen = asked or suspicions_in(open_ones, detector) or worst_of_machine(detector, settings.families)
-    return make_plan(detector, machine, runs, chosen, pairs, settings.temperature_sigma, progress)
 
 
 def _floors(detector: Detector, m: Measured) -> tuple[np.ndarray, np.ndarray]:

@@ -22,7 +22,9 @@ from twin.rom.load_model import LoadModel, Signal
 SENSOR = "plan:"  # before the place of a sensor that is not there yet; no name of a description holds a colon
 AGAIN = "again"  # name of the experiment that changes nothing
 SAMPLING = 10.0  # s, of the loads of an experiment: six rows in each fine step
-SPEED = 0.5  # of its top, at which an axis goes to and fro for hours: what drives allow, and what calibration has seen
+SPEED = (
+    0.5  # of its top, at which an axis goes to and fro for hours; at its top a ball screw's threshold was nine times
+)
 MOVING = 2.0 / 3.0  # of the run that an axis moves; then it rests, so that films show without the motor's heat
 STEPS = (0.25, 0.0, 0.5, 0.0, 1.0, 0.0)  # of the top level, a sixth of the run each
 LOADED = 1.0 / 3.0  # of the run under full load, before the long rest
@@ -95,6 +97,8 @@ def _air(load: LoadModel, run: Run) -> float:
     if not environment.signal:
         return environment.temperature
     signal = next(s for s in load.signals if s.name == environment.signal)
+    if signal.column not in run.loads.columns:
+        return float(signal.default if signal.default is not None else environment.temperature)
     values = np.asarray(run.loads.columns[signal.column])
     return float(signal.factor * values[np.isfinite(values)][0])
 
@@ -132,7 +136,8 @@ def _loaded(
         if a.axis is not None:
             axis = load.axes[a.axis]
             position = told[axis.position]
-            where = float(np.nanmedian(np.asarray(run.loads.columns[position.column]))) * position.factor
+            logged = run.loads.columns.get(position.column)  # none where it has a default
+            where = (axis.low + axis.high) / 2 if logged is None else float(np.nanmedian(logged)) * position.factor
             swept = axis.low + (axis.high - axis.low) * ((GOLDEN * np.arange(len(time))) % 1.0)
             values[position.column] = _as_logged(position, np.where(level[a.name] > 0.0, swept, where))
     units = {**run.loads.units, **{s.column: s.unit for s in load.signals}}

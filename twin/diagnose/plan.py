@@ -44,7 +44,7 @@ _P = TypeVar("_P", Proposal, Separation)
 
 
 @dataclass(frozen=True)
-class _Basis:
+class Basis:
     """The columns (u,) of the detector that hypotheses of a plan are combinations of."""
 
     columns: tuple[int, ...]
@@ -95,7 +95,7 @@ def make_plan(
     made = list(foreseen(detector, machine, runs, experiments, asked, noise, progress))
     _, J = detector.fitter.surrogate.at(np.zeros(len(study.probed.parameters)))
     now = sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J)))
-    basis = _Basis(tuple(columns), tuple(_hour(detector, key) for key in keys))
+    basis = Basis(tuple(columns), tuple(_hour(detector, key) for key in keys))
     lone = tuple(_foresight(detector, now, s, basis, made) for s in suspicions)
     return Plan(lone, tuple(_apart(a, b, basis, made) for a, b in pairs), ASSUMPTIONS)
 
@@ -129,7 +129,7 @@ def _listed(ordered: Sequence[_P]) -> list[_P]:
     return [p for p in ordered if not p.experiment.startswith(AT) or p in sensors[:SENSORS]]
 
 
-def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: _Basis, made: Sequence[Foreseen]) -> Foresight:
+def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made: Sequence[Foreseen]) -> Foresight:
     threshold = detector.thresholds[s.family]
     kind = s.batches(detector)[0][1].kind
     today = np.inf
@@ -188,7 +188,7 @@ def _information(F: np.ndarray, W: np.ndarray) -> np.ndarray:
     return np.asarray(1.0 / np.maximum(inverse[:, 0, 0], 1e-30))
 
 
-def _apart(a: Hypothesis, b: Hypothesis, basis: _Basis, made: Sequence[Foreseen]) -> Apart:
+def _apart(a: Hypothesis, b: Hypothesis, basis: Basis, made: Sequence[Foreseen]) -> Apart:
     """What each experiment makes of LR (1 - cos^2), with the first one true at its fitted size."""
     one, two = (basis.spread(coefficients(h, basis.columns)[None])[0] for h in (a, b))
 

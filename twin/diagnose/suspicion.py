@@ -49,6 +49,13 @@ def known_suspicions(detector: Detector) -> dict[Suspicion, float]:
     }
 
 
+def known_family(text: str, families: Sequence[Family]) -> None:
+    """Raises TwinError with the nearest name where a text begins with no family of the catalogue."""
+    name, names = text.strip().partition(" ")[0], [f.name for f in families]
+    if name not in names:
+        raise TwinError(f"'{name}' is not in the catalogue", OPTION, did_you_mean(name, names, "families"))
+
+
 def named(text: str, detector: Detector) -> list[Suspicion]:
     """The suspicions of a text: "FAMILY PLACE", or "FAMILY" for the place at which its limit is worst.
 
