@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnose.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival, Series, Unknown, Verdict, Window
+from twin.diagnose.plan_result import Apart, Foresight, Plan, Proposal, Separation
+from twin.diagnose.shown_place import Network, Scene, Shell, Support
 
 FAMILIES = ("heat_source", "film_gain", "forced_convection", "joint", "zone", "sensor", "signal", "coolant", "sun")
 
@@ -67,6 +69,22 @@ def made_gains(run: str = "sealed_run", sensors: int = 6) -> tuple[Gain, ...]:
     )
     tcp = tuple(Gain(run, f"d{a}", "m", 9e-6, 4e-6, 1.1e-6, (2e-6, 4e-6), a != "z") for a in "xyz")
     return temperatures + tcp
+
+
+SUPPORT = Support((("sensor_0", 0.7), ("sensor_3", 0.2), ("dx", 0.1)), 1.85)
+BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
+                  [0, 6, 4], [1, 5, 7], [1, 7, 3]])  # fmt: skip
+SIDES = tuple(f"bed.{side}" for side in ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max"))  # two triangles each
+SHELL = Scene(
+    Shell(BOX, FACES, np.zeros(12, dtype=int), np.repeat(np.arange(6), 2), SIDES), 2, ("bed.y_min",),
+    {"sensor_0": (0.5, 0.0, 0.5), "sensor_3": (1.0, 0.5, 0.5), "sensor_4": (0.5, 0.5, 1.0)}, "bed.y_min",
+)  # fmt: skip
+NETWORK = Scene(
+    Network(("head", "column", "bed", "screw"), ("screw",), (("head", "column", False), ("column", "bed", False),
+            ("screw", "head", True)), {}),
+    2, (), {"sensor_0": "head", "x_nut": "screw"}, "sensors.x_nut",
+)  # fmt: skip
 
 
 def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
@@ -135,4 +153,23 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
         seed=seed,
         catalogue="1",
         provenance={"artefact": "0123abc", "runs": ["run_1", "sealed_run"], "seconds": 412.0},
+        support=SUPPORT if causes[verdict] else None,
+        scene=NETWORK if verdict == "sensor" else SHELL if causes[verdict] else None,
     )  # fmt: skip
+
+
+def planned() -> Plan:
+    """Of two suspicions and a pair."""
+    proposals = (
+        Proposal("sensor at bed.left", "the longest run again, with a temperature sensor at bed.left", 5.0, 8.0),
+        Proposal("again", "the longest run again", 20.0, 2.0),
+    )
+    apart = Apart("heat_source bed.left", "film_gain bed.left", 4.0, 10.0, (Separation("again", "the same", 8.0),))
+    return Plan(
+        (
+            Foresight("heat_source", "bed.left", "W", 40.0, 20.0, 500.0, 36.0, False, proposals),
+            Foresight("loss_law", "sources.motor", "1", 9.0, 8.0, 5.0, 36.0, False, proposals[1:]),
+        ),
+        (apart,),
+        ("the same noise",),
+    )

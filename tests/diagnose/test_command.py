@@ -78,6 +78,12 @@ def test_a_sensor_that_is_none(artefact, tmp_path, capsys):
     assert "housing" in told
 
 
+def test_a_plan_for_a_family_that_is_none(artefact, tmp_path, capsys):
+    told = refused([artefact, RUN, "-o", tmp_path / "out", "--plan", "heat_sorce bed"], capsys)
+    assert "did you mean 'heat_source'" in told
+    assert "--plan" in told
+
+
 def test_files_that_are_not_there(artefact, tmp_path, capsys):
     assert "nowhere.h5" in refused([tmp_path / "nowhere.h5", RUN, "-o", tmp_path / "out"], capsys)
     assert "nothing_here" in refused([artefact, tmp_path / "nothing_here", "-o", tmp_path / "out"], capsys)

@@ -12,7 +12,7 @@ import pytest
 
 from tests.calibrate import lumped_case
 from tests.diagnose import small_case
-from tests.diagnose.made_up import SENSOR, SIGNAL, STEP, STRAINED, diagnosis, heat, made_gains, series
+from tests.diagnose.made_up import SENSOR, SIGNAL, STEP, STRAINED, diagnosis, heat, made_gains, planned, series
 from twin.diagnose.accepted import Accepted
 from twin.diagnose.batch import Hypothesis
 from twin.diagnose.catalogue import FAMILIES
@@ -157,6 +157,8 @@ def test_report_json_has_the_keys_that_its_page_explains(written):
         found = json.load(f)
     found["causes"] = plain(diagnosis("named").to_json())["causes"]
     found["causes"][0]["windows"] = plain(replace(diagnosis("named"), causes=(STEP,)).to_json())["causes"][0]["windows"]
+    found["support"] = plain(diagnosis("named").to_json())["support"]
+    found["plan"] = plain(replace(diagnosis("nothing"), plan=planned()).to_json())["plan"]
     assert {"place", "part", "surface", "history", "correlated_signals"} < found["unknown"].keys()
     assert found["unknown"]["place"] == "column.top"
     assert found["unknown"]["correlated_signals"][0] == ["hydraulics", 0.83]

@@ -38,6 +38,9 @@ def _options() -> type[Any]:
 @click.option("--catalogue", type=click.Path(), help="Python file with entries of your own (FAMILIES)")
 @click.option("--machine", type=click.Path(), help="description with its meshes, where it has moved since the build")
 @click.option("--no-build", is_flag=True, help="write the extended description, but do not build its artefact")
+@click.option("--plan", metavar="[SUSPICION]", is_flag=False, flag_value="",
+              help="propose the next experiment for a suspicion ('FAMILY PLACE', as report.json prints them; FAMILY "
+              "alone: its worst place; none: what the verdict leaves open)")  # fmt: skip
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(0), help="of the bootstrap")
 @click.option("--explain", metavar="FAMILY", help="print an entry of the catalogue, or 'all'")
 @bundled(_options)

@@ -167,7 +167,7 @@ def make_detector(
     wind = wind_columns(study, form, progress)
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
-    bare = [OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study), _together(raw, index), _discretised(other, len(J))]
+    bare = [*bare_forms(study, raw, index), _discretised(other, len(J))]
     known = known_forms(study, elements, nominal, raw, J, wind, whiten, form)
     fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known]))
     with progress("measurements without a cause: form", counts[0]) as advance:
@@ -192,6 +192,11 @@ def make_detector(
     small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
     lost = lost_conductances(study, elements, whiten, progress)
     return Detector(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost, pulls)
+
+
+def bare_forms(study: Study, raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> list[np.ndarray]:
+    """Columns (m, k) of unit prior variance that no model is needed for: constant errors of channels, and lateness."""
+    return [OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study), _together(raw, index)]
 
 
 def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.ndarray:

@@ -16,17 +16,22 @@ from twin.diagnose.catalogue import FAMILIES, VERSION, Family
 from twin.diagnose.channels_check import broken_sensors, stuck_sensors
 from twin.diagnose.coarse import too_coarse
 from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
-from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Verdict
+from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Unknown, Verdict
 from twin.diagnose.discretisation import Difference, differences
 from twin.diagnose.gain import predicted
 from twin.diagnose.nulls import form_of
+from twin.diagnose.plan import make_plan
 from twin.diagnose.probed_model import ProbedModel, drive_arrays, make_probed_model
+from twin.diagnose.scene import scene_of
 from twin.diagnose.sealed import judged
 from twin.diagnose.search import search
 from twin.diagnose.search_look import Search
 from twin.diagnose.settled_beside import settled
+from twin.diagnose.shown_place import Scene
 from twin.diagnose.study import Study, make_study
+from twin.diagnose.support import support_of
 from twin.diagnose.surrogate import Surrogate
+from twin.diagnose.suspicion import known_family, named, pairs_of, suspicions_in, worst_of_machine
 from twin.diagnose.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.diagnose.whiten import measured_of
 from twin.errors import ArtefactError, LogError
@@ -51,6 +56,7 @@ class Settings:
     form: int = FORM  # synthetic measurements for model discrepancy
     nulls: int = NULLS  # and for thresholds
     seed: int = 1
+    plan: str | None = None  # a suspicion to plan the next experiment for; "": what the verdict leaves open
 
 
 @dataclass(frozen=True)
@@ -155,7 +161,10 @@ def diagnose(
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
     faults += broken_sensors(usable, sensors, names[: len(runs)])
+    if settings.plan:
+        known_family(settings.plan, settings.families)  # now, not after minutes
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
+    asked = named(settings.plan, detector) if settings.plan else []
     found = search(detector, measured_of(study))
     verdict, causes = verdict_of(found, settings.families)
     shown = found
@@ -167,6 +176,7 @@ def diagnose(
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
+    searched = causes  # what was seen before any search has no statistic that channels could share
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED]
     opened = judged(shown, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
@@ -174,6 +184,13 @@ def diagnose(
         notes.append(opened.note)
     verdict, causes, extension = opened.verdict, opened.causes, opened.extension
     first = found.steps[0]
+    heat = unknown_of(found) if verdict == "unknown" else None
+    planned = None
+    if settings.plan is not None:
+        pairs = pairs_of(found) if verdict == "ambiguous" and not asked else []
+        chosen = asked or suspicions_in([h for pair in pairs for h in pair], detector)
+        chosen = chosen or worst_of_machine(detector, settings.families)
+        planned = make_plan(detector, machine, usable, chosen, pairs, settings.temperature_sigma, progress)
     diagnosis = Diagnosis(
         machine=machine.machine.name,
         verdict=verdict,
@@ -181,7 +198,7 @@ def diagnose(
         causes=causes,
         pulls=pulls_of(shown),
         detection_limits=limits_of(detector),
-        unknown=unknown_of(found) if verdict == "unknown" else None,
+        unknown=heat,
         gain=opened.gains,
         ranked=tuple(rival_of(h, float(first.cosine[0, i])) for i, h in enumerate(first.ranked)),
         cosine=first.cosine,
@@ -203,8 +220,20 @@ def diagnose(
             "window_error_K": study.probed.reduction[0],
             "window_error_m": study.probed.reduction[1],
         },
+        support=support_of(found) if searched and heat is None else None,
+        scene=_scene(machine, study.probed, searched or causes, heat),
+        plan=planned,
     )
     return Result(diagnosis, found, extension)
+
+
+def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unknown: Unknown | None) -> Scene | None:
+    """Where the first cause is, or the heat that nothing explains."""
+    if unknown is not None:
+        return scene_of(machine, probed, unknown.surface)
+    if not causes:
+        return None
+    return scene_of(machine, probed, causes[0].place, str(causes[0].settings.get("surface", "")))
 
 
 def _summary(verdict: Verdict, causes: Sequence[Cause], found: Search) -> tuple[str, ...]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
+from twin.diagnose.plan_result import Plan
+from twin.diagnose.shown_place import Scene, Support
 from twin.machine.effects.effect import Window
 
 Verdict = Literal["named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing"]
@@ -149,11 +151,14 @@ class Diagnosis:
     seed: int
     catalogue: str  # version
     provenance: Mapping[str, Any]
+    plan: Plan | None = None  # of the next experiment, where one was asked for
+    support: Support | None = None  # of the first cause
+    scene: Scene | None = None  # where it is, for the picture
 
     def to_json(self) -> dict[str, Any]:
         """What report.json holds: everything but the series."""
-        d = asdict(self)
-        del d["series"]
+        d = asdict(replace(self, series=(), scene=None))
+        del d["series"], d["scene"]
         if self.unknown:
             d["unknown"] = {"place": self.unknown.surface, **d["unknown"]}  # as a cause says where it is
         d["cosine"] = self.cosine.tolist()

@@ -36,9 +36,12 @@ SET_GAP = 600.0  # s: rows closer than that belong to one measurement
 
 
 def readings_of(
-    study: Study, nominal: Sequence[Nominal], outputs: Sequence[np.ndarray], J: Sequence[np.ndarray]
+    study: Study, nominal: Sequence[Nominal], outputs: Sequence[np.ndarray], J: Sequence[np.ndarray], swaps: bool = True
 ) -> tuple[np.ndarray, dict[Key, int]]:
-    """(m, n) columns of all fitted runs, and where each is; outputs, J: nominal ones per fitted run."""
+    """(m, n) columns of all fitted runs, and where each is; outputs, J: nominal ones per fitted run.
+
+    swaps: with a column for every pair of sensors, whose number grows with the square of theirs.
+    """
     columns: list[np.ndarray] = []
     index: dict[Key, int] = {}
 
@@ -50,7 +53,7 @@ def readings_of(
     scale = study.scale
     for i, p in enumerate(study.probed.parameters):
         add(("gain", p.path, "always"), [jac[:, i] / scale[i] for jac in J])
-    _sensors(study, plans, outputs, add)
+    _sensors(study, plans, outputs, add, swaps)
     if any(len(plan.measured.tcp) for plan in plans):
         _tcp(study, plans, nominal, add)
     for r, plan in enumerate(plans):
@@ -77,7 +80,7 @@ def _shown(plan: Planned, w: np.ndarray) -> np.ndarray:
     return w - w[0] if plan.measured.from_first else w
 
 
-def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarray], add: Add) -> None:
+def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarray], add: Add, swaps: bool) -> None:
     names = tuple(dict.fromkeys(s for plan in plans for s in plan.measured.sensors))
     surround = study.probed.base.load_model.surroundings
 
@@ -109,7 +112,7 @@ def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarra
         rates = [np.gradient(T, t) if len(t) > 1 else np.zeros_like(T) for T, t in zip(read[name], time, strict=True)]
         add(("lag", name, "always"), column([(name, [-v for v in rates])]))
         add(("detached", name, "always"), column([(name, [a - T for a, T in zip(air, read[name], strict=True)])]))
-    for a, first in enumerate(names):
+    for a, first in enumerate(names if swaps else ()):
         for second in names[a + 1 :]:
             change = [y - x for x, y in zip(read[first], read[second], strict=True)]
             add(("swapped", f"{first}<>{second}", "always"), column([(first, change), (second, [-c for c in change])]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from twin.diagnose.diagnosis import Diagnosis
 from twin.diagnose.report_evidence import candidates_picture, cosine_picture, nulls_picture, pulls_picture
 from twin.diagnose.report_gain import gain_picture, overlay_picture, unknown_picture
 from twin.diagnose.report_pictures import Picture, inline_svg, rms
+from twin.diagnose.report_place import place_picture
+from twin.diagnose.report_plan import plan_section
 from twin.diagnose.report_residuals import RUNS, by_load_state, residual_map, whiteness_picture
 from twin.diagnose.report_style import STYLE
 from twin.diagnose.report_tables import (
@@ -38,6 +41,7 @@ from twin.diagnose.report_text import (
     remedies,
     sealed_runs,
     summary_lines,
+    support_words,
     verdict_sentence,
     what,
 )
@@ -94,6 +98,24 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
+@dataclass(frozen=True)
+class Section:
+    """A part of the page: what everybody reads, and what opens with a click. A link to it opens it."""
+
+    name: str
+    title: str
+    shown: str = ""
+    folded: str = ""
+
+    def html(self) -> str:
+        head = f"<h2>{self.title}</h2>"
+        if not self.shown:
+            inner = f'<section id="{self.name}">\n{self.folded}\n</section>'
+            return f'<details class="part"><summary>{head}</summary>\n{inner}</details>'
+        more = f"<details><summary>Pictures and tables</summary>\n{self.folded}\n</details>" if self.folded else ""
+        return f'<section id="{self.name}">{head}\n{self.shown}\n{more}</section>'
+
+
 def page(d: Diagnosis) -> str:
     """The whole page."""
     count = 0
@@ -108,28 +130,34 @@ def page(d: Diagnosis) -> str:
             shown.append(_figure(picture, f"p{count}"))
         return "\n".join(shown)
 
+    place = show(place_picture(d))
     sections = [
-        ("evidence", "What it rests on", _evidence(d)),
-        ("gain", "Gain on the sealed run", _gain(d, show)),
-        ("residuals", "Residuals", _residuals(d, show)),
-        ("decision", "How it was decided", _decision(d, show)),
-        ("pulls", "Pulls", _pulls(d, show)),
-        ("unknown", "Heat that nothing explains", _unknown(d, show)),
-        ("limits", "Detection limits", _limits(d)),
-        ("notes", "Notes and provenance", _notes(d)),
+        Section("evidence", "What it rests on", _evidence(d)),
+        Section("plan", "The next experiment", plan_section(d.plan)),
+        Section("gain", "Gain on the sealed run", *_gain(d, show)),
+        Section("residuals", "Residuals", folded=_residuals(d, show)),
+        Section("decision", "How it was decided", folded=_decision(d, show)),
+        Section("pulls", "Pulls", folded=_pulls(d, show)),
+        Section("unknown", "Heat that nothing explains", *_unknown(d, show)),
+        Section("limits", "Detection limits", *_limits(d)),
+        Section("notes", "Notes and provenance", folded=_notes(d)),
     ]
+    sections = [s for s in sections if s.shown or s.folded]
     if d.verdict == "nothing":  # what would have been seen is the result then
-        sections.insert(0, sections.pop([name for name, _, _ in sections].index("limits")))
-    contents = " ".join(f'<a href="#{name}">{title}</a>' for name, title, _ in sections)
-    body = "\n".join(f'<section id="{name}"><h2>{title}</h2>\n{text}\n</section>' for name, title, text in sections)
+        sections.insert(0, sections.pop([s.name for s in sections].index("limits")))
+    contents = " ".join(f'<a href="#{s.name}">{s.title}</a>' for s in sections)
+    body = "\n".join(s.html() for s in sections)
     title = escape(f"{d.machine}: diagnosis")
-    said = "".join(f"<p>{escape(text)}</p>" for text in d.summary)
+    sentence = verdict_sentence(d)
+    said = "".join(f"<p>{escape(text)}</p>" for text in d.summary if text.lower() not in sentence.lower())
+    carried = f"<p>{escape(support_words(d.support))}</p>" if d.support else ""
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title><style>{STYLE}</style></head><body>
 <h1>{title}</h1>
 <div class="verdict {d.verdict}"><p class="label">{_LABELS[d.verdict]}</p>
-<p class="sentence">{escape(verdict_sentence(d))}</p><p>{_FOLLOWS[d.verdict]}</p></div>
+<p class="sentence">{escape(sentence)}</p><p>{_FOLLOWS[d.verdict]}</p>{carried}</div>
+{place}
 {said}
 <nav>{contents}</nav>
 {body}
@@ -197,16 +225,17 @@ def _rivals(d: Diagnosis) -> str:
     return "\n".join(parts)
 
 
-def _gain(d: Diagnosis, show: Any) -> str:
+def _gain(d: Diagnosis, show: Any) -> tuple[str, str]:
+    """What is read, and what is folded."""
     pictures = show(*(p for s in d.series if s.sealed for p in (gain_picture(d, s.run), overlay_picture(d, s))))
     if not d.gain:
         sealed = any(s.sealed for s in d.series)
         why = "nothing was measured in the run kept aside" if sealed else "no run was kept aside"
-        return f"<p>There is no gain to report: {why}.</p>" + pictures
+        return f"<p>There is no gain to report: {why}.</p>", pictures
     runs = sealed_runs(d)
     told = f"Run {runs[0]} was" if len(runs) == 1 else f"Runs {', '.join(runs)} were"
     head = f"<p>{escape(f'{told} opened once, after everything was decided.')}</p>"
-    return head + _items(gain_sentences(d)) + pictures + gain_table(d)
+    return head + _items(gain_sentences(d)), pictures + gain_table(d)
 
 
 def _residuals(d: Diagnosis, show: Any) -> str:
@@ -239,25 +268,27 @@ def _pulls(d: Diagnosis, show: Any) -> str:
     return show(pulls_picture(d)) + pulls_table(d)
 
 
-def _unknown(d: Diagnosis, show: Any) -> str:
+def _unknown(d: Diagnosis, show: Any) -> tuple[str, str]:
     if d.unknown is None:
-        return "<p>No heat remained that the catalogue does not explain.</p>"
+        return "", "<p>No heat remained that the catalogue does not explain.</p>"
     rows = [[name, f"{correlation:+.2f}"] for name, correlation in d.unknown.correlated_signals]
     follows = table(["logged signal", "correlation with this heat"], rows, (1,)) if rows else ""
-    return show(unknown_picture(d)) + follows
+    return show(unknown_picture(d)) + follows, ""
 
 
-def _limits(d: Diagnosis) -> str:
+def _limits(d: Diagnosis) -> tuple[str, str]:
+    """The result where nothing is found; else folded."""
     if not d.detection_limits:
-        return "<p>Detection limits were not determined.</p>"
-    lead = ""
-    if d.verdict == "nothing":
-        sizes = _items(map(limit_words, d.detection_limits))
-        lead = f"<p><strong>At half of all places these data would have shown, in 95 of 100 cases:</strong></p>{sizes}"
+        return "", "<p>Detection limits were not determined.</p>"
     text = (
         "The smallest size of each effect that would have been named in these data; smaller ones may be there unseen."
     )
-    return f"{lead}<p>{text}</p>{limits_table(d)}"
+    every = f"<p>{text}</p>{limits_table(d)}"
+    if d.verdict != "nothing":
+        return "", every
+    sizes = _items(map(limit_words, d.detection_limits))
+    lead = "At half of all places these data would have shown, in 95 of 100 cases:"
+    return f"<p><strong>{lead}</strong></p>{sizes}", every
 
 
 def _notes(d: Diagnosis) -> str:

@@ -36,6 +36,10 @@ _PAGE_COLOURS = {INK: "--ink", RC["grid.color"]: "--grid", DELIVERED: "--grey", 
                  EXTENDED: "--orange", MUTED: "--faint"}  # fmt: skip
 
 
+_BETWEEN = re.compile(r"(?<=>)\s*\n\s*(?=<)")  # blanks between tags: text has none around it
+_LONG = re.compile(r"-?\d+\.\d{3,}")
+
+
 @dataclass(frozen=True)
 class Picture:
     title: str
@@ -64,7 +68,23 @@ def inline_svg(figure: Figure, name: str) -> str:
         body = body.replace(f": {colour}", f": var({variable})")
     body = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font-size: \1", body)
     body = re.sub(r"font-family: [^;\"]*;? ?", "", body)  # the page's
-    return f"{head}>{body}"
+    body = re.sub(r' (d|x|y)="([^"]*)"', lambda m: f' {m[1]}="{_LONG.sub(_short, m[2])}"', body)
+    body = re.sub(r'(<g clip-path="[^"]*")>((?:\s*<use [^>]*/>)+)', _of_group, body)
+    return f"{head}>{re.sub(_BETWEEN, '', body)}"
+
+
+def _of_group(found: re.Match[str]) -> str:
+    """Dots of one look: it stands once, before them, instead of at each."""
+    styles = set(re.findall(r' style="[^"]*"', found[2]))
+    if len(styles) != 1:
+        return found[0]
+    (style,) = styles
+    return f"{found[1]}{style}>{found[2].replace(style, '')}"
+
+
+def _short(number: re.Match[str]) -> str:
+    """To a hundredth of a point: what matplotlib writes more is half of a page's bytes."""
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
 
 
 def short(name: str, length: int = 28) -> str:

@@ -68,7 +68,7 @@ def load_rows(loads: Mapping[str, np.ndarray]) -> tuple[list[str], np.ndarray]:
 
 
 def residual_map(series: Series) -> Picture | None:
-    """Sensor x time, as delivered, recalibrated and extended, with the loads below; None without a bin."""
+    """Sensor x time, as delivered, recalibrated and extended, with the loads below the first; None without a bin."""
     if not len(series.time) or not series.sensors:
         return None
     chosen = loudest(series)
@@ -89,12 +89,15 @@ def residual_map(series: Series) -> Picture | None:
             )  # fmt: skip
             left = float(rms(np.asarray(residual)[:, chosen].ravel()))
             axes.set_title(f"{stage}, {left:.2f} K" if np.isfinite(left) else stage)
-            if names:
+            if names and k == 0:  # one strip for all stages: their loads are the same
                 edges, rows = with_gaps(hours, loads.T)
                 panels[1, k].pcolormesh(
                     edges, np.arange(len(names) + 1), rows.T, cmap=LOAD_MAP, vmin=0, vmax=1, rasterized=True
                 )
-            panels[-1, k].set_xlabel("time in h")
+            elif names:
+                panels[1, k].set_axis_off()
+                axes.tick_params(labelbottom=True)
+        panels[-1, 0].set_xlabel("time in h")
         panels[0, 0].set_yticks(np.arange(len(chosen)) + 0.5, [short(series.sensors[i]) for i in chosen], fontsize=7.5)
         panels[0, 0].set_ylim(len(chosen), 0)
         if names:
@@ -105,7 +108,7 @@ def residual_map(series: Series) -> Picture | None:
     return Picture(
         f"Residuals of {series.run}" + (" (sealed: no value was fitted to it)" if series.sealed else ""),
         "Orange: the machine is warmer than the simulation, blue: colder, grey: no data; what switches with a "
-        "row of the strip below (dark: large) follows that load, and a good model leaves a pale map"
+        "row of the strip at the left (dark: large) follows that load, and a good model leaves a pale map"
         + (f" ({left_out} sensors with smaller residuals are left out)." if left_out else "."),
         fig,
     )

@@ -21,6 +21,9 @@ figure { margin: 1.2rem 0 2rem; break-inside: avoid; }
 figcaption { color: var(--muted); }
 svg.plot { width: 100%; height: auto; font-family: system-ui, sans-serif; }
 svg.plot * { stroke-linejoin: round; stroke-linecap: butt; }
+details > summary { cursor: pointer; color: var(--blue); margin: .4rem 0; }
+details.part > summary { margin: 1.2rem 0 0; border-bottom: 1px solid var(--grid); }
+details.part > summary h2 { display: inline-block; margin: .4rem 0; border: none; color: var(--ink); }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; margin: .6rem 0 1.2rem; font-size: .88rem; }
 th, td { text-align: left; padding: .25rem .7rem .25rem 0; border-bottom: 1px solid var(--grid); vertical-align: top;
@@ -28,5 +31,6 @@ th, td { text-align: left; padding: .25rem .7rem .25rem 0; border-bottom: 1px so
 th { color: var(--muted); font-weight: 600; }
 .number { text-align: right; font-variant-numeric: tabular-nums; }
 @media print { body { max-width: none; margin: 0; font-size: 10pt; } nav { display: none; } tr { break-inside: avoid; }
-  h2, h3 { break-after: avoid; } .wide { overflow: visible; } .verdict { print-color-adjust: exact; } }
+  h2, h3 { break-after: avoid; } .wide { overflow: visible; } .verdict { print-color-adjust: exact; }
+  details::details-content { content-visibility: visible; display: block; } }
 """

@@ -26,6 +26,11 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[
     return f'<div class="wide"><table><thead><tr>{titles}</tr></thead><tbody>\n{shown}\n</tbody></table></div>{more}'
 
 
+def folded(summary: str, html: str) -> str:
+    """What a reader opens who wants to know: a line that says what it is, over escaped HTML."""
+    return f"<details><summary>{escape(summary)}</summary>\n{html}\n</details>" if html else ""
+
+
 def _sized(value: float, ci95: tuple[float, float], unit: str) -> tuple[str, str]:
     middle, low, high, name = interval_and_unit(value, *ci95, unit)
     if not math.isfinite(value):

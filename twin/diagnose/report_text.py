@@ -11,7 +11,9 @@ import numpy as np
 from twin.diagnose.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival
 from twin.diagnose.report_numbers import interval_and_unit, number, quantity, size_words
 from twin.diagnose.report_recalibration import left_words, moved_words
+from twin.diagnose.shown_place import Support
 
+LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
 # What each family of the catalogue is, as the subject of "... at PLACE: SIZE".
 WHAT: dict[str, str] = {
     "film_gain": "heat transfer other than declared",
@@ -275,6 +277,13 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
     return f"It lies {far} standard deviations {whose} from what was declared; {needed} are needed."
 
 
+def support_words(support: Support) -> str:
+    """How many channels carry the first cause, and which."""
+    strongest = [f"{name} {100 * share:.0f} %" for name, share in support.shares[:3] if share >= LEAST_SHARE]
+    n = number(support.participation, 1)
+    return f"{n} channels carry this (participation ratio): {', '.join(strongest)} of the evidence."
+
+
 def sealed_runs(d: Diagnosis) -> list[str]:
     """The runs on which the gain was measured."""
     return list(dict.fromkeys(g.run for g in d.gain))
@@ -320,6 +329,8 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     lines = [f"{d.machine}: {d.verdict.replace('_', ' ')}", verdict_sentence(d)]
     several = len(d.causes) > 1
     lines += [(f"{c.place}: " if several else "") + cause_evidence(d, c) for c in d.causes[:2]]
+    if d.support:
+        lines.append(support_words(d.support))
     if d.unknown and not d.causes:
         lines.append(evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold))
     if d.verdict == "signal" and any(c.parameter for c in d.causes):

@@ -36,6 +36,9 @@ class DiagnoseOptions:
     nulls: int = 200  # synthetic runs without a cause that thresholds come from
     catalogue: str | Path | None = None  # Python file with entries of your own (FAMILIES)
     seed: int = 1  # of the bootstrap
+    plan: str | None = (
+        None  # a suspicion, "FAMILY PLACE", to plan the next experiment for; "": what the verdict leaves open
+    )
 
     def families(self) -> tuple[Family, ...]:
         """The catalogue, with entries of one's own."""
@@ -54,6 +57,7 @@ class DiagnoseOptions:
             self.families(),
             nulls=self.nulls,
             seed=self.seed,
+            plan=self.plan,
         )
 
 
@@ -160,8 +164,10 @@ class Report:
 
     def __str__(self) -> str:
         from twin.diagnose.report_page import summary_lines
+        from twin.diagnose.report_plan import plan_lines
 
-        return "\n".join([*summary_lines(self.findings), *self.said])
+        planned = plan_lines(self.findings.plan) if self.findings.plan else []
+        return "\n".join([*summary_lines(self.findings), *planned, *self.said])
 
 
 def diagnose(
