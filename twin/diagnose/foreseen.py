@@ -24,7 +24,7 @@ from twin.diagnose.detector import Detector, bare_forms
 from twin.diagnose.elements import Elements, Histories, Key, elements_of
 from twin.diagnose.experiments import SENSOR, Experiment, longest_of
 from twin.diagnose.formal import known_forms
-from twin.diagnose.nulls import Form
+from twin.diagnose.nulls import Form, form_of
 from twin.diagnose.probed_model import ProbedModel, make_probed_model
 from twin.diagnose.readings import readings_of
 from twin.diagnose.study import Planned, Study, make_study
@@ -95,7 +95,7 @@ def foreseen(
             both = replace(study, runs=(*study.runs[:n], own), fitted=tuple(range(n + 1)))
             each = [*known, _at_nominal(study, n + e)]
             whiten = Whitener(both, (*channels, _channels(detector, own, of_new, noise)))
-            yield from _compared(both, whiten, each, experiment, asked)
+            yield from _compared(both, whiten, each, experiment, asked, form_of(machine))
             advance(experiment.name)
 
 
@@ -140,7 +140,7 @@ def _channels(detector: Detector, planned: Planned, k: int, noise: float) -> tup
 
 
 def _compared(
-    study: Study, whiten: Whitener, runs: Sequence[_Run], experiment: Experiment, asked: Asked
+    study: Study, whiten: Whitener, runs: Sequence[_Run], experiment: Experiment, asked: Asked, form: Form
 ) -> Iterator[Foreseen]:
     nominal = tuple(r.nominal for r in runs)
     elements = elements_of(study, nominal)
@@ -152,8 +152,8 @@ def _compared(
     narrow = _narrowed(elements, chosen)
     place = {c: i for i, c in enumerate(chosen)}
     raw = respond(study, nominal, elements.vectors, narrow.columns)
-    wind = wind_columns(study, Form())
-    known = known_forms(study, narrow, nominal, raw, J, wind, whiten, Form())
+    wind = wind_columns(study, form)
+    known = known_forms(study, narrow, nominal, raw, J, wind, whiten, form)
     D = np.zeros((len(J), 2 * len(wanted)))
     for i, (now, new, reading, factor) in enumerate(wanted):
         if now is not None:
