@@ -28,6 +28,7 @@ from twin.diagnose.study import Study
 PULLED = 2.5  # standard deviations by which data without its tolerance must tell a number from the declared one
 BEYOND = 3.0  # prior standard deviations that a number out of its tolerance keeps beside any other explanation
 OUTSIDE = 1.0  # prior standard deviations: the declared tolerance itself
+SURE = 1.96  # standard deviations of its own that a number without its tolerance is off: its 95 % interval
 LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
 NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
@@ -82,14 +83,15 @@ def closed(
 def loose_ones(detector: Detector, y: np.ndarray, fitted: np.ndarray, settled: np.ndarray) -> tuple[Loose, ...]:
     """The FAR declared numbers farthest out of their tolerance, by parameters (n,) of two calibrations.
 
-    Out of its tolerance is what lies outside without one, too, on the same side.
+    Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared.
     """
     strain = detector.pulls.strain(fitted, settled)
     found = []
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
         x, covariance = settled_alone(detector.fitter, y, (j,))
-        if np.sign(fitted[j]) * x[j] > OUTSIDE:
-            found.append(Loose(j, float(x[j]), float(np.sqrt(covariance[j, j])), float(strain[j])))
+        sigma = float(np.sqrt(covariance[j, j]))
+        if np.sign(fitted[j]) * x[j] > max(OUTSIDE, SURE * sigma):
+            found.append(Loose(j, float(x[j]), sigma, float(strain[j])))
         if len(found) == FAR:
             break
     return tuple(found)
