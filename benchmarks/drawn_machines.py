@@ -2,7 +2,8 @@
 
 Truth is the full model of the real machine (`twin.inject.machines.other`): another mesh, other film laws, values off.
 Every machine is looked at with nothing hidden and with one fault of each of IN_MACHINE and IN_LOG; a row per trial goes
-to out/drawn/KIND_SEED.jsonl, and files that are there are not made again. The last lines count the answers.
+to out/drawn/KIND_SEED.jsonl, and files that are there are not made again. The last lines count the answers, of all
+trials and of those that are visible: faults in the machine that move any sensor by 0.5 K or the TCP by 3 um.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from twin.diagnose.whiten import measured_of
 from twin.inject.machines.drawn import RUNS, DrawnMachine, draw_machine
 from twin.inject.machines.other import other
 from twin.logs.read import read_run
+from twin.logs.run import Run
 from twin.machine.description import Machine
 
 OUT = Path("out/drawn")
@@ -40,6 +42,8 @@ TRUTHS = 2  # real machines with nothing hidden, per description
 IN_MACHINE = {"heat_source": "", "loss_law": "1.6", "joint": "0.3", "film_gain": "2", "expansion": "1.3"}
 IN_LOG = {"offset": "1 K", "drift": "2 K", "swapped": "", "factor": "1.4142135623730951"}
 SHARE = 0.25  # of the mean power of all sources: hidden heat
+# K, m: what a fault in the machine must do to be asked for, in means of an hour, or of three TCP rows
+VISIBLE = 0.5, 3e-6
 
 
 Row = dict[str, Any]
@@ -118,7 +122,7 @@ def _simulate(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachin
 
 def main(first: int, count: int, kind: str = "") -> None:
     OUT.mkdir(parents=True, exist_ok=True)
-    answers: dict[str, Counter[str]] = {}
+    answers: dict[tuple[str, bool], Counter[str]] = {}
     for seed in range(first, first + count):
         path = OUT / f"{kind or 'any'}_{seed}.jsonl"
         if not path.exists():
@@ -127,12 +131,17 @@ def main(first: int, count: int, kind: str = "") -> None:
             path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
         for line in path.read_text(encoding="utf-8").splitlines():
             row = json.loads(line)
-            answers.setdefault(row["hidden"][0], Counter())[answer(row)] += 1
+            visible = any(m >= least for m, least in zip(row["moved"], VISIBLE, strict=True))
+            for only in (False, True) if visible else (False,):
+                answers.setdefault((row["hidden"][0], only), Counter())[answer(row)] += 1
             print(
                 seed, row["hidden"], answer(row), row["verdict"], row["causes"], f"{row['seconds']:.0f} s", flush=True
             )
-    for kind, of_kind in answers.items():
-        print(f"   {kind:<12} {', '.join(f'{n} {told}' for told, n in of_kind.most_common())}")
+    for only in (False, True):
+        print("of those that are visible" if only else "of all")
+        for (hidden, seen), of_kind in answers.items():
+            if seen == only:
+                print(f"   {hidden:<12} {', '.join(f'{n} {told}' for told, n in of_kind.most_common())}")
 
 
 Measured = tuple[tuple[str, str, str], list[Path]]  # what was hidden, and the measured runs
@@ -159,7 +168,35 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
             made = _in_log(measured_runs[1][1], out, hidden)
         if made:
             measured_runs.append((hidden, made))
-    return [_said(detector, hidden, [read_run(p) for p in paths]) for hidden, paths in measured_runs]
+    healthy = [read_run(p) for p in measured_runs[0][1]]
+    rows = []
+    for hidden, paths in measured_runs:
+        said = [read_run(p) for p in paths]
+        moved = _moved(said, healthy) if hidden[0] in IN_MACHINE else (np.inf, np.inf)
+        rows.append(_said(detector, hidden, said) | {"moved": moved})
+    return rows
+
+
+def _moved(runs: Sequence[Run], healthy: Sequence[Run]) -> tuple[float, float]:
+    """K and m by which a fault moves the sensor, and the TCP, that it moves most: means of an hour, or of three rows.
+
+    Of the same real machine without it; the noise of both is in it.
+    """
+    kelvin, metres = 0.0, 0.0
+    for a, b in zip(runs, healthy, strict=True):
+        if a.temperatures is not None and b.temperatures is not None:
+            rows = max(1, int(3600.0 / float(np.median(np.diff(a.temperatures.time)))))
+            for name, values in a.temperatures.columns.items():
+                kelvin = max(kelvin, _largest(values - b.temperatures.columns[name], rows))
+        if a.tcp is not None and b.tcp is not None:
+            metres = max([metres, *(_largest(d, 3) for d in (a.tcp.displacement - b.tcp.displacement).T)])
+    return kelvin, metres
+
+
+def _largest(values: np.ndarray, rows: int) -> float:
+    """The largest mean of so many values one after the other."""
+    n = len(values) // rows * rows
+    return float(np.abs(values[:n].reshape(-1, rows).mean(axis=1)).max(initial=0.0))
 
 
 def _healthy(drawn: DrawnMachine, folder: Path, logs: Sequence[Path], k: int) -> Measured:

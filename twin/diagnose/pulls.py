@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.diagnose.batch import Hypothesis
 from twin.rom.parameter import Parameter
 
 NAMED = ("source", "film", "joint", "contact", "expansion")  # kinds whose number may be named out of its tolerance
@@ -64,6 +65,7 @@ class Loose:
     x: float  # prior standard deviations
     sigma: float  # likewise
     strain: float  # times the limit
+    rivals: tuple[tuple[Hypothesis, float], ...] = ()  # what does the same, with its cosine
 
 
 def tail(values: np.ndarray, share: float) -> float:

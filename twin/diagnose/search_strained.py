@@ -91,9 +91,28 @@ def loose_ones(detector: Detector, y: np.ndarray, fitted: np.ndarray, settled: n
         x, covariance = settled_alone(detector.fitter, y, (j,))
         sigma = float(np.sqrt(covariance[j, j]))
         if np.sign(fitted[j]) * x[j] > max(OUTSIDE, SURE * sigma):
-            found.append(Loose(j, float(x[j]), sigma, float(strain[j])))
+            found.append(Loose(j, float(x[j]), sigma, float(strain[j]), _signals(detector, j, float(x[j]), sigma)))
         if len(found) == FAR:
             break
+    return tuple(found)
+
+
+def _signals(detector: Detector, j: int, x: float, sigma: float) -> tuple[tuple[Hypothesis, float], ...]:
+    """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says."""
+    study = detector.study
+    if study.probed.parameters[j].kind != "source":
+        return ()
+    n, scale = len(study.probed.parameters), float(study.scale[j])
+    own = detector.whiten(detector.fitter.surrogate.at(np.zeros(n))[1][:, j]) / scale
+    size, found = float(own @ own), []
+    for batch in detector.columns.batches:
+        for i, _ in enumerate(batch.places if batch.kind == "signal" else ()):
+            signal = detector.columns.raw[:, batch.columns[i, 0]].astype(float)
+            along = float(signal @ own)
+            cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
+            heat = 1.0 + along / size
+            if abs(cosine) >= SAME and heat > 0.0 and abs(np.log(heat) - scale * x) < SURE * scale * sigma:
+                found.append((Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), float(cosine)))
     return tuple(found)
 
 

@@ -130,7 +130,7 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
     """What would tell two causes apart that these data do not."""
     wrong = next((h.name for h in (a, b) if h.family == "signal" and h.name.startswith("signals.")), None)
     if wrong is not None:
-        return f"one reading of {wrong.split('*')[0]} beside an instrument, or what the drive's manual says it logs"
+        return _reading(wrong)
     if a.name != b.name and a.when.name == b.when.name:
         return f"a temperature sensor between {a.name} and {b.name}, nearer to one of them"
     signals = [h.when.signal for h in (a, b) if h.when.signal]
@@ -142,6 +142,11 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
         both = f"{a.family} and {b.family}"
         return f"a run in which the air is 5 K colder, and one that cools from standstill: {both} differ there"
     return f"temperature sensors at {a.name} and at {b.name}"
+
+
+def _reading(signal: str) -> str:
+    """What tells whether a signal is declared rightly; signal: as "signals.x_current*1.4142"."""
+    return f"one reading of {signal.split('*')[0]} beside an instrument, or what the drive's manual says it logs"
 
 
 def _part(name: str) -> str:
@@ -164,7 +169,9 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
     if not causes:
         strained = strained_of(found)
-        return ("out_of_tolerance", strained) if strained else ("nothing", ())
+        if not strained:
+            return "nothing", ()
+        return "ambiguous" if strained[0].rivals else "out_of_tolerance", strained
     lead, chosen = causes[0], found.accepted[0]
     for other, cosine in chosen.rivals:
         more = AMPLITUDE * (other.batch.q - chosen.hypothesis.batch.q)
@@ -208,6 +215,7 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
         result.append(Cause(
             family=STRAIN[p.kind], place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
             statistic=own.strain**2, threshold=1.0, history=CALIBRATED,
+            rivals=tuple(rival_of(h, cosine, _reading(h.name)) for h, cosine in own.rivals),
         ))  # fmt: skip
     return tuple(sorted(result, key=lambda c: -c.statistic))
 
