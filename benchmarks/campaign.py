@@ -19,7 +19,7 @@ from twin.atomic import atomic_path
 from twin.build.workers import each
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.channels_check import broken_sensors, stuck_sensors
 from twin.diagnose.detector import Detector
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.gain import predicted
@@ -76,8 +76,9 @@ def judged(detector: Detector, trial: Trial) -> dict[str, Any]:
     usable, stuck = stuck_sensors(trial.runs[:2], detector.study.probed.base.sensors, names)
     if stuck:
         trial = replace(trial, runs=(*usable, *trial.runs[2:]))
+    stuck += broken_sensors(usable, detector.study.probed.base.sensors, names)
     plans = plans_of(detector, trial)
-    own = emptied(detector, plans) if stuck else detector
+    own = emptied(detector, plans)
     y = measured_of(with_measured(detector.study, plans))
     found = search(own, y)
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)

@@ -22,7 +22,7 @@ import numpy as np
 from twin.calibrate.fit.measured import measured
 from twin.cli.main import run as command
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.channels_check import broken_sensors, stuck_sensors
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.gaps import emptied
 from twin.diagnose.sealed import judged as on_sealed
@@ -131,7 +131,7 @@ def main(first: int, count: int, kind: str = "") -> None:
             path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
         for line in path.read_text(encoding="utf-8").splitlines():
             row = json.loads(line)
-            visible = any(m >= least for m, least in zip(row["moved"], VISIBLE, strict=True))
+            visible = any(m >= least for m, least in zip(row.get("moved", VISIBLE), VISIBLE, strict=True))
             for only in (False, True) if visible else (False,):
                 answers.setdefault((row["hidden"][0], only), Counter())[answer(row)] += 1
             print(
@@ -245,7 +245,8 @@ def _said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
         measured(study.probed.base, run, p.run.drive, p.run.name)
         for run, p in zip([*usable, *runs[2:]], study.runs, strict=True)
     ]
-    own = emptied(detector, plans) if stuck else detector
+    stuck += broken_sensors(usable, study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
+    own = emptied(detector, plans)
     found = search(own, measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     opened = on_sealed(found, verdict, causes, FAMILIES, plans[2:], 1)

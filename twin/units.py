@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 LARGEST = 1e15
 # degC of a machine and what surrounds it: 293.15 is 20 degC in kelvin, and below absolute zero there is nothing.
 COLDEST, HOTTEST = -60.0, 200.0
+FURNACE = 1500.0  # degC, of surroundings that radiate
 _ABSOLUTE_ZERO = -273.15  # degC
 
 _ANGLES = {
@@ -187,6 +188,11 @@ def to_si(value: float | int | str, unit: str) -> float:
     if abs(number) > LARGEST:
         raise ValueError(f"{number:g} {unit} is beyond all reason")
     return number
+
+
+def surroundings_temperature(value: float) -> float:
+    """The value [degC] likewise, where surroundings can have it: a furnace may stand beside a machine."""
+    return value if HOTTEST - _ABSOLUTE_ZERO < value <= FURNACE else machine_temperature(value)
 
 
 def machine_temperature(value: float) -> float:

@@ -88,7 +88,7 @@ def test_what_only_uses_thresholds_does_not_decide_about_them():
         "twin.diagnose.probed_model",
         "twin.calibrate.fit.window",
     } <= set(closure)
-    users = {"diagnose", "search", "verdict", "settled", "gain", "refit", "report_page", "hide", "damage"}
+    users = {"diagnose", "search", "verdict", "settled_beside", "gain", "refit", "report_page", "hide", "damage"}
     assert not users & {name.rpartition(".")[2] for name in closure if name.startswith("twin.diagnose.")}
     assert not [name for name in closure if name.startswith(("twin.cli", "twin.pictures"))]
 

@@ -13,11 +13,12 @@ from twin.build.cache import folder
 from twin.build.project import orthonormalise, project
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.channels_check import broken_sensors, stuck_sensors
 from twin.diagnose.coarse import Coarse, too_coarse
 from twin.diagnose.detector import Detector
 from twin.diagnose.diagnose import Settings, prepare
 from twin.diagnose.diagnosis import Cause, Verdict
+from twin.diagnose.gaps import emptied
 from twin.diagnose.search import search
 from twin.diagnose.study import with_measured
 from twin.diagnose.verdict import unknown_of, verdict_of, with_faults
@@ -65,7 +66,8 @@ def said(settings: Settings, name: str) -> Said:
         measured(study.probed.base, run, p.run.drive, p.run.name)
         for run, p in zip([*usable, runs[2]], study.runs, strict=True)
     ]
-    found = search(detector, measured_of(with_measured(study, plans)))
+    stuck += broken_sensors(usable, study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
+    found = search(emptied(detector, plans), measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     states, coarse = STATES.get(name), None
     if states:

@@ -33,7 +33,7 @@ def broken_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[
     causes = []
     for run, name in zip(runs, names, strict=True):
         told = set[str]()
-        for f in usable(run)[1]:
+        for f in usable(run, sensors)[1]:
             for channel in (c for c in f.channels if f.kind in BROKEN and c in sensors and c not in told):
                 told.add(channel)
                 window = Window(name, f.first_time, f.last_time)

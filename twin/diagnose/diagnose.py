@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -170,19 +170,20 @@ def diagnose(
     shown = found
     groups = {f.name: f.group for f in settings.families}
     if verdict == "unknown":  # told and judged is the calibration beside faulty channels then, not what was tried
-        kept = tuple(a for a in found.accepted if groups.get(a.hypothesis.family) == "sensor")
-        x, covariance = settled(detector, measured_of(study), kept)
-        shown = replace(found, accepted=kept, x=x, covariance=covariance)
+        shown = _beside_sensors(found, groups)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
     searched = causes  # what was seen before any search has no statistic that channels could share
     verdict, causes = with_faults(verdict, causes, faults)
-    notes += [f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED]
+    notes += [
+        f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED and not c.rivals
+    ]
     opened = judged(shown, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
-    if opened.note:
-        notes.append(opened.note)
     verdict, causes, extension = opened.verdict, opened.causes, opened.extension
+    if opened.note:  # what is shown is then the calibration beside faulty channels, as of any unknown
+        notes.insert(0, opened.note)
+        shown, searched = _beside_sensors(found, groups), ()
     first = found.steps[0]
     heat = unknown_of(found) if verdict == "unknown" else None
     planned = None
@@ -225,6 +226,13 @@ def diagnose(
         plan=planned,
     )
     return Result(diagnosis, found, extension)
+
+
+def _beside_sensors(found: Search, groups: Mapping[str, str]) -> Search:
+    """The search with the causes that are faulty temperature sensors alone, and the calibration beside these."""
+    kept = tuple(a for a in found.accepted if groups.get(a.hypothesis.family) == "sensor")
+    x, covariance = settled(found.detector, measured_of(found.detector.study), kept)
+    return replace(found, accepted=kept, x=x, covariance=covariance)
 
 
 def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unknown: Unknown | None) -> Scene | None:

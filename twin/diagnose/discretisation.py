@@ -107,8 +107,10 @@ def inside_of(node: str) -> str:
 
 
 def _acting(parameter: Parameter, other: Machine) -> Parameter:
-    """The parameter in another discretisation: a capacity is that of the inside, too."""
-    if parameter.kind != "capacity":
-        return parameter
+    """The parameter in another discretisation: a capacity is that of the inside, too, and each half of a node that
+    grows takes half of the change."""
     insides = [inside_of(t) for t in parameter.targets if inside_of(t) in other.nodes]
-    return replace(parameter, targets=(*parameter.targets, *insides))
+    if parameter.kind not in ("capacity", "expansion") or not insides:
+        return parameter
+    share = 0.5 if parameter.component >= 0 else 1.0
+    return replace(parameter, targets=(*parameter.targets, *insides), sigma=share * parameter.sigma)

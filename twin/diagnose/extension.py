@@ -126,7 +126,7 @@ def _write_description(
     diagnosis = result.diagnosis
     parameters: dict[tuple[str, str], str] = {}
     if not result.causes:
-        told = [n for n in diagnosis.notes if n.startswith("not written")] or ["no extension is written"]
+        told = [n for n in diagnosis.notes if n.startswith("withdrawn")] or ["no extension is written"]
         return parameters, told
     study = result.search.detector.study
     said: list[str] = []

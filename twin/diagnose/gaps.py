@@ -14,13 +14,16 @@ from twin.diagnose.whiten import missing
 
 
 def emptied(detector: Detector, plans: list[Measured]) -> Detector:
-    """The detector where these measurements have gaps that its own do not have; thresholds stay as they are.
+    """The detector where these measurements have gaps that its own do not have, itself where there is none; thresholds
+    stay as they are.
 
     `twin diagnose` makes a new one, thresholds and all, which takes minutes: too expensive for every such trial of a
     campaign.
     """
     study = with_measured(detector.study, plans)
     kept = ~missing(study)
+    if not np.any(~kept & ~missing(detector.study)):
+        return detector
     others = np.where(kept[:, None], detector.fitter.others, 0.0)
     raw = np.where(kept[:, None], detector.columns.raw, np.float32(0.0))
     fitter = replace(detector.fitter, study=study, whiten=replace(detector.whiten, study=study), others=others)

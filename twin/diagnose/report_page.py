@@ -69,6 +69,13 @@ _FOLLOWS = {
 }
 
 
+def _follows(d: Diagnosis) -> str:
+    """What to do with a verdict."""
+    if d.verdict == "unknown" and d.unknown is None:  # the sealed run refuted the name
+        return "What was named does not predict the sealed run; see the notes."
+    return _FOLLOWS[d.verdict]
+
+
 def write_report(diagnosis: Diagnosis, folder: Path) -> None:
     """Write index.html and report.json into `folder`, each whole or not at all.
 
@@ -156,7 +163,7 @@ def page(d: Diagnosis) -> str:
 <title>{title}</title><style>{STYLE}</style></head><body>
 <h1>{title}</h1>
 <div class="verdict {d.verdict}"><p class="label">{_LABELS[d.verdict]}</p>
-<p class="sentence">{escape(sentence)}</p><p>{_FOLLOWS[d.verdict]}</p>{carried}</div>
+<p class="sentence">{escape(sentence)}</p><p>{_follows(d)}</p>{carried}</div>
 {place}
 {said}
 <nav>{contents}</nav>
@@ -189,7 +196,11 @@ def _evidence(d: Diagnosis) -> str:
     if not parts:
         best = max((k for k in d.observed if d.thresholds.get(k, 0) > 0), default=None,
                    key=lambda k: d.observed[k] / d.thresholds[k])  # fmt: skip
-        parts.append("<p>No family of causes passes its threshold.</p>")
+        withdrawn = d.verdict == "unknown"
+        parts.append(
+            "<p>The sealed run refuted what was named.</p>" if withdrawn
+            else "<p>No family of causes passes its threshold.</p>"
+        )  # fmt: skip
         if best:
             text = evidence_sentence(d, best, d.observed[best], d.thresholds[best])
             parts.append(f"<p>{escape(f'The nearest is {what(best)}. {text}')}</p>")

@@ -59,7 +59,7 @@ def judged(
         f"withdrawn: {names}. It explains the runs that were looked at, and on the sealed run it makes {len(worse)} of "
         f"the {len(moved)} channels that it moves worse beyond chance"
     )
-    return Judged("unknown", tuple(c for c in causes if groups.get(c.family) == "sensor"), (), table, note)
+    return Judged("unknown", tuple(c for c in causes if c not in extension), (), table, note)
 
 
 def _noise(detector: Detector, m: Measured) -> tuple[np.ndarray, np.ndarray]:

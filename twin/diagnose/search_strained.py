@@ -91,14 +91,18 @@ def loose_ones(detector: Detector, y: np.ndarray, fitted: np.ndarray, settled: n
         x, covariance = settled_alone(detector.fitter, y, (j,))
         sigma = float(np.sqrt(covariance[j, j]))
         if np.sign(fitted[j]) * x[j] > max(OUTSIDE, SURE * sigma):
-            found.append(Loose(j, float(x[j]), sigma, float(strain[j]), _signals(detector, j, float(x[j]), sigma)))
+            rivals = _signals(detector, j, float(x[j]), sigma, float(strain[j]) ** 2)
+            found.append(Loose(j, float(x[j]), sigma, float(strain[j]), rivals))
         if len(found) == FAR:
             break
     return tuple(found)
 
 
-def _signals(detector: Detector, j: int, x: float, sigma: float) -> tuple[tuple[Hypothesis, float], ...]:
-    """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says."""
+def _signals(
+    detector: Detector, j: int, x: float, sigma: float, statistic: float
+) -> tuple[tuple[Hypothesis, float], ...]:
+    """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says; with
+    the source's own statistic, as they do the same."""
     study = detector.study
     if study.probed.parameters[j].kind != "source":
         return ()
@@ -112,7 +116,7 @@ def _signals(detector: Detector, j: int, x: float, sigma: float) -> tuple[tuple[
             cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
             heat = 1.0 + along / size
             if abs(cosine) >= SAME and heat > 0.0 and abs(np.log(heat) - scale * x) < SURE * scale * sigma:
-                found.append((Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), float(cosine)))
+                found.append((Hypothesis(batch, i, batch.histories[0], statistic, (1.0,), 0.0), float(cosine)))
     return tuple(found)
 
 

@@ -287,7 +287,7 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
 def with_faults(
     verdict: Verdict, causes: tuple[Cause, ...], faults: Sequence[Cause]
 ) -> tuple[Verdict, tuple[Cause, ...]]:
-    """The verdict with what was found without a search: sensors that stand still."""
+    """The verdict with what was found without a search: sensors that stand still, leap or break."""
     return "sensor" if faults and verdict == "nothing" else verdict, (*faults, *causes)
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import core_schema
 
-from twin.units import machine_temperature, to_si
+from twin.units import machine_temperature, surroundings_temperature, to_si
 
 # W/(m^2 K), and W/K of lumped machines: a micrometre of copper has 4e8. Tighter contacts are one part, and beside them
 # whatever else conducts is lost to rounding.
@@ -40,6 +40,7 @@ class _Quantity:
 
 Length = Annotated[float, _Quantity("m")]
 Temperature = Annotated[float, AfterValidator(machine_temperature), _Quantity("degC")]  # a point on the scale, degC
+Surroundings = Annotated[float, AfterValidator(surroundings_temperature), _Quantity("degC")]
 TemperatureDifference = Annotated[float, _Quantity("K")]
 Conductivity = Annotated[float, _Quantity("W/(m*K)")]
 Density = Annotated[float, _Quantity("kg/m^3")]
@@ -244,7 +245,7 @@ class Environment(Entry):
     """Air of a zone, a radiant surrounding, or a coolant at its inlet."""
 
     signal: str | None = None
-    temperature: Temperature | None = None  # constant, where no signal is given
+    temperature: Surroundings | None = None  # constant, where no signal is given
     gradient: TemperatureGradient = 0.0  # warmer by this per metre above `height`
     height: Length = 0.0  # vertical machine coordinate at which the temperature is measured
     # added to it: of a sensor that reads wrong by a constant, or of air that differs from where it is measured

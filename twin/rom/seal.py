@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 
 _MARK = b"\ntwin sha256 "
+_TAIL = 4096  # bytes in which a seal that is not at the end is looked for
 _LENGTH = len(_MARK) + 64 + 1  # hexadecimal digits, and a line feed
 
 
@@ -19,8 +20,8 @@ def sealed(image: bytes) -> bytes:
 
 
 def is_broken(content: bytes) -> bool:
-    """Whether the bytes of a file end with a seal that is not theirs; False without a seal."""
+    """Whether the bytes of a file have a seal that is not theirs, is cut or is followed by more; False without one."""
     if len(content) < _LENGTH or not content[-_LENGTH:].startswith(_MARK):
-        return False
+        return _MARK in content[-_TAIL:]
     stored = content[-_LENGTH + len(_MARK) : -1]
     return stored != hashlib.sha256(memoryview(content)[:-_LENGTH]).hexdigest().encode("ascii")

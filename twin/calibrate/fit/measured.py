@@ -81,7 +81,7 @@ def measured(
     What `twin.logs.faults.usable` sets aside is missing. Raises LogError where a run holds nothing that the model
     predicts.
     """
-    run, aside = usable(run)
+    run, aside = usable(run, [s for s in model.sensors if s not in exclude])
     skipped = [f"set aside: {aside_words(f)}" for f in aside]
     edges = drive.time
     table = run.temperatures

@@ -1,11 +1,13 @@
 """A run without what is no measurement of its machine: a broken sensor, a leap, rows of another time.
 
 One such channel decides a fit by least squares: it would be told as heat that nobody described. What is set aside is
-told, never lost silently.
+told, never lost silently. What may have been the machine stays: leaps of several channels at once (a coolant that is
+switched on), or between rows that are far apart.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -16,49 +18,69 @@ from twin.logs.faults.tell import shown
 from twin.logs.run import Run, Tcp
 
 BROKEN: tuple[Kind, ...] = ("noise", "rail", "leap")  # of temperatures: what a channel shows from there on is not known
+NEAR = 120.0  # s between rows, beyond which a wetted surface (time constant 100 s and more) may seem to leap
+MOST = 0.8  # of the sensors that a splice moves: a door that opens moves those in the air
 
 
-def usable(run: Run) -> tuple[Run, tuple[Fault, ...]]:
-    """The run with the cells of broken temperatures emptied, all temperatures and TCP rows from a splice on as well,
-    and the faults that this is for."""
+def usable(run: Run, sensors: Collection[str]) -> tuple[Run, tuple[Fault, ...]]:
+    """The run with the cells of broken sensors emptied, the temperatures of all and the TCP rows after a splice as
+    well, each until the next segment of the run begins; and the faults that this is for.
+
+    sensors: columns of temperatures.csv on the machine. Air and foreign columns have no say, and stay.
+    """
     table = run.temperatures
-    found = [f for f in faults_of(run) if f.table == "temperatures" and f.kind in (*BROKEN, "splice")]
-    if table is None or not found:
+    named = [n for n in sensors if table is not None and n in table.columns]
+    if table is None or not named:
         return run, ()
-    spliced = min((f.first_row for f in found if f.kind == "splice"), default=len(table.time))
+    own = replace(table, columns={n: table.columns[n] for n in named}, units=dict.fromkeys(named, "degC"))
+    found = [f for f in faults_of(replace(run, temperatures=own)) if f.table == "temperatures"]
+    step = float(np.median(np.diff(table.time))) if len(table.time) > 1 else 0.0
+    splices = [_ended(run, f) for f in found if f.kind == "splice" and len(f.channels) > MOST * len(named)]
+    broken = [_ended(run, f) for f in found if f.kind in BROKEN and (f.kind != "leap" or _alone(f, step))]
+    broken = [f for f in broken if not any(s.first_row <= f.first_row <= s.last_row for s in splices)]
     columns = {name: values.copy() for name, values in table.columns.items()}
-    kept = []
-    for f in found:
-        if f.first_row > spliced or (f.kind != "splice" and f.first_row >= spliced):
-            continue  # of rows that are not used
-        kept.append(f)
-        for name in f.channels if f.kind != "splice" else columns:
-            columns[name][f.first_row : (f.last_row + 1 if f.kind != "splice" else None)] = np.nan
     tcp = run.tcp
-    if tcp is not None and spliced < len(table.time):
-        tcp = _before(tcp, float(table.time[spliced]))
-    return replace(run, temperatures=replace(table, columns=columns), tcp=tcp), tuple(kept)
+    for f in (*splices, *broken):
+        for name in named if f.kind == "splice" else f.channels:
+            columns[name][f.first_row : f.last_row + 1] = np.nan
+        if f.kind == "splice" and tcp is not None:
+            tcp = _without(tcp, f.first_time, f.last_time if f.last_row + 1 < len(table.time) else np.inf)
+    aside = tuple(sorted((*splices, *broken), key=lambda f: f.first_row))
+    return (replace(run, temperatures=replace(table, columns=columns), tcp=tcp), aside) if aside else (run, ())
 
 
-def _before(tcp: Tcp, end: float) -> Tcp:
-    kept = tcp.time < end
-    sigma = tcp.sigma[kept] if tcp.sigma is not None else None
-    angle = {name: values[kept] for name, values in tcp.angle.items()}
+def _alone(f: Fault, step: float) -> bool:
+    return len(f.channels) == 1 and step <= NEAR
+
+
+def _ended(run: Run, f: Fault) -> Fault:
+    """The fault until the next segment begins, which is a test of its own."""
+    assert run.temperatures is not None
+    later = [s.start for s in run.segments if s.start > f.first_time]
+    end = int(np.searchsorted(run.temperatures.time, min(later, default=np.inf))) - 1
+    last = min(f.last_row, max(end, f.first_row))
+    return replace(f, last_row=last, last_time=float(run.temperatures.time[last]))
+
+
+def _without(tcp: Tcp, start: float, end: float) -> Tcp:
+    """TCP rows before `start` and after `end` [s]."""
+    kept = (tcp.time < start) | (tcp.time > end)
     return replace(
         tcp,
         time=tcp.time[kept],
         position=tcp.position[kept],
         displacement=tcp.displacement[kept],
-        sigma=sigma,
-        angle=angle,
+        sigma=tcp.sigma[kept] if tcp.sigma is not None else None,
+        angle={name: values[kept] for name, values in tcp.angle.items()},
     )
 
 
 def aside_words(f: Fault) -> str:
     """What was set aside, in words."""
-    when = f"from {f.first_time / 3600.0:.2f} h on"
+    when = f"from {f.first_time / 3600.0:.2f} h to {f.last_time / 3600.0:.2f} h"
+    lines = f"lines {f.first_row + 2} to {f.last_row + 2} of temperatures.csv"
     if f.kind == "splice":
-        return f"all temperatures and TCP rows {when}: rows of another time, line {f.first_row + 2} of temperatures.csv"
+        return f"all sensors and TCP rows {when}: rows of another time, {lines}"
     name = ", ".join(f"'{c}'" for c in f.channels)
     what = {"noise": "noise of", "rail": "rests at", "leap": "leaps by"}[f.kind]
-    return f"{name} {when}, line {f.first_row + 2} of temperatures.csv: {what} {shown(f.size, f.unit)}"
+    return f"{name} {when}, {lines}: {what} {shown(f.size, f.unit)}"
