@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.logs.faults.leaps import LEAST
 from twin.logs.faults.series import Series
 
 _BLOCKS = 16  # of a series; noise shorter than one is not looked for
@@ -56,7 +57,10 @@ def noise(s: Series) -> list[Stretch]:
         usual = away[outside & (away > 0.0)]
         if not found or len(usual) < _CALM[s.unit]:
             continue
-        limit = max(_NOISE * float(np.quantile(usual, 0.99)), _NOISE * s.resolution, _SPAN * _spanned(s.values, found))
+        limit = max(
+            _NOISE * float(np.quantile(usual, 0.99)), _NOISE * s.resolution, _SPAN * _spanned(s.values, found),
+            LEAST[s.unit],
+        )  # fmt: skip
         sizes = [float(np.median(away[first : last + 1])) for first, last in found]
         if min(sizes) > limit:
             return [_stretch(*edges, size, len(away)) for edges, size in zip(found, sizes, strict=True)]

@@ -29,6 +29,9 @@ _TOGETHER = 2.0
 _ZEROED = 1.5
 _FAR = 10.0  # last digits from zero, before
 _MOST = 8  # leaps in one channel; with more of them no change is unusual
+_ROWS = 30  # for each of them: of a few rows some always stand out
+# The smallest that is told: a tenth of what thermocouples of one machine differ by, and the noise of a probe
+LEAST = {"degC": 0.5, "m": 2e-6}
 # A leap is over in its row: of the change to the median of three rows, a first-order lag makes at most 73 % in the
 # first row if its time constant is a row or more. Faster ones look like leaps.
 _AT_ONCE = 0.8
@@ -67,9 +70,9 @@ def leaps(s: Series, c: Changes) -> list[tuple[int, float]]:
     sizes = [abs(float(c.excess[i])) for i in peaks] + [0.0]
     others = c.excess.copy()
     found = 0
-    for m, peak in enumerate(peaks[:_MOST]):
+    for m, peak in enumerate(peaks[: min(_MOST, max(1, len(s.values) // _ROWS))]):
         others[peak - 1 : peak + 2] = 0.0
-        if sizes[m] >= max(_RATIO * sizes[m + 1], _SCALE * _usual(s, others), 1e-300):
+        if sizes[m] >= max(_RATIO * sizes[m + 1], _SCALE * _usual(s, others), LEAST[s.unit]):
             found = m + 1
     return sorted((at, size) for at, size in (_located(s, c, i) for i in peaks[:found]) if size != 0.0)
 
