@@ -93,7 +93,7 @@ def moving(name: str, segments: int, *pairs: tuple[str, str]) -> str:
 def description() -> str:
     """The rod as a rail, with a nut that hardly touches it and gives all of a source's heat, 1 W, to it."""
     size, sides = (ROD.length, ROD.width, ROD.thickness), "x_min x_max y_min y_max"
-    rigid = (1e16, 0.3, 1e-5)  # as good as that: heat alone counts
+    rigid = (1e15, 0.3, 1e-5)  # as good as that: heat alone counts
     return (
         d.head("rod")
         + d.material("aluminium", ROD.conductivity, 2700.0, 900.0, rigid)

@@ -16,7 +16,7 @@ from twin.diagnose.acted import CONDUCTS, units_of
 from twin.diagnose.batch import Hypothesis, score
 from twin.diagnose.contest import beginning, misfit
 from twin.diagnose.detector import Detector
-from twin.diagnose.fitter import Fitted
+from twin.diagnose.fitter import Fitted, bounds
 from twin.diagnose.pulls import Loose
 from twin.diagnose.refit import WIDE, refit
 from twin.diagnose.search_look import Search, Step, look
@@ -28,6 +28,7 @@ from twin.diagnose.study import Study
 PULLED = 2.5  # standard deviations by which data without its tolerance must tell a number from the declared one
 BEYOND = 3.0  # prior standard deviations that a number out of its tolerance keeps beside any other explanation
 OUTSIDE = 1.0  # prior standard deviations: the declared tolerance itself
+NEARLY = 0.75  # of a bound, from which the quadratic surrogate of the settled calibration says little of a size
 SURE = 1.96  # standard deviations of its own that a number without its tolerance is off: its 95 % interval
 LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain
@@ -71,7 +72,7 @@ def closed(
         if _does_the_same(detector, detector.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
     )  # fmt: skip
     (j,) = freed(detector.study, one.hypothesis)
-    amplitude, variance = _amplitude(one, next(own for own in loose if own.index == j), detector.study)
+    amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector.study)
     one = replace(
         one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals,
         amplitude=np.array([amplitude]), covariance=np.array([[variance]]),
@@ -120,12 +121,16 @@ def _signals(
     return tuple(found)
 
 
-def _amplitude(one: Accepted, loose: Loose, study: Study) -> tuple[float, float]:
+def _size(one: Accepted, loose: Loose, study: Study) -> tuple[float, float]:
     """The amplitude of a number out of its tolerance as the settled calibration has it without one, and its variance.
 
     The fit that finds causes leaves to model discrepancy what looks like it, and frees the number to make up for that.
+    But it knows sizes beyond the parameter's bounds, where the settled one ends, and steps the exact model there.
     """
     scale = float(study.scale[loose.index])
+    low, high = (NEARLY * float(ends[loose.index]) for ends in bounds(study))
+    if not low < loose.x < high:
+        return float(one.amplitude[0]), float(one.covariance[0, 0])
     change, sigma = scale * loose.x, scale * loose.sigma
     if one.hypothesis.batch.kind not in CONDUCTS:
         return change, sigma**2

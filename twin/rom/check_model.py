@@ -19,6 +19,7 @@ from twin.units import machine_temperature
 
 EXACT = 1e-9  # of the terms of a sum: shipped machines are within 1e-13, and a wrong matrix is off by its own size
 SLACK = 1e-9  # of the largest entry: a semidefinite matrix has eigenvalues of -1e-17 of it, by rounding
+SLOWEST = 1e-12  # 1/s, times the capacity: a rate of 30,000 years is none
 SOLVABLE = 1e12  # condition of an oblique capacity: four digits of a solution are left
 
 
@@ -81,13 +82,16 @@ def _body(body: AffineBody, n_films: int, ends: Sequence[np.ndarray]) -> str:
     names = ["E", "A0", *(f"A[{k}]" for k in range(len(body.A)))]
     if body.symmetric:
         for name, matrix in zip(names, terms, strict=True):
-            _semidefinite(matrix, f"{where}/{name}", strictly=name == "E")
+            if name == "E" or not _nothing(body, matrix):
+                _semidefinite(matrix, f"{where}/{name}", strictly=name == "E")
     else:
         _stable(body, ends, where)
     left = body.left_one
     worst = max(
         _equal(body.E.T @ left, body.energy, body.E.T, left, f"{where}/energy", "the heat capacity E of 1 K"),
-        _equal(body.A0 @ body.one, 0.0, body.A0, body.one, f"{where}/A0", "free of heat at 1 K everywhere"),
+        0.0
+        if _nothing(body, body.A0)
+        else _equal(body.A0 @ body.one, 0.0, body.A0, body.one, f"{where}/A0", "free of heat at 1 K everywhere"),
         *(_film(body, k, n_films, where) for k in range(len(body.A))),
         _equal(left @ body.P, 1.0, left, body.P, f"{where}/P", "1 W of 1 W"),
         _equal(left @ body.B, 1.0, left, body.B, f"{where}/B", "1 W of 1 W"),
@@ -122,6 +126,8 @@ def _film(body: AffineBody, k: int, n_films: int, where: str) -> float:
     wanted = body.M[:, k] if body.theta[k] < n_films else 0.0
     if body.theta[k] >= n_films and body.M[:, k].any():
         raise KeyError(f"'{where}/M' feeds a joint from an environment")
+    if body.theta[k] >= n_films and _nothing(body, body.A[k]):
+        return 0.0
     return _equal(body.A[k] @ body.one, wanted, body.A[k], body.one, f"{where}/A[{k}]", "the film of M")
 
 
@@ -135,13 +141,16 @@ def _shares(body: AffineBody, name: str, where: str) -> float:
     )
 
 
+def _nothing(body: AffineBody, matrix: np.ndarray) -> bool:
+    """Whether a conductance is rounding: a body of a single state conducts nothing within itself."""
+    return float(np.abs(matrix).max(initial=0.0)) <= SLOWEST * float(np.abs(body.E).max(initial=0.0))
+
+
 def _semidefinite(matrix: np.ndarray, where: str, strictly: bool) -> None:
     """Symmetric bit by bit but for rounding, and without negative eigenvalues; `strictly` without zero ones."""
     size = float(np.abs(matrix).max(initial=0.0))
     if np.abs(matrix - matrix.T).max(initial=0.0) > EXACT * size:
         raise KeyError(f"'{where}' is not symmetric")
-    if size == 0.0 and not strictly:
-        return
     raised = matrix if strictly else matrix + SLACK * size * np.eye(len(matrix))
     try:
         np.linalg.cholesky(raised)
