@@ -401,7 +401,7 @@ def test_chance_is_told_of_what_was_held_against_synthetic_measurements_alone():
     for cause, told in (
         (stuck, "stood still for 2.50 h"),
         (STRAINED, "12.6 standard deviations of its fit from what was declared; 2.50 are needed"),
-        (calibrated, "3.00 standard deviations of its tolerance from what was declared; 2.50 are needed"),
+        (calibrated, "Calibration moves it 3.00 times as far as all but 3 % of simulated data sets"),
     ):
         one = replace(diagnosis("out_of_tolerance"), causes=(cause,), series=(), whiteness=(), ranked=(), gain=())
         assert told in cause_evidence(one, cause)

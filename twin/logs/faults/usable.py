@@ -7,7 +7,7 @@ switched on), or between rows that are far apart.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from twin.logs.faults.fault import Fault, Kind
 from twin.logs.faults.find import faults_of
 from twin.logs.faults.tell import shown
-from twin.logs.run import Run, Tcp
+from twin.logs.run import Run, Table, Tcp
 
 BROKEN: tuple[Kind, ...] = ("noise", "rail", "leap")  # of temperatures: what a channel shows from there on is not known
 NEAR = 120.0  # s between rows, beyond which a wetted surface (time constant 100 s and more) may seem to leap
@@ -32,21 +32,26 @@ def usable(run: Run, sensors: Collection[str]) -> tuple[Run, tuple[Fault, ...]]:
     named = [n for n in sensors if table is not None and n in table.columns]
     if table is None or not named:
         return run, ()
+    aside = _aside(run, table, named)
+    columns = {name: values.copy() for name, values in table.columns.items()}
+    tcp = run.tcp
+    for f in aside:
+        for name in named if f.kind == "splice" else f.channels:
+            columns[name][f.first_row : f.last_row + 1] = np.nan
+        if f.kind == "splice" and tcp is not None:
+            tcp = _without(tcp, f.first_time, f.last_time if f.last_row + 1 < len(table.time) else np.inf)
+    return (replace(run, temperatures=replace(table, columns=columns), tcp=tcp), aside) if aside else (run, ())
+
+
+def _aside(run: Run, table: Table, named: Sequence[str]) -> tuple[Fault, ...]:
+    """The faults of these columns for which readings are set aside, in the order of time."""
     own = replace(table, columns={n: table.columns[n] for n in named}, units=dict.fromkeys(named, "degC"))
     found = [f for f in faults_of(replace(run, temperatures=own)) if f.table == "temperatures"]
     step = float(np.median(np.diff(table.time))) if len(table.time) > 1 else 0.0
     splices = [_ended(run, f) for f in found if f.kind == "splice" and len(f.channels) > MOST * len(named)]
     broken = [_ended(run, f) for f in found if f.kind in BROKEN and (f.kind != "leap" or _alone(f, step))]
     broken = [f for f in broken if not any(s.first_row <= f.first_row <= s.last_row for s in splices)]
-    columns = {name: values.copy() for name, values in table.columns.items()}
-    tcp = run.tcp
-    for f in (*splices, *broken):
-        for name in named if f.kind == "splice" else f.channels:
-            columns[name][f.first_row : f.last_row + 1] = np.nan
-        if f.kind == "splice" and tcp is not None:
-            tcp = _without(tcp, f.first_time, f.last_time if f.last_row + 1 < len(table.time) else np.inf)
-    aside = tuple(sorted((*splices, *broken), key=lambda f: f.first_row))
-    return (replace(run, temperatures=replace(table, columns=columns), tcp=tcp), aside) if aside else (run, ())
+    return tuple(sorted((*splices, *broken), key=lambda f: f.first_row))
 
 
 def _alone(f: Fault, step: float) -> bool:
