@@ -34,6 +34,7 @@ def both():
     return found
 
 
+@pytest.mark.long
 def test_bars_of_half_the_element_size_tell_the_error_of_the_described_ones(both):
     """A machine of eight times as many elements, which nothing was made with, is where the difference leads to."""
     machine = small_case.machine()
@@ -45,6 +46,7 @@ def test_bars_of_half_the_element_size_tell_the_error_of_the_described_ones(both
     )  # the nut heats within an element: less than second order
 
 
+@pytest.mark.long
 def test_the_difference_follows_the_parameters(both):
     study = small_case.study()
     n = len(study.probed.parameters)

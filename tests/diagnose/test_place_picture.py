@@ -36,6 +36,7 @@ def drifting() -> np.ndarray:
     return y
 
 
+@pytest.mark.long
 def test_one_channel_carries_a_sensor_at_fault_and_several_carry_heat():
     detector = small_case.made_detector()
     alone = support_of(search(detector, drifting()))

@@ -40,6 +40,7 @@ def of(family: str, place: str) -> Foresight:
     return next(f for f in plan().suspicions if (f.family, f.place) == (family, place))
 
 
+@pytest.mark.long
 def test_todays_limits_are_those_of_the_diagnosis():
     detector = made_detector()
     for limit in limits_of(detector):

@@ -97,6 +97,7 @@ def test_a_joint_that_lost_its_preload_is_said_to_be_out_of_tolerance(folder, de
     assert cause.ci95[0] <= 0.02 <= cause.ci95[1] < 0.5
 
 
+@pytest.mark.long
 def test_a_screw_that_expands_too_much_is_named_with_its_factor(folder, detector):
     verdict, (cause,) = said(detector, in_machine(folder, "expansion"))
     assert (verdict, cause.family, cause.place) == ("named", "expansion", "parts.screw")
