@@ -1,4 +1,4 @@
-"""Faults of five families hidden in a small FE machine, and none: each must be said as what it is."""
+"""Faults of several families hidden in a small FE machine, and none: each must be said as what it is."""
 
 from __future__ import annotations
 
