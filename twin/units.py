@@ -191,7 +191,10 @@ def to_si(value: float | int | str, unit: str) -> float:
 
 
 def surroundings_temperature(value: float) -> float:
-    """The value [degC] likewise, where surroundings can have it: a furnace may stand beside a machine."""
+    """The value [degC], where surroundings can have it: a furnace may stand beside a machine.
+
+    Raises ValueError as `machine_temperature` does.
+    """
     return value if HOTTEST - _ABSOLUTE_ZERO < value <= FURNACE else machine_temperature(value)
 
 

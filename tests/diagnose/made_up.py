@@ -82,7 +82,7 @@ SHELL = Scene(
 )  # fmt: skip
 NETWORK = Scene(
     Network(("head", "column", "bed", "screw"), ("screw",), (("head", "column", False), ("column", "bed", False),
-            ("screw", "head", True)), {}),
+            ("screw", "head", True))),
     2, (), {"sensor_0": "head", "x_nut": "screw"}, "sensors.x_nut",
 )  # fmt: skip
 

@@ -45,7 +45,7 @@ def linear_elasticity(body: BodyMesh, solid: Elasticity, U: csr_array) -> tuple[
 
 
 def from_vertices_and_tanks(mesh: BodyMesh, n: int) -> csr_array:
-    """(n, m) likewise for all n unknowns of a thermal body: tanks, which follow its nodes, stay."""
+    """(n, m): values at all n unknowns of a thermal body from its vertices and its tanks, which follow the nodes."""
     return csr_array(block_diag([from_vertices(mesh), identity(n - mesh.n)], format="csr"))
 
 

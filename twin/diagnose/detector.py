@@ -209,7 +209,7 @@ def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.nda
 
 
 def _discretised(differences: Differences, m: int) -> np.ndarray:
-    """(m, k) what other discretisations do, each of a share of its own, and to each parameter's effect likewise."""
+    """(m, k) of unit variance: the difference to each other discretisation, and of each parameter's effect."""
     columns = [np.column_stack([o.d, SPREAD * o.D]) for o in differences]
     return np.hstack(columns) if columns else np.zeros((m, 0))
 

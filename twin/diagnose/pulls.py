@@ -16,7 +16,8 @@ from twin.diagnose.batch import Hypothesis
 from twin.rom.parameter import Parameter
 
 NAMED = ("source", "film", "joint", "contact", "expansion")  # kinds whose number may be named out of its tolerance
-LEAST = 0.25  # prior standard deviations: what moves less is no news, however seldom it moves
+# prior standard deviations: the least spread that is counted with, a quarter of a tolerance (chosen before any result)
+LEAST = 0.25
 TAIL = 0.03  # of synthetic measurements that may have a parameter farther off: as of all other causes together
 
 
@@ -63,7 +64,7 @@ class Loose:
 
     index: int
     x: float  # prior standard deviations
-    sigma: float  # likewise
+    sigma: float  # prior standard deviations, of x
     strain: float  # times the limit
     rivals: tuple[tuple[Hypothesis, float], ...] = ()  # what does the same, with its cosine
 

@@ -10,7 +10,7 @@ from twin.build.mesh import load_body_meshes
 from twin.build.places import Place
 from twin.build.surface import facet_nodes
 from twin.diagnose.probed_model import ProbedModel
-from twin.diagnose.shown_place import Network, Point, Scene, Shell
+from twin.diagnose.shown_place import Network, Scene, Shell
 from twin.machine.description import Machine
 
 
@@ -92,11 +92,4 @@ def _network(machine: Machine) -> Network:
     for contact in machine.contacts.values():
         for a, b in [tuple(contact.surfaces)] if contact.surfaces else contact.pairs:
             links.append((a.partition(".")[0], b.partition(".")[0], not contact.surfaces))
-    known: dict[str, Point] = {}
-    for name, node in machine.nodes.items():
-        if node.position is not None:
-            known[name] = (float(node.position[0]), float(node.position[1]), float(node.position[2]))
-    for name, bar in machine.bars.items():
-        middle = np.asarray(bar.origin, float) + 0.5 * float(bar.length) * np.asarray(bar.direction, float)
-        known[name] = (float(middle[0]), float(middle[1]), float(middle[2]))
-    return Network(nodes, tuple(machine.bars), tuple(dict.fromkeys(links)), known)
+    return Network(nodes, tuple(machine.bars), tuple(dict.fromkeys(links)))

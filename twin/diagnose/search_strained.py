@@ -28,7 +28,9 @@ from twin.diagnose.study import Study
 PULLED = 2.5  # standard deviations by which data without its tolerance must tell a number from the declared one
 BEYOND = 3.0  # prior standard deviations that a number out of its tolerance keeps beside any other explanation
 OUTSIDE = 1.0  # prior standard deviations: the declared tolerance itself
-NEARLY = 0.75  # of a bound, from which the quadratic surrogate of the settled calibration says little of a size
+# of a bound, from which the surrogate of the settled calibration says little of a size (chosen on a tenth of a joint in
+# the lumped machine of the tests; the joints at 0.3 of drawn networks lie within)
+NEARLY = 0.75
 SURE = 1.96  # standard deviations of its own that a number without its tolerance is off: its 95 % interval
 LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
 COVERS = 0.9  # of the evidence for heat of any history that a name must explain

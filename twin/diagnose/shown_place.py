@@ -22,12 +22,11 @@ class Shell:
 
 @dataclass(frozen=True)
 class Network:
-    """The nodes of a lumped machine; positions where the description gives every one."""
+    """The nodes of a lumped machine."""
 
     nodes: tuple[str, ...]
     bars: tuple[str, ...]  # those of the nodes that are bars
     links: tuple[tuple[str, str, bool], ...]  # and whether the contact moves
-    positions: dict[str, Point]
 
 
 @dataclass(frozen=True)

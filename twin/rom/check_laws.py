@@ -1,6 +1,6 @@
 """Are the laws of a load model known here, with all their arguments and parameters within physical bounds?
 
-The description is checked likewise when it is read (`twin.machine.wiring`); an artefact may come from another version
+A description is checked for the same when it is read (`twin.machine.wiring`); an artefact may come from another version
 of the table of laws, or from an editor.
 """
 
