@@ -20,6 +20,7 @@ from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
 from twin.rom.drive import evaluate, measured_air
+from twin.rom.rest import rest_before
 from twin.rom.poses import Kind, pose_weights
 
 KINDS: tuple[Kind, ...] = ("linear", "lagrange")
@@ -48,9 +49,13 @@ def fields_of_run(
     start = run.initial_temperature
     if start is None:
         start = float(measured_air(load, drive)[0, load.surroundings])
+    x = stepper.uniform(start)
+    if run.steady_start:
+        for _, x, _ in stepper.run(rest_before(drive), x):  # noqa: B007, B020
+            pass
     kept: dict[int, list[np.ndarray]] = {}
     with progress("full model", max(wanted)) as advance:
-        for step, x, _ in stepper.run(drive, stepper.uniform(start)):
+        for step, x, _ in stepper.run(drive, x):  # noqa: B020
             if step + 1 in wanted:
                 kept[step + 1] = list(x)
             advance(f"{drive.time[step + 1] / 3600:.1f} h")

@@ -79,7 +79,8 @@ def parse_run(folder: Path) -> Run:
         sampling=_sampling(facts, where),
         provenance=str(facts.get("provenance", facts.get("source", ""))),
         synthetic=_synthetic(facts.get("synthetic", False), where),
-        initial_temperature=_initial(facts, where),
+        initial_temperature=None if _steady(facts) else _initial(facts, where),
+        steady_start=_steady(facts),
         machine=_text(facts, "machine", where),
         folder=folder,
         segments=read_segments(facts.get("segments", []), str(where), loads_table.time.min(), loads_table.time.max()),
@@ -167,6 +168,10 @@ def _sampling(facts: Mapping[str, Any], where: Path) -> float | None:
     if value is not None and value <= 0.0:
         raise LogError(f"sampling is {value:g} s", str(where), 'give the time between rows: sampling = "5 s"')
     return value
+
+
+def _steady(facts: Mapping[str, Any]) -> bool:
+    return facts.get("initial_temperature") == "steady"
 
 
 def _initial(facts: Mapping[str, Any], where: Path) -> float | None:

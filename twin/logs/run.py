@@ -56,6 +56,7 @@ class Run:
     provenance: str = ""
     synthetic: tuple[str, ...] = ()  # the tables that were computed, not measured: "loads", "temperatures", "tcp"
     initial_temperature: float | None = None  # degC of the whole machine at the start, where known
+    steady_start: bool = False  # it starts in equilibrium with its surroundings instead, after a rest
     machine: str | None = None  # path of the machine description, relative to the run folder
     folder: Path = field(default=Path("."))
     segments: tuple[Segment, ...] = ()  # in the order of time, without overlap

@@ -44,7 +44,30 @@ def signal_values(run: Run, signals: Sequence[SignalLike]) -> dict[str, np.ndarr
     problems = [p for p in signal_problems(run, signals) if not p.warning]
     if problems:
         raise LogError.collect(problems)
-    return {s.name: as_meant(s, run.loads.columns[s.column]) for s in signals if s.column in run.loads.columns}
+    columns = {s.name: column_of(run, s) for s in signals}
+    return {s.name: as_meant(s, values) for s in signals if (values := columns[s.name]) is not None}
+
+
+def column_of(run: Run, signal: SignalLike) -> np.ndarray | None:
+    """What a run logged of a signal (n,) at `run.loads.time`, as it stands there; None where it did not.
+
+    A temperature that is not in loads.csv is read from temperatures.csv, linearly between its rows; NaN before the first
+    and after the last of them.
+    """
+    logged = run.loads.columns.get(signal.column)
+    if logged is not None or not _measured_too(run, signal):
+        return logged
+    assert run.temperatures is not None
+    values = run.temperatures.columns[signal.column]
+    good = np.isfinite(values)
+    return np.interp(run.loads.time, run.temperatures.time[good], values[good], left=np.nan, right=np.nan)
+
+
+def _measured_too(run: Run, signal: SignalLike) -> bool:
+    table = run.temperatures
+    if table is None or signal.unit != "degC" or signal.column not in table.columns:
+        return False
+    return bool(np.isfinite(table.columns[signal.column]).any())
 
 
 def as_meant(signal: SignalLike, logged: np.ndarray) -> np.ndarray:
@@ -59,9 +82,9 @@ def signal_problems(run: Run, signals: Sequence[SignalLike]) -> list[Problem]:
     for s in signals:
         found = run.loads.units.get(s.column)
         if found is None:
+            if _measured_too(run, s):
+                continue
             remedy = did_you_mean(s.column, run.loads.columns, "columns")
-            if run.temperatures and s.column in run.temperatures.columns:
-                remedy = "it is in temperatures.csv: signals are read from loads.csv, so copy the column there"
             called = "" if s.column == s.name else f" (signal '{s.name}')"
             what = f"no column '{s.column}'{called}"
             if s.default is not None:

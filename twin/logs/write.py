@@ -60,6 +60,7 @@ def _facts(run: Run) -> str:
             lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
     lines += [f"sampling = {run.sampling!r}"] if run.sampling else []
     lines += [f"initial_temperature = {run.initial_temperature!r}"] if run.initial_temperature is not None else []
+    lines += ['initial_temperature = "steady"'] if run.steady_start else []
     lines.append(f"synthetic = {json.dumps(list(run.synthetic))}")
     if run.tcp_reference != "absolute":
         lines.append(f"tcp_reference = {json.dumps(run.tcp_reference)}")

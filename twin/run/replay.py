@@ -19,6 +19,7 @@ from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.following_flags import following_flags
 from twin.rom.model import MachineModel
 from twin.rom.poses import outside_grid
+from twin.rom.rest import rest_before
 from twin.rom.tcp import by_body, is_exact, tcp_at
 from twin.run.checkpoint import CheckpointFolder, Steps, chain
 from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalanced
@@ -45,8 +46,8 @@ def replay(
 
     dt [s] and substeps: outputs every dt, in so many steps of the integrator; None: as many as the certificate is for.
     initial: temperature of the whole machine [degC], or a state (N,) in artefact coordinates (`Result.state`,
-    `twin.run.results.read_final_state`); by default the run's own initial temperature, else the first mean of its
-    surroundings.
+    `twin.run.results.read_final_state`); by default the run's own initial temperature or its steady state
+    (`twin.rom.rest`), else the first mean of its surroundings.
 
     Raises LogError for missing signals and bad times, TwinError for checkpoints of another run, and steps longer than
     the log or too many, FailedCheck for results that cannot be (`twin.run.plausible`).
@@ -56,15 +57,21 @@ def replay(
     signals = signal_values(run, model.load_model.signals)
     drive = evaluate(model.load_model, run.loads.time, signals, dt)
     if initial is None:
-        initial = (
-            run.initial_temperature
-            if run.initial_temperature is not None
-            else float(measured_air(model.load_model, drive)[0, model.load_model.surroundings])
-        )
+        air = float(measured_air(model.load_model, drive)[0, model.load_model.surroundings])
+        initial = air if run.initial_temperature is None else run.initial_temperature
+        if run.steady_start:
+            initial = at_rest(model, drive, air)
     # a position that is not logged is at its default all the time
     first = [signals.get(axis.position, drive.position[:, k]) for k, axis in enumerate(model.load_model.axes)]
     position = np.array([values[np.argmax(np.isfinite(values))] for values in first])
     return replay_drive(artefact, drive, position, substeps, initial, checkpoints, progress)
+
+
+def at_rest(model: MachineModel, drive: Drive, near: float) -> np.ndarray:
+    """State (N,) in artefact coordinates of a machine that rested before `drive` began; near [degC]: a first guess."""
+    prepared = prepare(model)
+    inputs = inputs_of(model.load_model, rest_before(drive), 1)
+    return prepared.to_artefact(integrate(prepared, inputs, prepared.uniform(near)).z[-1])
 
 
 def replay_drive(

@@ -7,7 +7,7 @@ sigma / sqrt(samples). Sensors in the air are inputs of the model, not outputs, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -117,6 +117,12 @@ def measured(
         skipped=tuple(skipped),
         position=position,
     )
+
+
+def after_steps(measured: Measured, steps: int) -> Measured:
+    """The same of a drive with so many steps in front of the one that it was read beside."""
+    before = np.zeros((len(measured.mean_of), steps))
+    return replace(measured, mean_of=np.hstack([before, measured.mean_of]), tcp_step=measured.tcp_step + steps)
 
 
 def _temperatures(

@@ -15,7 +15,7 @@ import numpy as np
 
 from twin.calibrate.fit.effects import Effects, Start, effects_of
 from twin.calibrate.fit.integration import Rows, WindowLoads, displacements, loads_for, temperatures, trajectory
-from twin.calibrate.fit.measured import Measured, measured, tcp_positions
+from twin.calibrate.fit.measured import Measured, after_steps, measured, tcp_positions
 from twin.calibrate.fit.options import Options
 from twin.calibrate.fit.training import History, basis_for, trained
 from twin.calibrate.fit.window import merged, require_galerkin
@@ -27,6 +27,8 @@ from twin.rom.contact_matrix import ContactPlaces
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
+from twin.rom.rest import STEPS as REST_STEPS
+from twin.rom.rest import with_rest
 from twin.rom.tcp import at_positions
 from twin.run.system import Layout, System, prepare
 
@@ -188,7 +190,10 @@ def problem(
         drive = evaluate(load, run.loads.time, signal_values(run, load.signals), options.dt)
         start = run.initial_temperature
         start = float(measured_air(load, drive)[0, load.surroundings]) if start is None else start
-        ready.append((name, drive, start, measured(model, run, drive, name, options.bin_length, options.exclude)))
+        m = measured(model, run, drive, name, options.bin_length, options.exclude)
+        if run.steady_start:
+            drive, m = with_rest(drive), after_steps(m, REST_STEPS)
+        ready.append((name, drive, start, m))
     starts = _starts(model, runs, options)
     histories = [History(drive, start) for _, drive, start, _ in ready]
     snapshots = trained(model, parameters, starts, histories, options, also, earlier, progress)
@@ -222,5 +227,8 @@ def _starts(model: MachineModel, runs: Sequence[Run], options: Options) -> tuple
     members = [m for b in model.bodies for m in b.members] or [""]
     sigma, bound = options.initial_sigma, 10.0 * options.initial_sigma
     return tuple(
-        Start(k, m, sigma, bound) for k, run in enumerate(runs) if run.initial_temperature is None for m in members
+        Start(k, m, sigma, bound)
+        for k, run in enumerate(runs)
+        if run.initial_temperature is None and not run.steady_start  # a rest before the run forgets where it began
+        for m in members
     )

@@ -14,7 +14,7 @@ from twin.calibrate.update.program import SLEW, Live, Program, Updated, replay_u
 from twin.calibrate.update.state import StateUpdater
 from twin.calibrate.update.state_filter import StatePrior, machine_of
 from twin.calibrate.update.state_tangent import KINDS, separate_loads
-from twin.errors import ModelError
+from twin.errors import LogError, ModelError
 from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
@@ -74,6 +74,11 @@ def update_run(
     state_prior = replace(options.state, sensor_noise=options.sensor_noise, tcp_noise=options.tcp_noise)
     signals = signal_values(run, model.load_model.signals)
     drive = evaluate(model.load_model, run.loads.time, signals, options.dt)
+    if run.steady_start:
+        raise LogError(
+            'initial_temperature = "steady"', str(run.folder / "run.toml"),
+            "the state filter starts at one temperature: give it, or choose --method gain",
+        )  # fmt: skip
     start = run.initial_temperature
     if start is None:
         start = float(measured_air(model.load_model, drive)[0, model.load_model.surroundings])
