@@ -229,7 +229,7 @@ def test_other_tables_are_checked(tmp_path):
     loads = "time [s],x [mm]\n0,1\n"
     assert "not in degC" in refused(write(tmp_path, loads, temperatures="time [s],bed [mm]\n0,1\n"))
     (tmp_path / "temperatures.csv").unlink()
-    assert "missing columns: dz" in refused(write(tmp_path, loads, tcp="time [s],dx [um],dy [um]\n0,1,1\n"))
+    assert "no column of dx, dy, dz" in refused(write(tmp_path, loads, tcp="time [s],x [mm]\n0,1\n"))
     assert "'dz' is in degC" in refused(write(tmp_path, loads, tcp="time [s],dx [um],dy [um],dz [K]\n0,1,1,1\n"))
     assert "start of the run is unknown" in refused(
         write(tmp_path, loads, run="", tcp="time,dx [um],dy [um],dz [um]\n2026-03-02T08:00:10Z,1,1,1\n")

@@ -225,12 +225,11 @@ def _table(table: CsvTable, zero: float | None, path: Path, unit: str | None = N
 
 
 def _tcp(table: CsvTable, zero: float | None, path: Path) -> Tcp:
-    missing = [name for name in _DISPLACEMENT if name not in table.columns]
-    if missing:
+    if not any(name in table.columns for name in _DISPLACEMENT):
         raise LogError(
-            f"missing columns: {', '.join(missing)}",
+            "no column of dx, dy, dz",
             str(path),
-            "columns are: time, the axis positions, dx, dy, dz, sigma",
+            "columns are: time, the axis positions, those of dx, dy, dz that were measured, sigma",
         )
     columns = [name for name, si in table.units.items() if si != "rad"]  # rotary axes: the structure is at angle zero
     axes = tuple(name for name in columns if name not in (*_DISPLACEMENT, "sigma"))
@@ -251,7 +250,7 @@ def _tcp(table: CsvTable, zero: float | None, path: Path) -> Tcp:
         time=_relative(table, zero, path),
         axes=axes,
         position=np.column_stack([table.columns[a] for a in axes]) if axes else np.zeros((n, 0)),
-        displacement=np.column_stack([table.columns[d] for d in _DISPLACEMENT]),
+        displacement=np.column_stack([table.columns.get(d, np.full(n, np.nan)) for d in _DISPLACEMENT]),
         sigma=table.columns.get("sigma"),
         naive=table.naive,
         angle={name: table.columns[name] for name, si in table.units.items() if si == "rad"},

@@ -82,9 +82,10 @@ def write_table(path: Path, table: Table) -> None:
 def write_tcp(path: Path, tcp: Tcp) -> None:
     """The tcp.csv of a run folder, positions in mm and displacements in um; not atomically."""
     headers = ["time [s]", *(f"{a} [mm]" for a in tcp.axes), *(f"{a} [deg]" for a in tcp.angle)]
-    headers += ["dx [um]", "dy [um]", "dz [um]"]
+    measured = np.isfinite(tcp.displacement).any(axis=0) if len(tcp.time) else np.ones(3, dtype=bool)
+    headers += [f"d{'xyz'[k]} [um]" for k in np.flatnonzero(measured)]
     angles = [np.rad2deg(values)[:, None] for values in tcp.angle.values()]
-    columns = [tcp.time[:, None], tcp.position * 1e3, *angles, tcp.displacement * 1e6]
+    columns = [tcp.time[:, None], tcp.position * 1e3, *angles, tcp.displacement[:, measured] * 1e6]
     if tcp.sigma is not None:
         headers.append("sigma [um]")
         columns.append(tcp.sigma[:, None] * 1e6)

@@ -31,7 +31,7 @@ _BLOCK = re.compile(rf"\r?\n# --- ({'|'.join(BY.values())}) ---\r?\n.*?# --- end
 
 
 def appended(text: str, tables: Sequence[tuple[str, Mapping[str, object]]], comment: str, mark: str = "found") -> str:
-    """The text with new tables at its end: ("sources.found_1", {"law": "constant_heat", ...}).
+    """The text with new tables at its end: ("sources.found_1", {"law": "constant_heat", ...}), or a rule ("parameters", ...).
 
     comment: one line above them. mark: a key of `BY`; what one program adds in several calls lies in one block. Values
     are strings, numbers, booleans, sequences or mappings of them.
@@ -41,13 +41,18 @@ def appended(text: str, tables: Sequence[tuple[str, Mapping[str, object]]], comm
     expected = deepcopy(data)
     for name, values in tables:
         section, _, key = name.partition(".")
+        content = _loads("".join(f"{_key(k)} = {_value(v)}\n" for k, v in values.items()))
+        if not key:
+            expected.setdefault(section, []).append(content)
+            continue
         if _at(data, (section, key)) is not None:
             raise DescriptionError("is there already", name, "choose another name for the new table")
-        expected.setdefault(section, {})[key] = _loads("".join(f"{_key(k)} = {_value(v)}\n" for k, v in values.items()))
+        expected.setdefault(section, {})[key] = content
     newline = "\r\n" if "\r\n" in text else "\n"
     lines = [f"# {' '.join(comment.split())}"]
     for name, values in tables:
-        lines.append(f"[{'.'.join(_key(k) for k in name.split('.', 1))}]")
+        header = f"[{'.'.join(_key(k) for k in name.split('.', 1))}]"
+        lines.append(header if "." in name else f"[{header}]")
         lines += [*(f"{_key(k)} = {_value(v)}" for k, v in values.items()), ""]
     end = f"# --- end of {BY[mark]} ---{newline}"
     if text.endswith(f"\n{end}"):
@@ -57,7 +62,7 @@ def appended(text: str, tables: Sequence[tuple[str, Mapping[str, object]]], comm
     return _expect(text + newline.join(lines) + newline + end, expected)
 
 
-def changed(text: str, values: Mapping[str, float | str | bool], mark: str = "found") -> str:
+def changed(text: str, values: Mapping[str, float | str | bool | Sequence[str]], mark: str = "found") -> str:
     """The text with other values at dotted paths ("sources.x_motor.surface"), each line with its old value behind it.
 
     Parameters (`parameter_units`) are numbers in SI and are written in the unit that they were written in; of others a
@@ -132,8 +137,8 @@ def _replaced(text: str, statement: Statement, new: str, mark: str) -> str:
     return text[: statement.start] + new + told + text[end:]
 
 
-def _token(text: str, keys: Keys, value: float | str | bool) -> str:
-    if isinstance(value, str | bool):
+def _token(text: str, keys: Keys, value: float | str | bool | Sequence[str]) -> str:
+    if isinstance(value, str | bool | Sequence):
         return _value(value)
     try:
         after = edited(text, {".".join(keys): value})

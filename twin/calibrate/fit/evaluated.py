@@ -75,6 +75,7 @@ def noise_at(
         rise = np.concatenate([dT[:, :, relative] * per_unit, tau * (T - run.start)[:, :, None]], axis=2)
         rise = np.where(np.isfinite(run.measured.temperature)[:, :, None], rise, np.nan)
         grown = np.concatenate([dw[:, :, relative] * per_unit, tau * w[:, :, None]], axis=2)
+        grown = np.where(np.isfinite(run.measured.tcp)[:, :, None], grown, np.nan)
         result.append((Noise(own[0], rise), Noise(own[1], grown)))
     return tuple(result)
 
@@ -84,6 +85,7 @@ def whitened_jacobian(evaluated: Evaluated, noise: tuple[tuple[Noise, Noise], ..
     rows = []
     for (T, w), (sensors, tcp), run in zip(evaluated.jacobian(x), noise, evaluated.problem.runs, strict=True):
         T = np.where(np.isfinite(run.measured.temperature)[:, :, None], T, np.nan)
+        w = np.where(np.isfinite(run.measured.tcp)[:, :, None], w, np.nan)
         rows += [part.reshape(-1, len(x)) for part in (sensors.whiten(T), tcp.whiten(w))]
     return np.vstack(rows)
 

@@ -38,7 +38,7 @@ class Measured:
     tcp_step: np.ndarray  # (k,) int, step edge before
     tcp_share: np.ndarray  # (k,) of the edge after
     pose: np.ndarray  # (k, n_poses) weights of the poses
-    tcp: np.ndarray  # (k, 3) m
+    tcp: np.ndarray  # (k, 3) m, NaN along axes that the run does not measure
     tcp_sigma: np.ndarray | None  # (k,) m, where the run tells
     from_first: bool  # deviations count from the first row
     skipped: tuple[str, ...]  # what the run holds and the fit does not use, in words
@@ -189,7 +189,8 @@ def _tcp_rows(
             "give the position of every linear axis in a column of its name",
         )  # fmt: skip
     position = tcp.position[:, [tcp.axes.index(a) for a in model.pose_axes]]
-    whole = np.isfinite(tcp.displacement).all(axis=1) & np.isfinite(position).all(axis=1)
+    known = np.isfinite(tcp.displacement)
+    whole = known[:, known.any(axis=0)].all(axis=1) & known.any(axis=1) & np.isfinite(position).all(axis=1)
     good = (tcp.time >= edges[0]) & (tcp.time <= edges[-1]) & whole
     if not good.all():
         skipped.append(f"{int((~good).sum())} rows of tcp.csv outside the loads' time, or with an empty cell")
