@@ -21,6 +21,7 @@ from twin.threads import one_thread_each
 
 # name -> what `twin --help` says about it; the command object is twin.cli.NAME.command
 COMMANDS = {
+    "new": "Propose a machine from nothing but a log.",
     "check": "Find mistakes in a machine description or a run folder.",
     "unpack": "Turn a file of load blocks into a run folder.",
     "losses": "Show the heat of every source, every film coefficient, and where they come from.",

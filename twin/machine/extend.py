@@ -24,7 +24,11 @@ from twin.errors import DescriptionError
 from twin.machine.edit import edited, insertion
 from twin.machine.toml_spans import Keys, Statement, spans
 
-BY = {"found": "found by twin diagnose", "hidden": "hidden by twin hide"}  # by the mark of changed values
+BY = {  # by the mark of changed values
+    "found": "found by twin diagnose",
+    "hidden": "hidden by twin hide",
+    "proposed": "proposed by twin new",
+}
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _MARK = re.compile(rf"[ ]{{2}}# (?:{'|'.join(BY)}): (was |new$)")
 _BLOCK = re.compile(rf"\r?\n# --- ({'|'.join(BY.values())}) ---\r?\n.*?# --- end of \1 ---\r?(?:\n|\Z)", re.DOTALL)

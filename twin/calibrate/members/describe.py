@@ -49,6 +49,7 @@ def with_members(text: str, members: Sequence[Member], scale: float, runs: Seque
         remedy = "add the body as a part, or describe the machine as nodes"
         raise DescriptionError("a machine of parts has no nodes that follow a temperature", "parts", remedy)
     signals = {s.get("column", name): name for name, s in data.get("signals", {}).items()}
+    names_of = {section: set(data.get(section, {})) for section in ("signals", "nodes")}
     rows: dict[str, list[str]] = {}
     groups: dict[Driver, list[Member]] = {}
     for m in members:
@@ -57,9 +58,10 @@ def with_members(text: str, members: Sequence[Member], scale: float, runs: Seque
     for driver, own in groups.items():
         signal = signals.get(driver.column)
         if signal is None:
-            signal = signals[driver.column] = _free(data, _bare(driver.column), "signals")
+            signal = signals[driver.column] = _free(names_of["signals"], _bare(driver.column))
             tables.append((f"signals.{signal}", {"column": driver.column, **_signal(driver, runs)}))
-        base = _free(data, f"follows_{_bare(driver.column)}" + ("" if driver.is_temperature else _power(driver)), "nodes")
+        shape = "" if driver.is_temperature else f"_power_{driver.exponent:.3g}".replace(".", "_")
+        base = _free(names_of["nodes"], f"follows_{_bare(driver.column)}{shape}")
         names = [f"{base}_{short(m.candidate.lag)}" for m in own]
         tables += _bodies(base, driver, names, [m.candidate.lag for m in own], signal, runs, data)
         rows |= {name: [f"{1e6 * v:.6g} um/K" for v in np.nan_to_num(m.expansion)] for name, m in zip(names, own, strict=True)}
@@ -144,13 +146,9 @@ def _bare(name: str) -> str:
     return re.sub(r"\W+", "_", name).strip("_").lower() or "column"
 
 
-def _power(driver: Driver) -> str:
-    return f"_power_{driver.exponent:.3g}".replace(".", "_")
-
-
-def _free(data: Mapping[str, Any], name: str, section: str) -> str:
-    """The name, with a number where something in the section begins with it already."""
-    taken = tuple(data.get(section, {}))
-    return next(
-        n for k in range(1, len(taken) + 2) if not any(t.startswith(n := name if k == 1 else f"{name}_{k}") for t in taken)
-    )
+def _free(taken: set[str], name: str) -> str:
+    """The name, with a number where something begins with it already; it is taken from now on."""
+    tried = (name, *(f"{name}_{k}" for k in range(2, len(taken) + 3)))
+    free = next(t for t in tried if not any(other.startswith(t) for other in taken))
+    taken.add(free)
+    return free

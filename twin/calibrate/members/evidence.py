@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 EVERY = 600.0  # s between the rows that are used
-MEMORY = 7200.0  # s for which what is left of a displacement is alike: a row counts as EVERY / MEMORY of a witness
+MEMORY = 5400.0  # s for which what is left of a displacement is alike: a row counts as EVERY / MEMORY of a witness
 NOISE_ROUNDS = 8  # of the fixed point for sigma; the fourth digit of a micrometre stands after four
 LEAST_NOISE = 0.1e-6  # m, of a measured displacement
 

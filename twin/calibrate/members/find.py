@@ -82,14 +82,14 @@ def _found(
     groups: dict[str, list[int]] = {}
     for k, candidate in enumerate(tried):
         groups.setdefault(candidate.driver.column, []).append(k)
-    thinned = [_thinned(r) for r in rows]
-    if sum(len(r.time) for r in thinned) == 0:
+    rows = [Rows(r.time[k], r.y[k], r.J[k]) for r in rows for k in [thinned(r.time)]]
+    if sum(len(r.time) for r in rows) == 0:
         raise LogError("no displacements", str(runs[0].folder), "give tcp.csv with dx, dy or dz")
-    measured = np.isfinite(np.concatenate([r.y for r in thinned])).any(axis=0)
+    measured = np.isfinite(np.concatenate([r.y for r in rows])).any(axis=0)
     axes = tuple(int(a) for a in np.flatnonzero(measured))
     parts = -(-STRETCHES // len(runs))
     stretches = []
-    for run, r in zip(runs, thinned, strict=True):
+    for run, r in zip(runs, rows, strict=True):
         F = responses(run, tried, r.time)
         part = np.minimum((parts * (r.time - r.time[0]) / max(np.ptp(r.time), 1e-9)).astype(int), parts - 1)
         stretches += [
@@ -106,11 +106,11 @@ def _found(
     return tuple(members), selected, axes
 
 
-def _thinned(rows: Rows) -> Rows:
-    """The first row of every EVERY seconds."""
-    slot = np.floor((rows.time - rows.time[0]) / EVERY + 1e-9) if len(rows.time) else np.zeros(0)
-    first = np.unique(slot, return_index=True)[1]
-    return Rows(rows.time[first], rows.y[first], rows.J[first])
+def thinned(time: np.ndarray) -> np.ndarray:
+    """Indices of the first row of every EVERY seconds."""
+    if not len(time):
+        return np.zeros(0, dtype=int)
+    return np.unique(np.floor((time - time[0]) / EVERY + 1e-9), return_index=True)[1]
 
 
 def _values(made: Problem, x: np.ndarray) -> dict[str, float]:

@@ -87,5 +87,5 @@ def aside_words(f: Fault) -> str:
     if f.kind == "splice":
         return f"all sensors and TCP rows {when}: rows of another time, {lines}"
     name = ", ".join(f"'{c}'" for c in f.channels)
-    what = {"noise": "noise of", "rail": "rests at", "leap": "leaps by"}[f.kind]
+    what = {"noise": "noise of", "rail": "rests at", "leap": "leaps by", "stuck": "stands still at"}[f.kind]
     return f"{name} {when}, {lines}: {what} {shown(f.size, f.unit)}"

@@ -1,0 +1,40 @@
+"""twin new: a machine from nothing but a log."""
+
+from __future__ import annotations
+
+import click
+
+
+def _pairs(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+    """NAME=VALUE of every option; the name may hold any sign but the last '='."""
+    from twin.errors import TwinError
+
+    if unset := [s for s in given if "=" not in s]:
+        raise TwinError(f"'{unset[0]}' has no value", f"--{option.name}", "write it like --unit 'PT01=degC'")
+    return {name: value for name, _, value in (s.rpartition("=") for s in given)}
+
+
+@click.command(epilog="Example: twin new out/lathe --from-log day_1.csv --from-log day_2.csv --sealed day_3.csv")
+@click.argument("folder", type=click.Path())
+@click.option("--from-log", "logs", multiple=True, required=True, type=click.Path(), help="CSV, XLSX or run folder; repeat")
+@click.option("--sealed", multiple=True, type=click.Path(), help="log that is scored and never fitted to; repeat")
+@click.option("--unit", "units", multiple=True, callback=_pairs, metavar="COLUMN=UNIT",
+              help="unit that neither header nor guess tells; COLUMN= leaves it out; repeat")  # fmt: skip
+@click.option("--axis", "axes", multiple=True, callback=_pairs, metavar="dx=COLUMN",
+              help="column that measures a displacement; repeat")  # fmt: skip
+def command(
+    folder: str, logs: tuple[str, ...], sealed: tuple[str, ...], units: dict[str, str], axes: dict[str, str]
+) -> None:
+    """Propose a machine in FOLDER that predicts the displacements of logs: a lumped network, its runs and a page.
+
+    Columns are taken for what their headers say, else guessed by name and values, and shown. Each node follows a logged
+    temperature, or the heat of a logged speed or power, with one time constant; how far each moves the tool is fitted to
+    all logs. The page compares it with ridge regression on runs that neither has seen.
+    """
+    from twin.errors import TwinError
+    from twin.face.new import NewOptions, from_log
+    from twin.progress import bar
+
+    if wrong := [axis for axis in axes if axis not in ("dx", "dy", "dz")]:
+        raise TwinError(f"no axis '{wrong[0]}'", "--axis", "write it like --axis 'dx=Disp. X'")
+    click.echo(str(from_log(logs, folder, sealed, NewOptions(units, axes), bar)))
