@@ -42,7 +42,8 @@ def tables_of(run: Run) -> dict[str, Table]:
         tables["temperatures"] = run.temperatures
     if run.tcp is not None:
         columns = {**{a: run.tcp.position[:, k] for k, a in enumerate(run.tcp.axes)},
-                   **{d: run.tcp.displacement[:, k] for k, d in enumerate(("dx", "dy", "dz"))}}  # fmt: skip
+                   **{d: run.tcp.displacement[:, k] for k, d in enumerate(("dx", "dy", "dz"))
+                      if np.isfinite(run.tcp.displacement[:, k]).any()}}  # fmt: skip
         if run.tcp.sigma is not None:
             columns["sigma"] = run.tcp.sigma
         tables["tcp"] = Table(run.tcp.time, columns, dict.fromkeys(columns, "m"), run.tcp.naive)

@@ -28,7 +28,7 @@ _SPEED = re.compile(r"speed|rpm|drehzahl|\bn\b", re.IGNORECASE)
 _POWER = re.compile(r"power|leistung", re.IGNORECASE)
 _TEMPERATURE = re.compile(r"temp|^t\d+$|^[pt][tc]\d+$|air|ambient|coolant|oil|room", re.IGNORECASE)
 PLAUSIBLE = (-30.0, 150.0)  # degC, of a sensor on a machine tool
-LENGTH = (600.0, 2.0e6)  # s, of a log that shows heat: ten minutes to three weeks
+LENGTH = (3600.0, 2.0e6)  # s, of a log that shows heat: one hour to three weeks
 STEP = (0.1, 900.0)  # s between rows
 
 
@@ -195,6 +195,11 @@ def _spread(columns: Sequence[Column], axes: Mapping[str, str]) -> list[Column]:
     return result
 
 
+def as_name(column: str) -> str:
+    """A column as a name that a description allows: "Spindle Motor" is "Spindle_Motor"."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", column).strip("_") or "column"
+
+
 def _run(path: Path, columns: Sequence[Column], table: CsvTable, values: Mapping[str, np.ndarray]) -> Run:
     def si(c: Column) -> np.ndarray:
         unit = parse_unit(c.unit)
@@ -206,11 +211,11 @@ def _run(path: Path, columns: Sequence[Column], table: CsvTable, values: Mapping
         keep = np.concatenate([[True], np.diff(np.maximum.accumulate(time)) > 0.0])
         line = int(np.argmin(keep)) + 2
         raise LogError("times do not increase", f"{path} (line {line})", "sort the rows, or cut the log in two")
-    heat = {c.name: si(c) for c in columns if c.role == "temperature"}
-    loads = {c.name: si(c) for c in columns if c.role == "load"}
+    heat = {as_name(c.name): si(c) for c in columns if c.role == "temperature"}
+    loads = {as_name(c.name): si(c) for c in columns if c.role == "load"}
     if not heat:
         raise LogError("no temperatures", str(path), "tell them: --unit 'COLUMN=degC'")
-    units = {c.name: parse_unit(c.unit).si for c in columns if c.role in ("temperature", "load")}
+    units = {as_name(c.name): parse_unit(c.unit).si for c in columns if c.role in ("temperature", "load")}
     driven = loads or dict(list(heat.items())[:1])  # loads.csv needs a column: the first temperature does
     displacement = np.full((len(time), 3), np.nan)
     for c in columns:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Sequence
 
 from twin.calibrate.members.describe import with_members
 from twin.calibrate.members.find import Found
 from twin.logs.run import Run
+from twin.machine.extend import appended
 
 _HEAD = """\
 # Proposed by `twin new --from-log` from {runs}: a network without geometry. Each node follows a logged
@@ -24,4 +26,11 @@ def description(name: str, found: Found, runs: Sequence[Run]) -> str:
     """machine.toml of a machine that consists of the members found, its logged temperatures as sensors."""
     names = ", ".join(run.folder.name for run in runs)
     text = _HEAD.format(runs=names if len(names) < 60 else f"{len(runs)} runs", name=json.dumps(name))
-    return with_members(text, found.members, found.selected.explained.scale, runs, "proposed")
+    text = with_members(text, found.members, found.selected.explained.scale, runs, "proposed")
+    data = tomllib.loads(text)
+    sensors = [  # inputs of the model, shown beside what is computed
+        (f"sensors.{data['signals'][e['signal']]['column']}", {"environment": name})
+        for name, e in data["environment"].items()
+        if "signal" in e
+    ]
+    return appended(text, sensors, "the logged temperatures", "proposed") if sensors else text
