@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.acted import Unit, slots_with
-from twin.diagnose.bank import Column, respond
-from twin.diagnose.elements import FORCINGS, slim
+from twin.diagnose.faults.acted import Unit, slots_with
+from twin.diagnose.faults.elements import FORCINGS, slim
+from twin.diagnose.model.bank import Column, respond
 
 LITTLE = {"heat": 0.5, "film": 0.05, "joint": 2e-3, "contact": 5e-3, "capacity": 50.0, "group": 5e-3, "air": 0.02,
           "zone": 0.02, "source": 0.5, "group_film": 0.05}  # fmt: skip
@@ -96,7 +96,7 @@ def test_one_run_leaves_the_other_alone():
 
 
 def test_many_columns_are_stepped_in_portions(monkeypatch):
-    import twin.diagnose.bank as bank
+    import twin.diagnose.model.bank as bank
 
     study, nominal, elements = small_case.study(), small_case.nominal(), small_case.elements()
     some = elements.columns[:7]

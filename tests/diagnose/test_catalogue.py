@@ -9,11 +9,11 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.cli.main import run
-from twin.diagnose.batch import best, prepared
-from twin.diagnose.catalogue import FAMILIES, explained, family, with_own
-from twin.diagnose.hypotheses import Context
-from twin.diagnose.report_catalogue import BEGIN, END, catalogue_table, renewed
-from twin.diagnose.whiten import Projector
+from twin.diagnose.evidence.batch import best, prepared
+from twin.diagnose.evidence.whiten import Projector
+from twin.diagnose.faults.catalogue import FAMILIES, explained, family, with_own
+from twin.diagnose.faults.hypotheses import Context
+from twin.diagnose.report.catalogue import BEGIN, END, catalogue_table, renewed
 from twin.errors import TwinError
 from twin.machine.effects.edits import EDITS
 
@@ -40,7 +40,7 @@ def test_nineteen_entries_each_once():
 
 def test_the_page_shows_the_catalogue():
     page = PAGE.read_text("utf-8")
-    assert renewed(page) == page, "run: python -m twin.diagnose.report_catalogue docs/diagnosis.md"
+    assert renewed(page) == page, "run: python -m twin.diagnose.report.catalogue docs/diagnosis.md"
     rows = page.split(BEGIN)[1].split(END)[0].strip().splitlines()
     assert len(rows) == 2 + 19
     assert all(row.replace("\\|", "").count("|") == 9 for row in rows)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import Accepted
-from twin.diagnose.acted import slots_with, units_of
-from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.contest import (
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.contest import (
     _liquid,
     _moved,
     beginning,
@@ -25,8 +26,7 @@ from twin.diagnose.contest import (
     tried,
     worth,
 )
-from twin.diagnose.diagnosis import Window
-from twin.diagnose.verdict import cause_of
+from twin.diagnose.search.verdict import cause_of
 
 pytestmark = pytest.mark.long
 

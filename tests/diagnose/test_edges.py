@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.acted import units_of
-from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.bells import Bell, by_blocks, name
-from twin.diagnose.diagnosis import Window
-from twin.diagnose.edges import Edge, edges_of, moved, with_pulses
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.bells import Bell, by_blocks, name
+from twin.diagnose.faults.acted import units_of
+from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.edges import Edge, edges_of, moved, with_pulses
 
 HOUR = 3600.0
 

@@ -11,9 +11,9 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.gain import _read
-from twin.diagnose.readings import late, play, readings_of
-from twin.diagnose.study import Study, make_study
+from twin.diagnose.faults.readings import late, play, readings_of
+from twin.diagnose.model.study import Study, make_study
+from twin.diagnose.search.gain import _read
 from twin.inject.damage.channels import Damage
 from twin.inject.damage.kinds import damaged
 from twin.logs.run import Run

@@ -11,13 +11,13 @@ from tests.calibrate import lumped_case
 from tests.diagnose import small_case
 from twin.calibrate.fit import integration as plain
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.acted import Unit, slots_with
-from twin.diagnose.bank import nominal_run
-from twin.diagnose.elements import elements_of
-from twin.diagnose.integration import loads_for, states_of
-from twin.diagnose.probed_model import make_probed_model
-from twin.diagnose.slots import no_slots
-from twin.diagnose.study import Study, make_study
+from twin.diagnose.faults.acted import Unit, slots_with
+from twin.diagnose.faults.elements import elements_of
+from twin.diagnose.model.bank import nominal_run
+from twin.diagnose.model.integration import loads_for, states_of
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.slots import no_slots
+from twin.diagnose.model.study import Study, make_study
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 
@@ -184,7 +184,7 @@ def test_more_amplitudes_than_slots_are_refused():
 
 
 def test_a_plan_for_every_run():
-    from twin.diagnose.study import make_study
+    from twin.diagnose.model.study import make_study
     from twin.errors import TwinError
 
     study = small_case.study()

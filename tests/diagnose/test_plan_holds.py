@@ -14,18 +14,18 @@ import pytest
 from tests.hidden import small
 from twin.build.simulate import Noise, simulate_run
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.actuators import actuators_of
-from twin.diagnose.batch import score
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.detector import Detector, instruments_of, make_detector
-from twin.diagnose.experiments import experiments_of
-from twin.diagnose.plan import make_plan
-from twin.diagnose.plan_result import Foresight
-from twin.diagnose.probed_model import make_probed_model
-from twin.diagnose.sight import sight
-from twin.diagnose.study import make_study, with_measured
-from twin.diagnose.suspicion import named
-from twin.diagnose.whiten import measured_of
+from twin.diagnose.evidence.batch import score
+from twin.diagnose.evidence.sight import sight
+from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.study import make_study, with_measured
+from twin.diagnose.plan.actuators import actuators_of
+from twin.diagnose.plan.experiments import experiments_of
+from twin.diagnose.plan.plan import make_plan
+from twin.diagnose.plan.suspicion import named
+from twin.diagnose.result.plan import Foresight
+from twin.diagnose.search.detector import Detector, instruments_of, make_detector
 from twin.logs.read import read_run
 from twin.logs.run import Run
 from twin.machine.effects.edits import extended_description

@@ -9,10 +9,10 @@ import pytest
 from tests.build.test_cache_codec import equal
 from tests.diagnose import small_case
 from twin.build.cache_file import read_entry, write_entry
-from twin.diagnose import diagnose
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.detector import instruments_of, make_detector, stored
-from twin.diagnose.probed_model import ProbedModel
+from twin.diagnose import pipeline as diagnose
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.model.probed_model import ProbedModel
+from twin.diagnose.search.detector import instruments_of, make_detector, stored
 
 
 @pytest.fixture

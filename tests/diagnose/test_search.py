@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import exchanged
-from twin.diagnose.acted import Unit, slots_with
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.gain import predicted
-from twin.diagnose.search import search
-from twin.diagnose.verdict import limits_of, pulls_of, verdict_of
+from twin.diagnose.faults.acted import Unit, slots_with
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.search.accepted import exchanged
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.verdict import limits_of, pulls_of, verdict_of
 
 
 def measured(kind="", place="", size=0.0, seed=0, levels=(1.0,)):

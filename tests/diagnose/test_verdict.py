@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import parameter_of
-from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.pulls import Loose
-from twin.diagnose.search import search
-from twin.diagnose.search_look import look
-from twin.diagnose.search_strained import loose_ones, strained
-from twin.diagnose.verdict import (
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.pulls import Loose
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.search.accepted import parameter_of
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.look import look
+from twin.diagnose.search.strained import loose_ones, strained
+from twin.diagnose.search.verdict import (
     CALIBRATED,
     _more_alike,
     limits_at,

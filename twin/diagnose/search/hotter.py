@@ -1,0 +1,42 @@
+"""Model discrepancy of channels that get far hotter than described: it grows with the response.
+
+A detector knows the model discrepancy of the described machine. A motor that gives off twice its heat is wrong by
+twice as much wherever that heat goes, and would be called by the name of whatever looks most like the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.model.study import Study
+from twin.diagnose.search.detector import Detector
+
+MUCH = 1.4  # times the described rise of a channel: parameters within their tolerances stay below
+LEAST = 1.0, 5e-6  # K, m: rms of a described rise that a ratio is taken to
+
+
+def hotter(detector: Detector, x: np.ndarray) -> Detector:
+    """The detector at parameters x (n,) in prior standard deviations; itself where no channel is MUCH hotter."""
+    surrogate = detector.fitter.surrogate
+    times = _rise(detector.study, surrogate.at(x)[0]) / _rise(detector.study, surrogate.y0)
+    times = np.where(times > MUCH, times, 1.0)
+    if np.all(times == 1.0):
+        return detector
+    others = times[:, None] * detector.fitter.others
+    return replace(detector, fitter=replace(detector.fitter, others=others), columns=detector.columns.beside(others))
+
+
+def _rise(study: Study, flat: np.ndarray) -> np.ndarray:
+    """(m,) for every number the rms rise of its channel in its run, at least LEAST."""
+    parts, first = [], 0
+    for k in study.fitted:
+        planned = study.runs[k]
+        own = planned.split(flat[first : first + planned.size])
+        first += planned.size
+        for values, least in zip(own, LEAST, strict=True):
+            if len(values):
+                rms = np.sqrt(((values - values[0]) ** 2).mean(axis=0))
+                parts.append(np.broadcast_to(np.maximum(rms, least), values.shape).ravel())
+    return np.concatenate(parts) if parts else np.zeros(0)
