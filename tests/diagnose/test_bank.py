@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.faults.acted import Unit, slots_with
+from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.elements import FORCINGS, slim
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.model.bank import Column, respond
 
 LITTLE = {"heat": 0.5, "film": 0.05, "joint": 2e-3, "contact": 5e-3, "capacity": 50.0, "group": 5e-3, "air": 0.02,
@@ -45,7 +47,7 @@ def test_against_differences(key):
     """On the machine whose laws read no temperature, where responses leave out nothing."""
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
     kind, place, _ = key
-    unit = Unit(kind, place, elements.index[key], history(key, elements, study))
+    unit = Unit(OF_KIND[kind], place, elements.index[key], history(key, elements, study))
     x = np.zeros(len(study.probed.parameters))
     got = small_case.responses(linear=True)[:, elements.index[key]]
     parts = []
@@ -68,7 +70,7 @@ def test_reactions_of_laws_are_small():
     """Bearings that run easier when warm, and radiation."""
     study, elements = small_case.study(), small_case.elements()
     key = ("heat", "housing", "always")
-    unit = Unit("heat", "housing", elements.index[key], history(key, elements, study))
+    unit = Unit(OF_KIND["heat"], "housing", elements.index[key], history(key, elements, study))
     x = np.zeros(len(study.probed.parameters))
     slots = slots_with(study, elements, [unit], 0)
     exact = study.outputs(0, x, slots, [0.5]) - study.outputs(0, x, slots, [-0.5])

@@ -12,7 +12,7 @@ from twin.cli.main import run
 from twin.diagnose.evidence.batch import best, prepared
 from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.catalogue import FAMILIES, explained, family, with_own
-from twin.diagnose.faults.hypotheses import Context
+from twin.diagnose.faults.context import Context
 from twin.diagnose.report.catalogue import BEGIN, END, catalogue_table, renewed
 from twin.errors import TwinError
 from twin.machine.effects.edits import EDITS

@@ -9,7 +9,7 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.faults.hypotheses import Context
+from twin.diagnose.faults.context import Context
 from twin.diagnose.faults.readings import readings_of
 
 

@@ -19,7 +19,6 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.pipeline import Result
 from twin.diagnose.report.evidence import candidates_picture, cosine_picture, nulls_picture
 from twin.diagnose.report.gain import broken
-from twin.diagnose.report.numbers import customary, number, quantity, size_words
 from twin.diagnose.report.page import page, plain, summary_lines, write_report
 from twin.diagnose.report.residuals import load_rows, loudest, on_masks, residual_map, with_gaps
 from twin.diagnose.report.tables import gain_table, table, when
@@ -33,6 +32,7 @@ from twin.diagnose.report.text import (
     verdict_sentence,
 )
 from twin.diagnose.result.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Limit, Pull, Rival, Window
+from twin.diagnose.result.numbers import customary, number, quantity, size_words
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import gains

@@ -16,10 +16,9 @@ from pathlib import Path
 
 from twin.build.product import build_artefact
 from twin.calibrate.fit.problem import run_names
-from twin.diagnose.model.study import Study
 from twin.diagnose.pipeline import Result
 from twin.diagnose.report.page import write_report
-from twin.diagnose.result.diagnosis import Cause, Diagnosis, Window
+from twin.diagnose.result.diagnosis import Diagnosis, Window
 from twin.errors import TwinError
 from twin.logs.run import Run
 from twin.logs.write import write_run
@@ -27,12 +26,10 @@ from twin.machine.copy import with_files
 from twin.machine.description import Machine
 from twin.machine.edit import edited
 from twin.machine.effects.edits import extended_description, loads_with
-from twin.machine.effects.effect import Effect
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 
 MOVED = 0.1  # prior standard deviations that a parameter must have moved by to be written
-RIGID = 300.0  # s: time constant of a capacity that the diagnosis attached rigidly
 PAGE, REPORT, DESCRIPTION, ARTEFACT = "index.html", "report.json", "machine.toml", "extended.h5"
 
 
@@ -128,7 +125,7 @@ def _write_description(
     if not result.causes:
         told = [n for n in diagnosis.notes if n.startswith("withdrawn")] or ["no extension is written"]
         return parameters, told
-    study = result.search.detector.study
+    study, entries = result.search.detector.study, {f.name: f for f in result.families}
     said: list[str] = []
     text = artefact.description
     signals: dict[str, Sequence[Window]] = {}
@@ -137,18 +134,14 @@ def _write_description(
     text = edited(text, values, notes)
     for cause in result.causes:
         try:
-            edit = extended_description(text, [_as_edited(cause, study)])
+            edit = extended_description(text, [entries[cause.family].edit(cause, study)])
         except TwinError as e:
             said.append(f"not in the description: {cause.family} at {cause.place}: {e.problems[0].what}")
             continue
         text = edit.text
         signals |= edit.signals
         parameters[cause.family, cause.place] = edit.parameters[0]
-        if cause.family == "misplaced_source" and cause.ci95[1] < 1.0:
-            said.append(
-                f"{cause.place}: machine.toml moves all of its heat to {cause.settings['surface']}, these data say "
-                f"{cause.amplitude:.2f} of it: divide the source by hand to have the gain that is shown"
-            )
+        said += entries[cause.family].told_of_edit(cause)
     if not parameters:
         return parameters, said
     (new / DESCRIPTION).write_text(with_files(text, machine, new), encoding="utf-8")
@@ -157,31 +150,3 @@ def _write_description(
         write_run(new / "runs" / name, replace(loads_with(run, signals, name), machine=None))
         said.append(f"loads with {', '.join(signals)}: {target / 'runs' / name}")
     return parameters, said
-
-
-def _as_edited(cause: Cause, study: Study) -> Effect:
-    """A cause as descriptions take it (`twin.machine.effects.edits`)."""
-    probed = study.probed
-    settings = dict(cause.settings)
-    amplitude = cause.amplitude
-    if cause.family == "forced_convection":
-        amplitude = amplitude / float(settings.pop("reference", 1.0)) ** cause.exponent  # at 1 m/s
-    if cause.place.startswith("films.") and cause.family == "forced_convection":
-        film = cause.place.removeprefix("films.")
-        places = [p for p in probed.places if p.film == film]
-        settings["surfaces"] = ",".join(".".join(s) for p in places for s in p.surfaces or ((p.name,),))
-    if cause.family == "coolant":
-        settings.pop("temperature_sigma", None)
-    if cause.family == "scale_expansion":
-        part = str(settings.pop("part"))
-        settings["surface"] = next((p.name for p in probed.places if part in p.members and p.surfaces), part)
-    if cause.family == "capacity":
-        settings["conductance"] = amplitude / RIGID
-    if cause.family == "loss_law" and cause.signal:
-        settings["gain"] = 1.0
-    place = cause.place.removesuffix(".expansion") if cause.family == "expansion" else cause.place
-    if cause.family == "scale_expansion":
-        place = f"axes.{cause.place.removeprefix('axes.')}"
-    return Effect(
-        cause.family, place, amplitude, cause.unit, cause.history, cause.signal, cause.exponent, cause.windows, settings
-    )

@@ -16,8 +16,10 @@ from twin.diagnose.evidence.coarse import too_coarse
 from twin.diagnose.evidence.discretisation import Difference, differences
 from twin.diagnose.evidence.nulls import form_of
 from twin.diagnose.evidence.whiten import measured_of
-from twin.diagnose.faults.catalogue import FAMILIES, VERSION, Family
+from twin.diagnose.faults.catalogue import VERSION
 from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.faults.fault import Family
+from twin.diagnose.faults.table import FAMILIES
 from twin.diagnose.model.probed_model import ProbedModel, drive_arrays, make_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.model.surrogate import Surrogate
@@ -64,6 +66,7 @@ class Result:
     diagnosis: Diagnosis
     search: Search
     causes: tuple[Cause, ...]  # that belong into the description
+    families: tuple[Family, ...] = FAMILIES
 
 
 def machine_of(artefact: Artefact, path: Path, machine: Path | None = None) -> Machine:
@@ -225,7 +228,7 @@ def diagnose(
         scene=_scene(machine, study.probed, searched or causes, heat),
         plan=planned,
     )
-    return Result(diagnosis, found, extension)
+    return Result(diagnosis, found, extension, settings.families)
 
 
 def _beside_sensors(found: Search, groups: Mapping[str, str]) -> Search:

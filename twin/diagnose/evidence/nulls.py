@@ -20,6 +20,7 @@ from twin.diagnose.model.integration import INNER
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.sources import heated_places, own_place
 from twin.diagnose.model.study import Study
+from twin.diagnose.result.spot import Spot
 from twin.machine.description import Machine
 from twin.run.system import Array
 
@@ -230,7 +231,7 @@ def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> 
     if probed.base.load_model.sources[source].contact:
         return None
     B, own = body.B[:, body.sources.index(source)], own_place(study, source)
-    near = [p for p in beside(probed.places, own) if not probed.places[p].name.startswith("contacts.")]
+    near = [p for p in beside(probed.places, own) if not Spot.read(probed.places[p].name).pad]
     share = abs(form.beside * rng.standard_normal())
     if not near:
         return None

@@ -17,6 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from twin.diagnose.model.study import Study
+from twin.diagnose.result.spot import Spot
 
 MEMORY = 2.0  # blocks
 SIGMAS = (3.0, 12.0, 50.0)  # W
@@ -48,7 +49,7 @@ def heat_of(study: Study, blocks: Sequence[tuple[int, int, int]], of_place: Mapp
     correlation = correlation + 1e-6 * np.eye(len(blocks))
     surfaces, columns = [], []
     for part in parts:
-        own = [p.name for p in study.probed.places if part in p.members and not p.name.startswith("contacts.")]
+        own = [p.name for p in study.probed.places if part in p.members and not Spot.read(p.name).pad]
         c = np.concatenate([of_place[name] for name in own]) if own else np.zeros(0, int)
         surfaces.append(tuple(own))
         columns.append(c)

@@ -7,6 +7,7 @@ import numpy as np
 from twin.diagnose.evidence.formal import Described
 from twin.diagnose.evidence.nulls import Form, lump_of, typical
 from twin.diagnose.faults.elements import EXPONENT, Elements, Key
+from twin.diagnose.faults.signal import CLOCK
 from twin.diagnose.model.sources import heated_places
 from twin.diagnose.model.study import Study
 
@@ -57,3 +58,8 @@ def described_forms(study: Study, elements: Elements, raw: np.ndarray, form: For
     slow = tuple(own for (kind, _), own in elements.block_of.items() if kind == "group")
     made = np.stack(columns, axis=1) if columns else np.zeros((len(raw), 0))
     return Described(made, slow, elements.histories.blocks)
+
+
+def clocks(index: dict[Key, int]) -> list[int]:
+    """The columns of the clocks of all runs."""
+    return [column for (kind, _, _), column in index.items() if kind == CLOCK.kind]

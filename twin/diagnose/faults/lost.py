@@ -14,8 +14,10 @@ import numpy as np
 from twin.build.workers import each
 from twin.diagnose.evidence.batch import Batch, Hypothesis
 from twin.diagnose.evidence.whiten import Projector, Whitener
-from twin.diagnose.faults.acted import Unit, slots_with
+from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.elements import Elements
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import FAULTS, fault_of
 from twin.diagnose.model.study import Study
 from twin.progress import Progress, silent
 
@@ -29,6 +31,11 @@ class Lost:
 
     names: tuple[tuple[str, str], ...]  # kind and place
     responses: np.ndarray  # (m, n) white, of LEFT
+
+    def response(self, h: Hypothesis) -> np.ndarray | None:
+        """(m,) of a contact or joint; None of anything else."""
+        name = h.batch.kind, fault_of(h).bare(h.name)
+        return self.responses[:, self.names.index(name)] if name in self.names else None
 
 
 def lost_conductances(study: Study, elements: Elements, whiten: Whitener, progress: Progress = silent) -> Lost:
@@ -45,7 +52,8 @@ def lost_conductances(study: Study, elements: Elements, whiten: Whitener, progre
 def _without(shared: tuple[Study, Elements], name: tuple[str, str]) -> np.ndarray:
     study, elements = shared
     always = tuple(np.ones(p.run.drive.n_steps) for p in study.runs)
-    unit, x = Unit(*name, -1, always), np.zeros(len(study.probed.parameters))
+    kind, place = name
+    unit, x = Unit(FAULTS["joint", kind], place, -1, always), np.zeros(len(study.probed.parameters))
     parts = [study.outputs(k, x, slots_with(study, elements, [unit], k), (LEFT - 1.0,)) for k in study.fitted]
     return np.concatenate(parts)
 
@@ -57,11 +65,12 @@ def lost_candidates(lost: Lost, batches: Sequence[Batch], projector: Projector, 
     P = projector(lost.responses)
     information = np.maximum((lost.responses * P).sum(axis=0), 1e-30)
     found = []
-    for (kind, place), share, own in zip(lost.names, P.T @ white / information, information, strict=True):
-        batch = next((b for b in batches if b.kind == kind and f"contacts.{place}" in b.places), None)
+    for (kind, bare), share, own in zip(lost.names, P.T @ white / information, information, strict=True):
+        place = FAULTS["joint", kind].prefix + bare
+        batch = next((b for b in batches if b.kind == kind and place in b.places), None)
         if batch is not None and NEAR[0] < share < NEAR[1]:
             always = next(h for h in batch.histories if h.name == "always")
             size = share * (LEFT - 1.0)
-            i = batch.places.index(f"contacts.{place}")
+            i = batch.places.index(place)
             found.append(Hypothesis(batch, i, always, float(share**2 * own), (size,), float(own / (LEFT - 1.0) ** 2)))
     return found

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from twin.diagnose.plan.actuators import Actuator
-from twin.diagnose.report.numbers import quantity
+from twin.diagnose.result.numbers import quantity
 from twin.logs.run import Run, Table
 from twin.rom.load_model import LoadModel, Signal
 

@@ -17,13 +17,15 @@ import numpy as np
 from twin.diagnose.evidence.batch import RIDGE, Batch, Hypothesis
 from twin.diagnose.evidence.sight import Sight, sight
 from twin.diagnose.faults.elements import Key
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.plan.actuators import actuators_of
 from twin.diagnose.plan.experiments import AGAIN, experiments_of, longest_of
 from twin.diagnose.plan.foreseen import Asked, Foreseen, foreseen
 from twin.diagnose.plan.suspicion import Suspicion, coefficients
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
+from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.verdict import APART, POWER, told
+from twin.diagnose.search.verdict import APART, POWER
 from twin.logs.run import Run
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
@@ -85,7 +87,7 @@ def make_plan(
     longest = longest_of(runs)
     load = study.probed.base.load_model
     actuators = actuators_of(load, [study.runs[k].run.signals for k in study.fitted])
-    places = [p.name for p in study.probed.places if not p.name.startswith("contacts.")]
+    places = [p.name for p in study.probed.places if not Spot.read(p.name).pad]
     sensors = study.runs[longest].measured.sensors
     experiments = experiments_of(load, runs[longest], sensors, actuators, places)
     columns = _needed(detector, suspicions, pairs)
@@ -131,7 +133,7 @@ def _listed(ordered: Sequence[_P]) -> list[_P]:
 
 def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made: Sequence[Foreseen]) -> Foresight:
     threshold = detector.thresholds[s.family]
-    kind = s.batches(detector)[0][1].kind
+    told = fault_of(s.batches(detector)[0][1]).curve.told
     today = np.inf
     best = np.full(len(made), np.inf)
     for k, batch, p in s.batches(detector):
@@ -145,14 +147,14 @@ def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made:
             more = information + share * np.maximum(then - without, 0.0)
             best[e] = min(best[e], _limit(more, threshold, batch))
     proposals = [
-        Proposal(_name(f), _words(f), told(kind, float(size)), float(today / size))
+        Proposal(_name(f), _words(f), told(float(size)), float(today / size))
         for f, size in zip(made, best, strict=True)
     ]
     proposals.sort(key=lambda one: -one.gain)
     again = next(p.limit for p in proposals if p.experiment == AGAIN)
-    largest = [told(kind, batch.largest[p]) for _, batch, p in s.batches(detector) if batch.largest]
+    largest = [told(batch.largest[p]) for _, batch, p in s.batches(detector) if batch.largest]
     return Foresight(
-        s.family, s.place, s.unit, told(kind, float(today)), again, max(largest, default=None), threshold, s.windowed,
+        s.family, s.place, s.unit, told(float(today)), again, max(largest, default=None), threshold, s.windowed,
         tuple(_listed(proposals)),
     )  # fmt: skip
 

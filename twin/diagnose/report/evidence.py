@@ -5,7 +5,6 @@ from __future__ import annotations
 import matplotlib
 import numpy as np
 
-from twin.diagnose.report.numbers import size_words
 from twin.diagnose.report.pictures import (
     DELIVERED,
     EXTENDED,
@@ -18,6 +17,7 @@ from twin.diagnose.report.pictures import (
 )
 from twin.diagnose.report.text import history_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Rival
+from twin.diagnose.result.numbers import size_words
 from twin.pictures.style import INK, figure
 
 CANDIDATES = 15

@@ -11,6 +11,7 @@ from twin.diagnose.report.pictures import DELIVERED, EXTENDED, PAGE_RC, RECALIBR
 from twin.diagnose.report.text import place_words
 from twin.diagnose.result.diagnosis import Diagnosis
 from twin.diagnose.result.place import Network, Scene, Shell
+from twin.diagnose.result.spot import Of, Spot
 from twin.pictures.marked import marked_view
 from twin.pictures.network import layout
 from twin.pictures.style import INK, MUTED, figure
@@ -90,7 +91,8 @@ def _machine(axes: Axes, scene: Scene, shell: Shell, shares: dict[str, float]) -
     mesh = SurfaceMesh(shell.points, shell.triangles, shell.part)
     view = marked_view(mesh, marked, to_rgb(EXTENDED), scene.vertical, WIDTH)
     axes.imshow(view.pixels, interpolation="antialiased")
-    at_fault = scene.place.removeprefix("sensors.").split("<>") if scene.place.startswith("sensors.") else []
+    spot = Spot.read(scene.place)
+    at_fault = (spot.name, spot.partner) if spot.of is Of.SENSOR else ()
     known = [(n, p) for n, p in scene.sensors.items() if not isinstance(p, str)]
     where = view.at(np.array([p for _, p in known]).reshape(-1, 3)) if known else np.zeros((0, 2))
     ranked = list(shares)[:NAMED]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from html import escape
 
-from twin.diagnose.report.numbers import number, quantity
 from twin.diagnose.report.tables import folded, table
 from twin.diagnose.report.text import place_words, times, what
+from twin.diagnose.result.numbers import number, quantity
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal
 
 FEW = 2  # suspicions of which a terminal gets all experiments; of more the best one each

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.diagnose.report.numbers import number, quantity, size_words
 from twin.diagnose.result.diagnosis import Diagnosis, Pull
+from twin.diagnose.result.numbers import number, quantity, size_words
 
 KELVIN, METRES = 0.5, 3e-6  # rms of a channel, from which a change is told: what users asked for
 WHITE = 0.2  # correlation from bin to bin: two standard deviations of that of 100 bins (8 h) of white noise

@@ -11,6 +11,7 @@ from twin.build.places import Place
 from twin.build.surface import facet_nodes
 from twin.diagnose.model.probed_model import ProbedModel
 from twin.diagnose.result.place import Network, Scene, Shell
+from twin.diagnose.result.spot import Of, Spot
 from twin.machine.description import Machine
 
 
@@ -34,30 +35,28 @@ def _located(machine: Machine, probed: ProbedModel, place: str) -> list[str]:
     its marker, and what is measured or logged has no place."""
     places = {p.name: p for p in probed.places}
     load = probed.base.load_model
-    kind, _, name = place.partition(".")
-    name = name.split(">")[0].split("<")[0].split("*")[0]
+    spot = Spot.read(place)
+    of, name = spot.of, spot.name
     if place in places:
         return _surfaces([places[place]])
-    if kind == "films":
+    if of is Of.FILM:
         return _surfaces([p for p in places.values() if p.film == name])
-    if kind == "contacts" and name in machine.contacts:
+    if of is Of.CONTACT and name in machine.contacts:
         contact = machine.contacts[name]
         named = [*(contact.surfaces or ()), *(s for pair in contact.pairs for s in pair)]
         return [_known(machine, s) for s in named]
-    if kind == "sources" and name in machine.sources:
+    if of is Of.SOURCE and name in machine.sources:
         source = machine.sources[name]
         if source.contact:
             return _located(machine, probed, f"contacts.{source.contact}")
         return [_known(machine, str(source.surface))]
-    if kind == "signals":
+    if of is Of.SIGNAL:
         read = [s.name for s in load.sources if name in s.use.signals.values()]
         return [m for s in read for m in _located(machine, probed, f"sources.{s}")]
-    if kind == "environment":
+    if of is Of.ENVIRONMENT:
         films = [f.name for f in load.films if load.environments[f.environment].name == name]
         return _surfaces([p for p in places.values() if p.film in films])
-    member = place.removeprefix("tcp.expansion.").split(".")[-1] if place.startswith("tcp.expansion.") else place
-    member = place.split("<")[1] if "<" in place else member.removeprefix("parts.").rpartition(".")[2]
-    return _surfaces([p for p in places.values() if member in p.members])
+    return _surfaces([p for p in places.values() if spot.member in p.members])
 
 
 def _surfaces(places: Sequence[Place]) -> list[str]:

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from twin.diagnose.report.numbers import customary, interval_and_unit, number, quantity
 from twin.diagnose.report.text import beyond, history_words, place_words, times, what
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Rival
+from twin.diagnose.result.numbers import customary, interval_and_unit, number, quantity
 
 MANY = 60  # rows that a table shows at most
 

@@ -8,53 +8,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnose.report.numbers import interval_and_unit, number, quantity, size_words
+from twin.diagnose.faults.table import family_of
 from twin.diagnose.report.recalibration import left_words, moved_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival
+from twin.diagnose.result.numbers import interval_and_unit, number, quantity, size_words
 from twin.diagnose.result.place import Support
+from twin.diagnose.result.spot import Spot
 
 LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
-# What each family of the catalogue is, as the subject of "... at PLACE: SIZE".
-WHAT: dict[str, str] = {
-    "film_gain": "heat transfer other than declared",
-    "forced_convection": "cooling by air that motion drives",
-    "heat_source": "heat that the description lacks",
-    "loss_law": "a loss other than declared",
-    "joint": "a joint that conducts otherwise than declared",
-    "zone": "surroundings warmer or colder than declared",
-    "sun": "heat from the sun",
-    "coolant": "a medium that exchanges heat",
-    "sensor": "a temperature sensor at fault",
-    "signal": "a logged signal at fault",
-    "scale_expansion": "growth of a scale that the description lacks",
-    "expansion": "thermal expansion other than declared",
-    "slip": "a fixing that slips",
-    "capacity": "stored heat that the description lacks",
-    "initial_state": "another temperature at the start",
-    "coarse_model": "a model too coarse",
-    "measurement": "a TCP measurement at fault",
-    "misplaced_source": "a source declared at the wrong surface",
-    "not_thermal": "a deviation that is not thermal",
-}
 SEEN = ("stuck", "leap", "broken")  # histories of sensors at fault that are seen before anything is fitted
-_KINDS = {
-    "sensors": "sensor", "signals": "signal", "films": "film", "contacts": "contact", "environment": "surroundings",
-    "sources": "source", "materials": "material", "parts": "part", "scales": "scale", "runs": "run", "tanks": "tank",
-}  # fmt: skip
 
 
 def what(family: str) -> str:
-    return WHAT.get(family, family.replace("_", " "))
+    entry = family_of(family)
+    return (entry and entry.what) or family.replace("_", " ")
 
 
 def place_words(place: str) -> str:
     """As "film bed" for "films.bed"; surfaces and the rest stay as they are."""
-    kind, dot, name = place.partition(".")
-    return f"{_KINDS[kind]} {name}" if dot and kind in _KINDS else place
-
-
-_FACTORS = ("film_gain", "loss_law", "joint", "expansion")  # whose sizes without a unit multiply a declared number
-_KIND_OF_FAULT = ("sensor", "signal", "measurement", "not_thermal")  # families whose history says what kind it is
+    return Spot.read(place).words
 
 
 def history_words(history: str) -> str:
@@ -63,11 +35,8 @@ def history_words(history: str) -> str:
 
 def times(family: str, unit: str) -> str:
     """What a size without a unit is a multiple of."""
-    if unit not in ("", "1"):
-        return ""
-    if family == "misplaced_source":
-        return "times what it emits"
-    return "times the declared" if family in _FACTORS else ""
+    entry = family_of(family)
+    return entry.times if entry and unit in ("", "1") else ""
 
 
 def setting_words(cause: Cause) -> str:
@@ -77,9 +46,8 @@ def setting_words(cause: Cause) -> str:
         said.append(f"which enters at {surface}")
     if part := settings.get("part"):
         said.append(f"with the temperature of {part}")
-    if cause.family == "coolant" and "temperature" in settings:
-        medium, half = float(settings["temperature"]), 1.96 * float(settings.get("temperature_sigma", math.nan))
-        said.append(f"to a medium of {size_words(medium, (medium - half, medium + half), 'degC')}")
+    if entry := family_of(cause.family):
+        said += entry.said(cause)
     if (reference := settings.get("reference")) and cause.signal:
         said.append(f"where {cause.signal} is {number(float(reference))} in SI units")
     if height := settings.get("height"):
@@ -90,7 +58,8 @@ def setting_words(cause: Cause) -> str:
 def cause_words(cause: Cause | Rival) -> str:
     """As "heat that the description lacks at bed.x_motor: 85 W (95 % interval 80 to 90 W), following x_current²"."""
     where = place_words(cause.place)
-    if cause.family in ("sensor", "signal") and where:
+    entry = family_of(cause.family)
+    if entry and entry.channel and where:
         head = f"{where} is at fault"
     else:
         head = what(cause.family) + (f" {'in' if where.startswith('run ') else 'at'} {where}" if where else "")
@@ -100,7 +69,7 @@ def cause_words(cause: Cause | Rival) -> str:
     if isinstance(cause, Cause) and (settings := setting_words(cause)):
         size = f"{size}, {settings}" if size else settings
     history = history_words(cause.history)
-    if cause.family in _KIND_OF_FAULT:
+    if entry and entry.kind_told:
         said = [text for text in (history, size) if text]
     else:  # "x_current²" is a signal to follow; "from 4 h of run_1 on" says all
         said = [text for text in (size, f"following {history}" if history and " " not in history else history) if text]

@@ -10,12 +10,13 @@ import numpy as np
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.consistency import Size
 from twin.diagnose.evidence.fitter import bounds
-from twin.diagnose.faults.acted import CONDUCTS, Unit, slots_with, units_of
-from twin.diagnose.faults.readings import lagged, late, play
+from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import Study
+from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
 
-CURVED = ("slip", "clock", "lag")  # kinds that act on what is read, and not in proportion to their size
 OWN = ("gain", "conductance", "total")  # how parameters of sources, films, contacts and joints are called there
 ASIDE = 0.1  # of a size, by which such a one is moved for its derivative
 
@@ -48,7 +49,7 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
 
     Side by side the two would share one change.
     """
-    if h.batch.kind not in ("gain", *CONDUCTS) or h.when.windows or h.when.signal:
+    if not fault_of(h).declared or h.when.windows or h.when.signal:
         return []
     j = parameter_of(study, h.name)
     return [] if j is None else [j]
@@ -67,14 +68,13 @@ def jacobian(
     study = detector.study
     low, high = bounds(study)
     there, held = x.copy(), list[int]()
-    corrected = [(h, amplitude) for h, amplitude in causes if h.batch.kind == "signal"]
+    corrected = [(h, amplitude) for h, amplitude in causes if fault_of(h).corrects]
     anew = bool(corrected)
     for h, amplitude in causes:
         for j in freed(study, h):
-            size = amplitude if h.batch.kind == "gain" else float(np.log1p(amplitude))
-            there[j] = size / study.scale[j]
+            there[j] = fault_of(h).log_change(amplitude) / study.scale[j]
             held.append(j)
-            anew |= h.batch.kind != "gain" and not low[j] <= there[j] <= high[j]
+            anew |= fault_of(h).conducts and not low[j] <= there[j] <= high[j]
     if not anew:
         J = detector.fitter.surrogate.at(there)[1]
     elif before is not None:
@@ -93,7 +93,7 @@ def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]
     """(amplitude, parameter) of causes that are a declared parameter beyond its tolerance."""
     result, first = [], 0
     for a in accepted:
-        if a.hypothesis.batch.kind == "gain" and (j := parameter_of(study, a.hypothesis.name)) is not None:
+        if fault_of(a.hypothesis).parameter and (j := parameter_of(study, a.hypothesis.name)) is not None:
             result.append((first, j))
         first += len(a.amplitude)
     return result
@@ -115,7 +115,7 @@ def with_shifts(study: Study, accepted: Sequence[Accepted], x: np.ndarray) -> np
 
 
 def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
-    """(m, q) white first-order responses of a hypothesis: exact for what acts on what is read, but for `CURVED`."""
+    """(m, q) white first-order responses of a hypothesis: exact for what is read, but where that is curved."""
     columns, weights = h.combination()
     return np.asarray(detector.columns.raw[:, columns].astype(float) @ weights.T)
 
@@ -125,26 +125,21 @@ def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.
 
     x (n,): parameters that a clock's run is stepped with.
     """
-    if h.batch.kind == "swapped":  # `exchanged` has left nothing of it
+    if fault_of(h).exchanges:  # `exchanged` has left nothing of it
         return np.zeros(detector.columns.raw.shape[0])
-    if h.batch.kind in CURVED:
+    if fault_of(h).curved:
         return detector.whiten(curved_change(detector, h, float(amplitude[0]), x))
     return np.asarray(readings_columns(detector, h) @ amplitude)
 
 
 def curved_change(detector: Detector, h: Hypothesis, size: float, x: np.ndarray | None) -> np.ndarray:
-    """(m,) likewise of the kinds CURVED, in what is measured; x None: of the nominal machine, which costs no step."""
-    study = detector.study
-    if h.batch.kind == "slip":
-        return size * play(study, detector.nominal, h.name.removeprefix("tcp."), abs(size))
-    run = h.name.removeprefix("runs.")
-    states = {
-        k: detector.nominal[k].states if x is None else study.states(k, x)
-        for k in study.fitted if study.runs[k].run.name == run or h.batch.kind == "lag"
-    }  # fmt: skip
-    if h.batch.kind == "lag":
-        return size * lagged(study, states, h.name.removeprefix("sensors."), max(size, h.batch.smallest))
-    return size * late(study, states, size)
+    """(m,) likewise of what is curved, in what is measured; x None: of the nominal machine, which costs no step."""
+    study, nominal = detector.study, detector.nominal
+
+    def states(k: int) -> np.ndarray:
+        return nominal[k].states if x is None else study.states(k, x)
+
+    return fault_of(h).change(study, nominal, states, h.name, size)
 
 
 def curved_slope(detector: Detector, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
@@ -158,7 +153,8 @@ def in_place(T: np.ndarray, sensors: Sequence[str], accepted: Sequence[Accepted]
     """(b, s) temperatures T of sensors with those back in place that were found swapped."""
     order = list(range(len(sensors)))
     for a in accepted:
-        pair = a.hypothesis.name.removeprefix("sensors.").split("<>") if a.hypothesis.batch.kind == "swapped" else []
+        spot = Spot.read(a.hypothesis.name)
+        pair = (spot.name, spot.partner) if fault_of(a.hypothesis).exchanges else ()
         if pair and set(pair) <= set(sensors):
             i, j = (list(sensors).index(name) for name in pair)
             order[i], order[j] = order[j], order[i]
@@ -167,7 +163,7 @@ def in_place(T: np.ndarray, sensors: Sequence[str], accepted: Sequence[Accepted]
 
 def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
     """(m,) measurements y with the channels back in place that were found swapped: exact, whatever the parameters."""
-    if not any(a.hypothesis.batch.kind == "swapped" for a in accepted):
+    if not any(fault_of(a.hypothesis).exchanges for a in accepted):
         return y
     parts, first = [], 0
     for k in study.fitted:

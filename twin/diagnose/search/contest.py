@@ -16,25 +16,22 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted, bounds
-from twin.diagnose.faults.acted import CONDUCTS, READINGS, units_of
-from twin.diagnose.model.study import K, Study
-from twin.diagnose.search.accepted import CURVED, curved_change, curved_slope, freed, jacobian
+from twin.diagnose.faults.acted import units_of
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.study import K
+from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import STEP, Edge, edges_of, moved, with_pulses
 from twin.diagnose.search.growth import GROWTH
 
-BENT = (*CONDUCTS, "film", "group_film", "capacity", "coolant", "moved")
 PASSES, WINDOW_PASSES, READ_PASSES = 3, 8, 6
 ENTRANTS = 5  # candidates of a kind that are refitted
 BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
 SATURATES = 0.4  # likewise of capacities and of coolants' films: the larger they are, the worse is linearity
 EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
 GONE = -0.7  # of a relative change, linearly
-WET = 60.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
 ENOUGH = 0.02  # of a size, that a pass moves it by when it has arrived
 LESS, SHARE = 1.0, 1e-3  # likelihood-ratio units and share of a statistic: a pass that changes less is the last
-HARDLY = 35.0  # W/(m^2 K), likewise: less than the discrepancy in 95 of 100 cases is no film of a warm liquid
-FROZEN = 0.0  # degC, below which no medium flows over a machine
 HELD = 2  # passes in which its heat and edges are found for that film, before all are free
 TRIAL = 4  # passes by which coolants are compared before the best of them are refitted
 BENDS = 2.5  # prior standard deviations that only something hidden moves a parameter by
@@ -55,15 +52,15 @@ def misfit(detector: Detector, fitted: Fitted) -> float:
 def worth(h: Hypothesis) -> float:
     """A statistic less the price of its freedom: how many like it were tried, amplitudes, further windows."""
     tried = len(h.batch.places) * len(h.batch.histories)
-    more = max(len(h.when.windows) - 1, 0) if h.family not in ("sun", "joint") else 0
+    more = max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
     return h.statistic - 2.0 * float(np.log(tried)) - AMPLITUDE * (h.batch.q - 1) - GROWTH * more
 
 
 def proof(detector: Detector, h: Hypothesis) -> float:
     """A refitted statistic as thresholds count it: they know neither edges that are fitted nor further windows."""
-    if h.batch.kind in READINGS:
+    if fault_of(h).read:
         return h.statistic
-    more = max(len(h.when.windows) - 1, 0) if h.when.bell is None and h.family != "joint" else 0
+    more = max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
     return h.statistic - EDGE * len(edges_of(detector.study, h)) - (GROWTH - 2.0 * EDGE) * more
 
 
@@ -82,7 +79,7 @@ def judged(
     left: list[Hypothesis] = []
     lead, leads_by, count = -np.inf, -np.inf, Counter[str]()
     for h in waiting:
-        behind = SATURATES if h.batch.kind == "capacity" else BEHIND
+        behind = SATURATES if fault_of(h).saturates else BEHIND
         led = worth(h) < (1.0 - behind) * leads_by
         bent = _bent(detector, h)
         if (led and not _saturated(h)) or (bent and count[h.batch.kind] >= ENTRANTS):
@@ -105,12 +102,12 @@ def tried(
     refitted for some passes, from the last of their starts: linearity is, for a film that saturates, wrong by
     tens of per cent, more at the wetted face than at those behind it, so that it would be left aside."""
     order = sorted(candidates, key=lambda starts: -worth(starts[0]))
-    if not order or order[0][0].batch.kind != "coolant":
+    if not order or not fault_of(order[0][0]).wets:
         return order
     least = (1.0 - SATURATES) * worth(order[0][0])
     passed = [
         (exact(detector, y, fitted, starts[-1], TRIAL),)
-        if starts[0].batch.kind == "coolant" and worth(starts[0]) > least else starts
+        if fault_of(starts[0]).wets and worth(starts[0]) > least else starts
         for starts in order
     ]  # fmt: skip
     return sorted(passed, key=lambda starts: -worth(starts[0]))
@@ -123,7 +120,7 @@ def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequenc
     while True:
         lead = order[0]
         near = [h for h in order[1:] if worth(h) > (1.0 - BEHIND) * worth(lead)]
-        settled = _bent(detector, lead) or id(lead) in exactly or lead.batch.kind in READINGS or lead.batch.fixed
+        settled = _bent(detector, lead) or id(lead) in exactly or fault_of(lead).read or lead.batch.fixed
         if settled or not any(_bent(detector, h) or id(h) in exactly for h in near):
             break
         order[0] = exact(detector, y, fitted, lead)
@@ -134,11 +131,12 @@ def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequenc
 
 def _saturated(h: Hypothesis) -> bool:
     """A conductance that is nearly gone: it moves temperatures by far more than its score says."""
-    return h.batch.kind in CONDUCTS and h.amplitude[0] < GONE
+    return fault_of(h).conducts and h.amplitude[0] < GONE
 
 
 def _bent(detector: Detector, h: Hypothesis) -> bool:
-    return h.batch.kind in (*BENT, *CURVED) or (h.batch.kind not in READINGS and bool(edges_of(detector.study, h)))
+    fault = fault_of(h)
+    return fault.bent or fault.curved or (not fault.read and bool(edges_of(detector.study, h)))
 
 
 def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes: int = 0) -> Hypothesis:
@@ -147,12 +145,12 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     y (m,): NaN where nothing was measured. What accepted causes do is added to what it does. passes: at most, 0 for as
     many as its kind needs.
     """
-    if h.batch.kind in CURVED:
+    fault = fault_of(h)
+    if fault.curved:
         return _read_anew(detector, fitted, h)
-    study = detector.study
-    relative, q = h.batch.kind in CONDUCTS, h.batch.q
+    study, q = detector.study, h.batch.q
     a = np.array(h.amplitude)
-    if relative:
+    if fault.conducts:
         a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, LOW, HIGH)  # as if temperatures were linear in t
     if h.when.bell is not None:
         h = moved(study, detector.elements, h, ())  # hours found by `growth` get their windows
@@ -161,14 +159,14 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     low, high = bounds(study)
     floor = lowest(detector, h)
     a = np.maximum(a, floor)
-    mean, inverse = priors(h)
-    if h.batch.kind == "coolant":  # a strong film saturates: a score that takes it as linear says little
-        a[0] = WET
+    mean, inverse = fault.prior(q)
+    if fault.wets:  # a strong film saturates: a score that takes it as linear says little
+        a[0] = mean[0]
     x0 = beginning(fitted.x).copy()
     x0[freed(study, h)] = 0.0
     now = _Point(a, x0, h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
-    held = HELD if h.batch.kind == "coolant" else 0
+    held = HELD if fault.wets else 0
     for i in range(passes or held + (PASSES if not inner else WINDOW_PASSES)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(detector, now, edges)
@@ -199,7 +197,7 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
             pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
             below = np.concatenate([floor - now.a, np.full(len(edges), -np.inf)])
             found = solved(F, PD.T @ left + pulled, below)
-            after = _liquid(study, h, _moved(now.a, found[:q], relative, h.batch.sign))
+            after = fault.limited(study, h.name, _moved(now.a, found[:q], fault.conducts, h.batch.sign))
             shifts = np.clip(found[q:], -STEP, STEP)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
             drift = np.clip(np.clip(nuisance, low, high) - now.x, -NEAR, NEAR)
@@ -208,8 +206,8 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
             moved(study, detector.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
         )
         now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
-    if h.batch.kind == "coolant" and best.a[0] <= HARDLY and best.a[1] > 0.0:
-        statistic = 0.0  # that is heat
+    if fault.vanished(best.a):
+        statistic = 0.0
     # what better parameters remove is not the cause's
     plain = np.concatenate([study.outputs(k, best.x) for k in study.fitted])
     _, J = detector.fitter.surrogate.at(best.x)
@@ -254,36 +252,8 @@ def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:
 
 
 def lowest(detector: Detector, h: Hypothesis) -> np.ndarray:
-    """(q,) below which no amplitude goes: less than the described film cannot lack at a surface."""
-    result = np.full(h.batch.q, -np.inf)
-    if h.batch.kind == "coolant":
-        result[0] = h.batch.smallest
-    elif h.family == "sun":  # on no day does it cool
-        result[:] = 0.0
-    elif h.batch.kind == "film" and not h.batch.sign:
-        probed = detector.study.probed
-        film = next(p.film for p in probed.places if p.name == h.name)
-        own = [f for f, described in enumerate(probed.base.load_model.films) if described.name == film]  # perhaps none
-        result[0] = -max(float(detector.nominal[k].total[:, own].max(initial=0.0)) for k in detector.study.fitted)
-    return result
-
-
-def _liquid(study: Study, h: Hypothesis, a: np.ndarray) -> np.ndarray:
-    """(q,) amplitudes, a coolant's film no less than what takes its heat to a medium that is not FROZEN: plain cold at
-    a large face beside it imitates a coolant, from far below that."""
-    if h.batch.kind != "coolant":
-        return a
-    area = next(p.area for p in study.probed.places if p.name == h.name)
-    above = study.probed.base.reference_temperature - FROZEN
-    return np.array([max(a[0], -a[1] / (area * above)) if above > 0.0 else a[0], a[1]])
-
-
-def priors(h: Hypothesis) -> tuple[np.ndarray, np.ndarray]:
-    """(q,) means and inverse variances of amplitudes: a brief coolant tells its heat well and its film hardly."""
-    mean, inverse = np.zeros(h.batch.q), np.zeros(h.batch.q)
-    if h.batch.kind == "coolant":
-        mean[0], inverse[0] = WET, WET**-2
-    return mean, inverse
+    """(q,) below which no amplitude goes."""
+    return fault_of(h).lowest(detector.study, detector.nominal, h)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ the heat there, whose parameters are fitted to first order. (`twin.diagnose.sear
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,8 @@ import numpy as np
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.faults.fault import Fault
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.integration import loads_for
 from twin.diagnose.model.study import Planned, Study
 from twin.diagnose.search.accepted import parameter_of
@@ -36,7 +39,7 @@ EXACT = 3  # passes likewise of the model with a corrected signal
 def declared_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Exact factors of signals that leave less misfit than the fit without a cause does, to first order."""
     before, found = misfit(detector, fitted), []
-    for h, D in _promising(detector, y, "signal")[:CLOSELY]:
+    for h, D in _promising(detector, y, lambda fault: fault.corrects)[:CLOSELY]:
         statistic = before - _fitted_with(detector, y, D)
         if statistic > 0.0:
             found.append(replace(h, statistic=statistic))
@@ -46,7 +49,7 @@ def declared_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> li
 def misplaced_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Likewise of sources all of whose heat is elsewhere, with what they do there beside the described machine."""
     study, before, found = detector.study, misfit(detector, fitted), []
-    for h, _ in _promising(detector, y, "moved")[:CLOSELY]:
+    for h, _ in _promising(detector, y, lambda fault: fault.elsewhere)[:CLOSELY]:
         units, x = units_of(study, h), np.zeros(len(fitted.x))
         there = [study.outputs(k, x, slots_with(study, detector.elements, units, k), h.amplitude) for k in study.fitted]
         change = detector.whiten(np.concatenate(there) - detector.fitter.surrogate.y0)
@@ -61,11 +64,11 @@ def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[
     each of the SIGNALS most promising; where that explains half of what a signal must, CLOSELY of them."""
     before, found = misfit(detector, fitted), list[Hypothesis]()
     factors = dict[str, list[Hypothesis]]()
-    for h, _ in _promising(detector, y, "signal"):
-        factors.setdefault(h.name.split("*")[0], []).append(h)
+    for h, _ in _promising(detector, y, lambda fault: fault.corrects):
+        factors.setdefault(fault_of(h).factor(h.name)[0], []).append(h)
     for name, own in list(factors.items())[:SIGNALS]:
         for h in own[:CLOSELY]:
-            corrected = with_signal(detector.study, name.removeprefix("signals."), float(h.name.split("*")[1]))
+            corrected = with_signal(detector.study, fault_of(h).bare(name), fault_of(h).factor(h.name)[1])
             least = 0.5 * detector.thresholds[h.family]
             statistic = before - _fitted_by(detector, y, corrected, before - least)
             found.append(replace(h, statistic=max(statistic, 0.0)))
@@ -113,12 +116,12 @@ def _sum(drive: Drive, more: Drive, less: Drive, moving: list[int]) -> Drive:
     )
 
 
-def _promising(detector: Detector, y: np.ndarray, kind: str) -> list[tuple[Hypothesis, np.ndarray]]:
-    """Those of a kind and their white responses (m,), first those that leave least beside the description, to first
-    order."""
+def _promising(detector: Detector, y: np.ndarray, of: Callable[[Fault], bool]) -> list[tuple[Hypothesis, np.ndarray]]:
+    """Those of some faults and their white responses (m,), to first order, first those that leave least beside the
+    description."""
     found = []
     for batch in detector.columns.batches:
-        if batch.kind != kind:
+        if not of(fault_of(batch)):
             continue
         D = detector.columns.raw[:, batch.columns[:, 0]].astype(float)
         f, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))

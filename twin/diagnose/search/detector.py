@@ -27,9 +27,9 @@ from twin.diagnose.evidence.unknown import heat_of
 from twin.diagnose.evidence.whiten import Whitener, offsets
 from twin.diagnose.evidence.windy import wind_columns
 from twin.diagnose.faults.catalogue import Family
+from twin.diagnose.faults.context import Context
 from twin.diagnose.faults.elements import Elements, elements_of, slim
-from twin.diagnose.faults.forms import described_forms
-from twin.diagnose.faults.hypotheses import Context
+from twin.diagnose.faults.forms import clocks, described_forms
 from twin.diagnose.faults.lost import Lost, lost_conductances
 from twin.diagnose.faults.readings import readings_of
 from twin.diagnose.model.bank import Nominal, nominal_run, respond
@@ -206,10 +206,10 @@ def bare_forms(study: Study, raw: np.ndarray, index: dict[tuple[str, str, str], 
 def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.ndarray:
     """(m, 1) what all clocks by LATE do, of a unit prior: a log's clock is off in its own run, and what comes early or
     late in every run is a light part's or a sensor's time constant. (m, 0) where there is one run alone."""
-    clocks = [column for (kind, _, _), column in index.items() if kind == "clock"]
-    if len(clocks) < 2:
+    own = clocks(index)
+    if len(own) < 2:
         return np.zeros((len(raw), 0))
-    return np.asarray(LATE * raw[:, clocks].astype(float).sum(axis=1, keepdims=True))
+    return np.asarray(LATE * raw[:, own].astype(float).sum(axis=1, keepdims=True))
 
 
 def _discretised(differences: Differences, m: int) -> np.ndarray:

@@ -15,8 +15,10 @@ import numpy as np
 
 from twin.diagnose.evidence import bells
 from twin.diagnose.evidence.batch import Hypothesis
-from twin.diagnose.faults.acted import Unit, slots_with
+from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.elements import Elements
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Window
@@ -27,7 +29,6 @@ BRIEF = 7200.0  # s, the shortest bell
 PRIOR = 1800.0  # s: standard deviation of an edge about the hour that the search found
 STEP = 1800.0  # s, the longest step of an edge
 EXPONENT = 0.12  # standard deviation of a signal's exponent about the one of the catalogue
-WARMER = 0.3  # standard deviation of what a coolant's heat changes by from the middle of a window to its end
 LONGER = 1800.0  # s, likewise of the length of a bell that was fitted
 
 
@@ -35,13 +36,13 @@ LONGER = 1800.0  # s, likewise of the length of a bell that was fitted
 class Edge:
     """One end of a window, or what a bell is made of."""
 
-    what: Literal["start", "end", "centre", "length"]
+    what: Literal["begin", "end", "centre", "length"]
     window: int = 0
 
     @property
     def per_second(self) -> float:
         """The response to a shift by 1 s, in units of that to its pulse."""
-        return (-1.0 if self.what == "start" else 1.0) / PULSE
+        return (-1.0 if self.what == "begin" else 1.0) / PULSE
 
     @property
     def prior(self) -> float:
@@ -54,7 +55,7 @@ def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
 
     What was there before a run and stays, or lasts beyond its end, has no edge there.
     """
-    if h.family == "not_thermal":
+    if fault_of(h).instant:
         return []
     if h.when.bell is not None:
         return [*(Edge("centre", i) for i in range(len(h.when.bell.centres))), Edge("length")]
@@ -66,7 +67,7 @@ def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
         lasts = whole[i] and (w.start == 0.0 or i + 1 == len(windows) or windows[i + 1].start == 0.0)
         begun = w.start == 0.0 and (whole[i] or (i > 0 and whole[i - 1]))
         if not begun:  # what begins with a run may begin some minutes later
-            result.append(Edge("start", i))
+            result.append(Edge("begin", i))
         if not lasts:
             result.append(Edge("end", i))
     return result
@@ -130,11 +131,10 @@ def with_pulses(
 def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarray) -> list[Unit]:
     """Units whose responses at amplitude one are what the shape of a cause leaves open, one standard deviation each.
 
-    The exponent of a logged signal, the length of a bell, a coolant that becomes warmer, the first edges of windows.
+    The exponent of a logged signal, the length of a bell, the first edges of windows, what its fault says.
     """
-    if h.batch.kind == "coolant":  # its film shows in how its heat declines, and so would this
-        shapes = tuple(WARMER * float(a[1]) * _ramp(s) for s in units[1].shapes)
-        return [replace(units[1], shapes=shapes)]
+    if (own := fault_of(h).left_open(units, a)) is not None:
+        return own
     if (bell := h.when.bell) is not None:
         changes = []
         for k in range(len(study.runs)):
@@ -157,15 +157,6 @@ def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarr
         replace(u, shapes=tuple(v * by * s * np.log(np.maximum(s, 1e-12)) for s in u.shapes))
         for u, v in zip(units, a, strict=True)
     ]
-
-
-def _ramp(shape: np.ndarray) -> np.ndarray:
-    """(n_fine,) from 1 to -1 over every stretch of a shape, times the shape."""
-    result = np.zeros(len(shape))
-    on = np.concatenate([[False], shape != 0.0, [False]])
-    for start, end in zip(np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(~on[1:] & on[:-1]), strict=True):
-        result[start:end] = np.linspace(1.0, -1.0, end - start) * shape[start:end]
-    return result
 
 
 def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray | None:

@@ -15,8 +15,9 @@ from twin.diagnose.evidence.consistency import differs
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.acted import units_of
-from twin.diagnose.faults.size_discrepancy import size_discrepancy
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
+from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, exchanged
 from twin.diagnose.search.contest import beginning, judged, proof, tried
 from twin.diagnose.search.declared import declared_candidates, declared_exactly, misplaced_candidates
@@ -33,8 +34,6 @@ TRIES = 3  # rounds of candidates that the exact model refuses
 WINDOWS = 4  # in which a cause switches at one place; what does so more often has a history that no name tells
 FEW = 2  # windows likewise that a cause may have and still leave heat where it is
 LEFT = 0.5  # of the threshold of heat of any history: what windows may leave of it
-LEAVES, DRIES = 0.005, 0.01  # of their statistic likewise; of a coolant, whose film saturates as the model has it
-SEVERAL = ("initial_state",)  # families that come part by part: one of them explains a share
 AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
 NAMED = 0.7  # share of its own threshold that a name needs where another one passes
 MISFIT = 0.003  # of what a cause in the machine explains: a response that is wrong by a twentieth leaves so much
@@ -99,8 +98,8 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
         if free > detector.thresholds["unknown"]:
             standing = [
                 h for h in standing
-                if (h.statistic > COVERS * free or h.family in SEVERAL)
-                and (len(h.when.windows) <= WINDOWS or h.when.bell is not None or h.name.startswith("environment."))
+                if (h.statistic > COVERS * free or fault_of(h).several)
+                and (len(h.when.windows) <= WINDOWS or h.when.bell is not None or fault_of(h).everywhere)
             ]  # fmt: skip
             if not standing:
                 break
@@ -124,7 +123,7 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
         fitted, accepted = _without(detector, y, fitted, accepted, leaking)
         seen, _, step = look(detector, fitted)
         steps.append(step)
-    if uneven := [a for a in accepted if _of_machine(a) and differs(a.by_run, size_discrepancy(a.hypothesis))]:
+    if uneven := [a for a in accepted if _of_machine(a) and differs(a.by_run, fault_of(a.hypothesis).own)]:
         fitted, accepted = _without(detector, y, fitted, accepted, uneven)
         seen, _, step = look(detector, fitted)
         steps.append(step)
@@ -159,8 +158,8 @@ def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
 def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
     """Whether it is the loss of a source that reads a corrected signal: what the exact factor leaves there is misfit of
     a source that emits many times as much, and no cause beside it."""
-    names = [a.hypothesis.name for a in accepted if a.hypothesis.batch.kind == "signal"]
-    wrong = {name.removeprefix("signals.").split("*")[0] for name in names}
+    corrected = [(fault_of(a.hypothesis), a.hypothesis.name) for a in accepted if fault_of(a.hypothesis).corrects]
+    wrong = {fault.bare(fault.factor(name)[0]) for fault, name in corrected}
     sources = study.probed.base.load_model.sources
     return any(h.name == f"sources.{s.name}" and wrong & set(s.use.signals.values()) for s in sources)
 
@@ -195,27 +194,27 @@ def _leaking(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, 
     left = max(parts.values(), default=0.0)
     return [
         a for a in accepted
-        if a.hypothesis.when.windows and a.hypothesis.when.bell is None and a.units and a.hypothesis.family != "joint"
+        if a.hypothesis.when.windows and a.hypothesis.when.bell is None and a.units and fault_of(a.hypothesis).grows
         and left > max(LEFT * detector.thresholds["unknown"], _misfit(a))
     ]  # fmt: skip
 
 
 def _of_machine(a: Accepted) -> bool:
     """Whether a cause is a property of the machine: what acts on readings may be set up anew for every run."""
-    return bool(a.units) or a.hypothesis.batch.kind == "gain"
+    return bool(a.units) or fault_of(a.hypothesis).parameter
 
 
 def _misfit(a: Accepted) -> float:
     """Heat that a cause in windows may leave because the model is not the machine."""
-    return (DRIES if a.hypothesis.batch.kind == "coolant" else LEAVES) * a.statistic
+    return fault_of(a.hypothesis).leaves * a.statistic
 
 
 def _parts(study: Study, name: str) -> set[str]:
     """The parts that a surface or a film belongs to."""
-    head, _, rest = name.partition(".")
-    if head == "films":
-        return {p.name.partition(".")[0] for p in study.probed.places if p.film == rest}
-    return {head}
+    spot = Spot.read(name)
+    if spot.of is Of.FILM:
+        return {Spot.read(p.name).part for p in study.probed.places if p.film == spot.name}
+    return {spot.part}
 
 
 def _stands(a: Accepted) -> bool:

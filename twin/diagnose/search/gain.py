@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.faults.readings import play, readings_of
+from twin.diagnose.faults.readings import readings_of
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.accepted import in_place, stepped, with_shifts
 from twin.diagnose.search.look import Search
 
-MACHINE_READINGS = ("scale", "expansion")  # kinds that act on what is read, and belong to the machine
-MEASURING = ("probe", "frame", "heated", "slip", "load")  # kinds that belong to the measurement
 BLOCK = 2.0 * 3600.0  # s, of the bootstrap
 NOTICED = 0.5  # of a channel's noise, by which causes must move it to count as affected
 
@@ -43,8 +42,7 @@ def predicted(found: Search, k: int) -> Predicted:
 def _read(found: Search, k: int) -> np.ndarray:
     """(size,) what causes that act on the reading of the TCP add in run k."""
     study = found.detector.study
-    kinds = MACHINE_READINGS + MEASURING
-    wanted = [a for a in found.accepted if a.hypothesis.batch.kind in kinds]
+    wanted = [a for a in found.accepted if fault_of(a.hypothesis).lasts]
     result = np.zeros(study.runs[k].size)
     if not wanted:
         return result
@@ -53,13 +51,9 @@ def _read(found: Search, k: int) -> np.ndarray:
     y = study.outputs(k, np.zeros(len(found.x)))
     columns, index = readings_of(one, [nominal], [y], [np.zeros((len(y), len(found.x)))])
     for a in wanted:
-        h = a.hypothesis
-        place = h.name.removeprefix("tcp.expansion.").removeprefix("tcp.").removeprefix("parts.")
-        column = index.get((h.batch.kind, place, "always"))
-        if h.batch.kind == "slip":
-            result += a.amplitude[0] * play(one, [nominal], place, abs(float(a.amplitude[0])))
-        elif column is not None:
-            result += a.amplitude[0] * columns[:, column]
+        fault, h = fault_of(a.hypothesis), a.hypothesis
+        known = {p: columns[:, c] for (kind, p, when), c in index.items() if (kind, when) == (fault.kind, "always")}
+        result += fault.read_in(one, [nominal], h.name, float(a.amplitude[0]), known)
     return result
 
 

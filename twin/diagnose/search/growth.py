@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnose.evidence.batch import RIDGE, History, Hypothesis
-from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.faults.table import fault_of
+from twin.machine.effects.effect import Window
 
 GROWTH = 12.0  # likelihood-ratio units that another window must bring
 SHARE = 0.05  # and the least share of what the others explain: a strong cause has misfits that windows imitate
@@ -23,7 +24,7 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
     """
     if h.when.bell is not None:
         return _elsewhere(h, g, block)
-    if len(h.when.windows) == 0 or h.batch.fixed or h.family in ("not_thermal", "sun", "joint"):
+    if len(h.when.windows) == 0 or h.batch.fixed or not fault_of(h).grows:
         return h
     own = g[h.batch.columns[h.place]]
     others = [w for w in h.batch.histories if w.windows]
@@ -62,7 +63,7 @@ def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis | Non
     A score takes a film as linear, in which cold and film cancel over hours that have neither: a window that
     is far too long can then lead. What a coolant takes away is cold, whatever its film.
     """
-    if h.batch.kind != "coolant" or len(h.when.windows) == 0:
+    if not fault_of(h).wets or len(h.when.windows) == 0:
         return None
     cold, hot = _plain(h, g, block, -1), _plain(h, g, block, 1)
     if cold is None or (hot is not None and hot.statistic > cold.statistic):

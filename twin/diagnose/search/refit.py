@@ -12,10 +12,11 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.consistency import sizes
 from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.evidence.formal import of_channels
-from twin.diagnose.faults.acted import RELATIVE, slots_with
+from twin.diagnose.faults.acted import slots_with
+from twin.diagnose.faults.fault import Curve
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.search.accepted import (
-    CURVED,
     Accepted,
     curved_change,
     curved_slope,
@@ -26,7 +27,7 @@ from twin.diagnose.search.accepted import (
     readings_columns,
     shifted,
 )
-from twin.diagnose.search.contest import LOW, lowest, priors, solved
+from twin.diagnose.search.contest import LOW, lowest, solved
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import shape_errors
 
@@ -73,9 +74,10 @@ def refit(
     amplitude = np.concatenate([a.amplitude for a in accepted])
     D = np.zeros((len(y), len(amplitude)))
     y = exchanged(study, y, accepted)
-    swapped = np.concatenate([np.full(len(a.amplitude), a.hypothesis.batch.kind == "swapped") for a in accepted])
+    swapped = np.concatenate([np.full(len(a.amplitude), fault_of(a.hypothesis).exchanges) for a in accepted])
     gains = gains_of(study, accepted)
-    mean, inverse_prior = (np.concatenate(p) for p in zip(*(priors(a.hypothesis) for a in accepted), strict=True))
+    priors = [fault_of(a.hypothesis).prior(len(a.amplitude)) for a in accepted]
+    mean, inverse_prior = (np.concatenate(p) for p in zip(*priors, strict=True))
     floor = np.concatenate([lowest(detector, a.hypothesis) for a in accepted])
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
     x = x.copy()
@@ -90,12 +92,13 @@ def refit(
         for a in accepted:
             own = slice(first, first + len(a.amplitude))
             first = own.stop
-            if a.hypothesis.batch.kind in CURVED:
+            fault = fault_of(a.hypothesis)
+            if fault.curved:
                 size = float(amplitude[own][0])
                 slope = curved_slope(detector, a.hypothesis, size, there)
                 D[:, own] = detector.whiten(slope)[:, None]
                 bent += size * slope - curved_change(detector, a.hypothesis, size, there)
-            elif a.hypothesis.batch.kind == "swapped":  # `exchanged` has left nothing of it
+            elif fault.exchanges:  # `exchanged` has left nothing of it
                 D[:, own] = 0.0
             elif not a.units:
                 D[:, own] = readings_columns(detector, a.hypothesis)
@@ -174,14 +177,14 @@ def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted]
     """Amplitudes after a step; factors move by their logarithms, of which a step is no longer than LONGEST."""
     result, first = found.copy(), 0
     for a in accepted:
-        old, new = before[first], found[first]
-        if a.hypothesis.batch.kind in RELATIVE:
+        fault, old, new = fault_of(a.hypothesis), before[first], found[first]
+        if fault.curve is Curve.RELATIVE:
             old = max(old, LOW)  # what a score says beyond it would be an exchange the wrong way
             step = np.clip((new - old) / (1.0 + old), -LONGEST, LONGEST)
             result[first] = max((1.0 + old) * np.exp(step) - 1.0, LOW)
-        elif a.hypothesis.batch.kind == "gain":
+        elif fault.curve is Curve.LOGARITHM:
             result[first] = np.clip(new, old - LONGEST, old + LONGEST)
-        elif a.hypothesis.batch.kind in CURVED:
+        elif fault.curved:
             result[first] = np.clip(new, old - 0.5 * abs(old), old + 0.5 * abs(old))
         first += len(a.amplitude)
     return result

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.faults.catalogue import Family
+from twin.diagnose.faults.fault import Family
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.gain import gains
@@ -39,12 +39,11 @@ def judged(
     seed: int,
 ) -> Judged:  # fmt: skip
     """The headline of a search, held against the measurements of the sealed runs, the last ones of its study."""
-    groups = {f.name: f.group for f in families}
+    entries = {f.name: f for f in families}
     named = verdict in ("named", "out_of_tolerance", "ambiguous", "signal")
     extension = tuple(
         c for c in causes
-        if (named and groups.get(c.family) == "machine" and c.history != CALIBRATED)
-        or (c.family == "signal" and c.place.startswith("signals."))
+        if named and c.history != CALIBRATED and c.family in entries and entries[c.family].changes(c)
     )  # fmt: skip
     first = len(found.detector.study.runs) - len(opened)
     table = tuple(

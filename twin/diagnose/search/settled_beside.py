@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from twin.diagnose.evidence.settled import settle, settled_alone
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, exchanged, freed, read_change, stepped, with_shifts
 from twin.diagnose.search.detector import Detector
 
@@ -17,7 +18,7 @@ def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> 
         return settled_alone(detector.fitter, y)
     study, surrogate = detector.study, detector.fitter.surrogate
     y = exchanged(study, y, accepted)
-    reading = [a for a in accepted if not a.units and a.hypothesis.batch.kind != "gain"]
+    reading = [a for a in accepted if not a.units and not fault_of(a.hypothesis).parameter]
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
 
     def outputs(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,23 +14,19 @@ import scipy.linalg
 
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.whiten import Projector
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import curved_change
 from twin.diagnose.search.detector import Detector
 
-SIZES = {
-    "slip": (1e-6, 2e-6, 6e-6, 9e-6, 13e-6, 20e-6),  # m
-    "clock": (-3600.0, -1200.0, -400.0, 400.0, 1200.0, 3600.0),  # s
-    "lag": (600.0, 1800.0, 5400.0),  # s
-}
-
 
 def sized_candidates(detector: Detector, projector: Projector, white: np.ndarray) -> list[Hypothesis]:
-    """Plays of TCP components, clocks of runs and lags of sensors that would explain white residuals (m,), at SIZES."""
+    """Plays of TCP components, clocks of runs and lags of sensors that would explain white residuals (m,)."""
     tried = [
         Hypothesis(batch, i, batch.histories[0], 0.0, (size,), 0.0)
         for batch in detector.columns.batches
-        for i in range(len(batch.places) if batch.kind in SIZES else 0)
-        for size in SIZES[batch.kind]
+        for sizes in [fault_of(batch).sizes]
+        for i in range(len(batch.places) if sizes else 0)
+        for size in sizes
     ]
     if not tried:
         return []

@@ -16,7 +16,9 @@ from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.evidence.sight import Sight
-from twin.diagnose.faults.acted import CONDUCTS, units_of
+from twin.diagnose.faults.acted import units_of
+from twin.diagnose.faults.loss_law import is_source
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import Study
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns
 from twin.diagnose.search.contest import beginning, misfit
@@ -69,7 +71,7 @@ def closed(
     fits = {h.name for h in declared if h.statistic > removed - NEAR}
     rivals = tuple(
         (Hypothesis(batch, i, batch.histories[0], one.statistic, (1.0,), 0.0), 1.0)
-        for batch in detector.columns.batches if batch.kind == "signal"
+        for batch in detector.columns.batches if fault_of(batch).corrects
         for i, name in enumerate(batch.places)
         if _does_the_same(detector, detector.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
     )  # fmt: skip
@@ -107,13 +109,13 @@ def _signals(
     """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says; with
     the source's own statistic, as they do the same."""
     study = detector.study
-    if study.probed.parameters[j].kind != "source":
+    if not is_source(study.probed.parameters[j]):
         return ()
     n, scale = len(study.probed.parameters), float(study.scale[j])
     own = detector.whiten(detector.fitter.surrogate.at(np.zeros(n))[1][:, j]) / scale
     size, found = float(own @ own), []
     for batch in detector.columns.batches:
-        for i, _ in enumerate(batch.places if batch.kind == "signal" else ()):
+        for i, _ in enumerate(batch.places if fault_of(batch).corrects else ()):
             signal = detector.columns.raw[:, batch.columns[i, 0]].astype(float)
             along = float(signal @ own)
             cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
@@ -134,7 +136,7 @@ def _size(one: Accepted, loose: Loose, study: Study) -> tuple[float, float]:
     if not low < loose.x < high:
         return float(one.amplitude[0]), float(one.covariance[0, 0])
     change, sigma = scale * loose.x, scale * loose.sigma
-    if one.hypothesis.batch.kind not in CONDUCTS:
+    if not fault_of(one.hypothesis).conducts:
         return change, sigma**2
     return float(np.expm1(change)), float(np.exp(2.0 * change) * sigma**2)
 
@@ -156,7 +158,7 @@ def _does_the_same(detector: Detector, signal: np.ndarray, one: Accepted, fits: 
     heat = 1.0 + along / size  # times what the source emits
     factor = float(one.amplitude[0])
     sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), FORM * factor))
-    far = one.hypothesis.batch.kind == "gain" and abs(factor) > DISTANT
+    far = fault_of(one.hypothesis).parameter and abs(factor) > DISTANT
     return far and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
 
 
@@ -192,13 +194,12 @@ def strained(
     strain = {own.index: own.strain for own in loose}
     found = []
     for batch in detector.columns.batches:
-        for i, name in enumerate(batch.places if batch.kind in ("gain", *CONDUCTS) else ()):
+        fault = fault_of(batch)
+        for i, name in enumerate(batch.places if fault.declared else ()):
             if (j := parameter_of(detector.study, name)) is None or j not in strain:
                 continue
             always = next(h for h in batch.histories if not h.windows)
-            size = float(fitted.x[j] * detector.study.scale[j])
-            if batch.kind in CONDUCTS:
-                size = float(np.expm1(size))
+            size = fault.amplitude(float(fitted.x[j] * detector.study.scale[j]))
             likelihood = float((PULLED * strain[j]) ** 2)
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(detector.study.scale[j] ** -2.0)))
     seen, ranked, _ = glance
@@ -207,7 +208,7 @@ def strained(
     for h in sorted(found, key=lambda h: -h.statistic):
         # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
         # leave as much as its own discrepancy makes
-        likely = h.batch.kind == "group" or _scored(detector, fitted, seen, h) > FAINT * most
+        likely = fault_of(h).faint or _scored(detector, fitted, seen, h) > FAINT * most
         if not likely and ROUGHLY * (1.0 - COVERS) * _told_alone(detector, fitted, h) < most:
             continue
         made = _freed(detector, y, fitted, h)
@@ -220,9 +221,7 @@ def _scored(detector: Detector, fitted: Fitted, seen: Sight, h: Hypothesis) -> f
     """What a declared number scores by its derivative, and a contact by its response when it is nearly gone."""
     own = next(own for own in seen.ready if own.batch is h.batch)
     best = float(score(own, seen.g).statistic[h.place].max())
-    name = (h.batch.kind, h.name.removeprefix("contacts."))
-    if name in detector.lost.names:
-        D = detector.lost.responses[:, detector.lost.names.index(name)]
+    if (D := detector.lost.response(h)) is not None:
         P = fitted.projector(D)
         best = max(best, float(P @ detector.whiten(fitted.residual)) ** 2 / max(float(D @ P), 1e-30))
     return best
@@ -248,7 +247,7 @@ def _freed(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> 
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
     if not sigma > 0.0 or not h.batch.possible(h.place, change):
         return None
-    if h.batch.kind in CONDUCTS:  # as a logarithm: derivatives at many times a film say little of the film itself
+    if fault_of(h).conducts:  # as a logarithm: derivatives at many times a film say little of the film itself
         change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
     statistic = (change / sigma) ** 2
     return (fitted, replace(one, statistic=statistic)) if statistic >= one.threshold else None

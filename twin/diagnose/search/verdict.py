@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,16 +11,15 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.evidence.sight import sight
 from twin.diagnose.evidence.unknown import history
-from twin.diagnose.faults.acted import CONDUCTS, RELATIVE
-from twin.diagnose.faults.catalogue import Family
-from twin.diagnose.faults.elements import pivot
-from twin.diagnose.faults.size_discrepancy import size_discrepancy
+from twin.diagnose.faults.fault import Family
+from twin.diagnose.faults.table import family_of_parameter, fault_of
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
+from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, freed
-from twin.diagnose.search.contest import AMPLITUDE, WET
+from twin.diagnose.search.contest import AMPLITUDE
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.forward import MOST, SEVERAL
+from twin.diagnose.search.forward import MOST
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.strained import COVERS
 
@@ -29,96 +27,41 @@ APART = 10.0  # likelihood-ratio units that LR (1 - cos^2) must exceed for two c
 CLOSE = 6.0  # within which a rival of another family, or another part, makes a verdict ambiguous
 POWER = 1.645  # one-sided 95 %
 REMAINDER = 0.35  # of the evidence for unknown heat before all names: the share that may be left beside them
-KINDS = ("films", "contacts", "sensors", "signals", "sources", "environment", "axes", "tcp", "runs")
-STRAIN = {"source": "loss_law", "film": "film_gain", "contact": "joint", "joint": "joint", "expansion": "expansion"}
-MEDIUM = 0.15  # likewise of a coolant's film where its temperature is told, which follows from the heat
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
-PLAIN = ("loss_law", "film_gain", "joint", "expansion")  # declared numbers: always wrong means out of tolerance
-
-
-def told(kind: str, amplitude: float) -> float:
-    """An amplitude as reports take it: relative changes and logarithms of factors as factors, others as they are."""
-    if kind in RELATIVE:
-        return max(1.0 + amplitude, 0.0)
-    return float(np.exp(amplitude)) if kind == "gain" else amplitude
 
 
 def cause_of(a: Accepted, study: Study) -> Cause:
     """A cause as reports and edits take it: factors as factors, differences as differences.
 
-    The interval counts that the model's own form is wrong (`size_discrepancy`).
+    The interval counts that the model's own form is wrong (`Fault.own`).
     """
-    h = a.hypothesis
-    kind, unit = h.batch.kind, h.batch.unit
+    h, fault = a.hypothesis, fault_of(a.hypothesis)
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
-    own = size_discrepancy(h) * (max(value, WET) if h.family == "coolant" else value)
-    sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), own))
-    low, high = value - 1.96 * sigma, value + 1.96 * sigma
-    settings: dict[str, float | str] = {}
-    value, low, high = (told(kind, v) for v in (value, low, high))
-    place = h.name
-    history_name, exponent = h.when.name, h.when.exponent
-    if h.family == "signal" and kind == "signal":
-        place, factor = place.split("*")
-        value = low = high = float(factor)
-    elif h.family == "misplaced_source":
-        place, surface = place.split(">")
-        settings["surface"] = surface
-    elif h.family == "scale_expansion":
-        place, part = place.split("<")
-        settings["part"] = part
-    elif kind == "gradient":
-        names = [e.name for e in study.probed.base.load_model.environments]
-        settings["height"] = pivot(study, names.index(place.removeprefix("environment.")))
-    elif h.family == "coolant" and len(a.amplitude) > 1 and value > 0:
-        settings |= _medium(study, a, MEDIUM * value)
-    elif h.family == "sun" and len(a.amplitude) > 1:
-        # one size, a level per day
-        top = float(max(a.amplitude))
-        scale = top / value if value else 1.0
-        value, low, high = value * scale, low * scale, high * scale
-    if h.when.signal:
-        settings["reference"] = h.when.reference
-    windows = h.when.windows
-    if h.family == "sun" and len(a.amplitude) > 1 and value > 0:
-        order = list(dict.fromkeys(w.run for w in windows))
-        windows = tuple(
-            replace(w, level=w.level * max(float(a.amplitude[order.index(w.run)]), 0.0) / value) for w in windows
-        )
+    sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), fault.uncertain(value)))
+    told = fault.curve.told
+    size = told(value), told(value - 1.96 * sigma), told(value + 1.96 * sigma)
+    said = fault.described(study, h.name, a.amplitude, a.covariance, size, h.when.windows)
+    value, low, high = said.size
+    settings = said.settings | ({"reference": h.when.reference} if h.when.signal else {})
     return Cause(
-        family=h.family, place=place, parameter="", amplitude=value, ci95=(low, high), unit=unit,
-        statistic=float(a.statistic), threshold=float(a.threshold), history=history_name, signal=h.when.signal,
-        exponent=exponent, windows=windows, settings=settings,
+        family=h.family, place=said.place, parameter="", amplitude=value, ci95=(low, high), unit=h.batch.unit,
+        statistic=float(a.statistic), threshold=float(a.threshold), history=h.when.name, signal=h.when.signal,
+        exponent=h.when.exponent, windows=said.windows, settings=settings,
         rivals=tuple(_rival(a.hypothesis, other, cosine) for other, cosine in a.rivals),
     )  # fmt: skip
-
-
-def _medium(study: Study, a: Accepted, own: float) -> dict[str, float | str]:
-    """Temperature [degC] of what wets a surface, and its standard deviation [K].
-
-    T_ref + Q / (h A) of the film h (its own discrepancy: own) and the heat Q at the reference temperature.
-    """
-    h, Q = map(float, a.amplitude)
-    area = next(p.area for p in study.probed.places if p.name == a.hypothesis.name)
-    slope = np.array([-Q / (h**2 * area), 1.0 / (h * area)])
-    variance = float(slope @ a.covariance @ slope) + (slope[0] * own) ** 2
-    rise = Q / (h * area)
-    return {
-        "temperature": study.probed.base.reference_temperature + rise,
-        "temperature_sigma": float(np.sqrt(variance)),
-    }
 
 
 def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
     """A hypothesis in a row of a table. Its interval is that of an amplitude that enters linearly, of which the
     statistic is (amplitude / sigma)^2; an exact factor has none."""
-    kind, value, place = h.batch.kind, h.amplitude[0], h.name
-    if h.family == "signal" and kind == "signal":
-        place, factor = place.split("*")
-        return Rival(h.family, place, h.when.name, float(factor), h.batch.unit, h.statistic, cosine, remedy)
+    value, place, fault = h.amplitude[0], h.name, fault_of(h)
+    if fault.corrects:
+        place, factor = fault.factor(place)
+        return Rival(h.family, place, h.when.name, factor, h.batch.unit, h.statistic, cosine, remedy)
     half = 1.96 * abs(value) / math.sqrt(h.statistic) if h.statistic > 0.0 and not h.batch.fixed else math.nan
-    ci95 = (told(kind, value - half), told(kind, value + half))
-    return Rival(h.family, place, h.when.name, told(kind, value), h.batch.unit, h.statistic, cosine, remedy, ci95)
+    told = fault.curve.told
+    ci95 = (told(value - half), told(value + half))
+    return Rival(h.family, place, h.when.name, told(value), h.batch.unit, h.statistic, cosine, remedy, ci95)
 
 
 def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float) -> Rival:
@@ -128,7 +71,7 @@ def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float) -> Rival:
 
 def remedy(a: Hypothesis, b: Hypothesis) -> str:
     """What would tell two causes apart that these data do not."""
-    wrong = next((h.name for h in (a, b) if h.family == "signal" and h.name.startswith("signals.")), None)
+    wrong = next((h for h in (a, b) if fault_of(h).corrects), None)
     if wrong is not None:
         return _reading(wrong)
     if a.name != b.name and a.when.name == b.when.name:
@@ -144,19 +87,20 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
     return f"temperature sensors at {a.name} and at {b.name}"
 
 
-def _reading(signal: str) -> str:
-    """What tells whether a signal is declared rightly; signal: as "signals.x_current*1.4142"."""
-    return f"one reading of {signal.split('*')[0]} beside an instrument, or what the drive's manual says it logs"
+def _reading(h: Hypothesis) -> str:
+    """What tells whether a signal is declared rightly."""
+    signal, _ = fault_of(h).factor(h.name)
+    return f"one reading of {signal} beside an instrument, or what the drive's manual says it logs"
 
 
 def _part(name: str) -> str:
     """What a place belongs to: the first part of its name, or all of a name of the description."""
-    head = name.split(".")[0]
-    return name.split(">")[0].split("<")[0].split("*")[0] if head in KINDS else head
+    return Spot.read(name).owner
 
 
 def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tuple[Cause, ...]]:
     """The verdict, and the causes it rests on."""
+    entries = {f.name: f for f in families}
     groups = {f.name: f.group for f in families}
     thresholds = found.detector.thresholds
     left = max(found.steps[-1].parts.values(), default=0.0)
@@ -189,19 +133,19 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     lead = others[0]
     if groups.get(lead.family) == "signal":
         return "signal", causes
-    declared = lead.family in PLAIN and not lead.windows and not lead.signal
-    whole = lead.place.split(".")[0] in ("films", "contacts", "sources", "materials")
+    declared = lead.family in entries and entries[lead.family].declared and not lead.windows and not lead.signal
+    whole = Spot.read(lead.place).declared
     return ("out_of_tolerance" if declared and whole else "named"), causes
 
 
 def _more_alike(found: Search, left: float) -> bool:
     """Whether a search ended with as many causes as it takes, all of a family that comes part by part, and one more of
     them explains what is left: a body that was warm has more parts than that, and nothing about it is unknown."""
-    alike = {(a.hypothesis.family, a.hypothesis.name.rpartition(".")[0]) for a in found.accepted}
+    alike = {(a.hypothesis.family, Spot.read(a.hypothesis.name).within) for a in found.accepted}
     best = next(iter(found.steps[-1].ranked), None)
     return (
-        len(found.accepted) >= MOST and best is not None and best.family in SEVERAL
-        and alike == {(best.family, best.name.rpartition(".")[0])} and best.statistic > COVERS * left
+        len(found.accepted) >= MOST and best is not None and fault_of(best).several
+        and alike == {(best.family, Spot.read(best.name).within)} and best.statistic > COVERS * left
     )  # fmt: skip
 
 
@@ -213,9 +157,9 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
         gain, low, high = (float(np.exp(p.sigma * (own.x + z * own.sigma))) for z in (0.0, -1.96, 1.96))
         place = ".".join(p.path.split(".")[:2])
         result.append(Cause(
-            family=STRAIN[p.kind], place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
+            family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
             statistic=own.strain**2, threshold=1.0, history=CALIBRATED,
-            rivals=tuple(rival_of(h, cosine, _reading(h.name)) for h, cosine in own.rivals),
+            rivals=tuple(rival_of(h, cosine, _reading(h)) for h, cosine in own.rivals),
         ))  # fmt: skip
     return tuple(sorted(result, key=lambda c: -c.statistic))
 
@@ -276,7 +220,7 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
     ]  # fmt: skip
     for a in found.accepted:
         change, spread = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
-        if a.hypothesis.batch.kind in CONDUCTS:
+        if fault_of(a.hypothesis).conducts:
             change, spread = float(np.log1p(change)), spread / (1.0 + change)
         for j in freed(study, a.hypothesis):  # held at its declared value in x
             p, pull = study.probed.parameters[j], change / float(study.scale[j])
@@ -314,7 +258,7 @@ def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
 
 def limits_of(detector: Detector) -> tuple[Limit, ...]:
     """Per family and unit `limits_at` its places, for what always acts where there is such; factors as factors."""
-    kinds = {(batch.family, batch.unit): batch.kind for batch in detector.columns.batches}
+    curves = {(batch.family, batch.unit): fault_of(batch).curve for batch in detector.columns.batches}
     at = limits_at(detector)
     found: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for (family, unit, place, windowed), size in at.items():
@@ -324,6 +268,6 @@ def limits_of(detector: Detector) -> tuple[Limit, ...]:
     for (family, unit), sizes in found.items():
         ordered = sorted(sizes)
         median, place = ordered[len(ordered) // 2]
-        size, smallest, largest = (told(kinds[family, unit], s) for s in (median, ordered[0][0], ordered[-1][0]))
+        size, smallest, largest = (curves[family, unit].told(s) for s in (median, ordered[0][0], ordered[-1][0]))
         limits.append(Limit(family, place, size, smallest, largest, unit))
     return tuple(limits)
