@@ -13,6 +13,7 @@ from tests.diagnose import small_case
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import parameter_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import look
@@ -24,7 +25,6 @@ from twin.diagnose.search.verdict import (
     limits_of,
     rival_of,
     strained_of,
-    told,
     verdict_of,
 )
 
@@ -60,7 +60,7 @@ def test_limits_of_factors_are_factors():
         size for (family, unit, _, _), size in limits_at(detector).items() if (family, unit) == (gain.family, "1")
     )
     (limit,) = (x for x in limits_of(detector) if (x.family, x.unit) == (gain.family, "1"))
-    assert limit.smallest == pytest.approx(told("gain", at[0])) == pytest.approx(np.exp(at[0]))
+    assert limit.smallest == pytest.approx(OF_KIND["gain"].curve.told(at[0])) == pytest.approx(np.exp(at[0]))
     assert limit.largest == pytest.approx(np.exp(at[-1]))
 
 
@@ -153,7 +153,7 @@ def test_contacts_that_calibration_strains_are_told_with_what_they_became():
 )
 def test_what_one_more_part_of_a_warm_body_explains_is_not_unknown(causes, next_one, statistic, left, wanted):
     def start(name, statistic=500.0):
-        return SimpleNamespace(family="initial_state", name=name, statistic=statistic)
+        return SimpleNamespace(family="initial_state", kind="start", name=name, statistic=statistic)
 
     accepted = [SimpleNamespace(hypothesis=start(f"runs.a.{part}")) for part in "bcx"[:causes]]
     found = SimpleNamespace(accepted=accepted, steps=[SimpleNamespace(ranked=(start(next_one, statistic),))])
