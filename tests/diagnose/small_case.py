@@ -18,6 +18,7 @@ from twin.diagnose.model.bank import Nominal, nominal_run, respond
 from twin.diagnose.model.probed_model import ProbedModel, make_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.search.detector import Detector, instruments_of, make_detector
+from twin.diagnose.search.policy import POLICY
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.machine.description import Machine
@@ -124,4 +125,4 @@ def responses(linear: bool = False) -> np.ndarray:
 @cache
 def made_detector() -> Detector:
     """From few synthetic measurements: thresholds are rough."""
-    return make_detector(study(), FAMILIES, instruments_of(study(), NOISE, TCP_NOISE), counts=(24, 40))
+    return make_detector(study(), FAMILIES, instruments_of(study(), NOISE, TCP_NOISE), POLICY, counts=(24, 40))

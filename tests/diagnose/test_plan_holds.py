@@ -26,6 +26,7 @@ from twin.diagnose.plan.plan import make_plan
 from twin.diagnose.plan.suspicion import named
 from twin.diagnose.result.plan import Foresight
 from twin.diagnose.search.detector import Detector, instruments_of, make_detector
+from twin.diagnose.search.policy import POLICY
 from twin.logs.read import read_run
 from twin.logs.run import Run
 from twin.machine.effects.edits import extended_description
@@ -74,7 +75,7 @@ def detector_of(path: Path, text: str, runs: list[Run]) -> Detector:
     probed = make_probed_model(machine, parameters(machine), runs)
     plans = [measured(probed.base, run, own.drive, own.name) for run, own in zip(runs, probed.runs, strict=True)]
     study = make_study(probed, plans, range(len(runs)))
-    return make_detector(study, FAMILIES, instruments_of(study, NOISE, TCP_NOISE), counts=COUNTS)
+    return make_detector(study, FAMILIES, instruments_of(study, NOISE, TCP_NOISE), POLICY, counts=COUNTS)
 
 
 def statistic(detector: Detector, runs: list[Run], place: str, history: str) -> float:

@@ -17,6 +17,7 @@ from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import parameter_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import look
+from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.strained import loose_ones, strained
 from twin.diagnose.search.verdict import (
     CALIBRATED,
@@ -156,5 +157,9 @@ def test_what_one_more_part_of_a_warm_body_explains_is_not_unknown(causes, next_
         return SimpleNamespace(family="initial_state", kind="start", name=name, statistic=statistic)
 
     accepted = [SimpleNamespace(hypothesis=start(f"runs.a.{part}")) for part in "bcx"[:causes]]
-    found = SimpleNamespace(accepted=accepted, steps=[SimpleNamespace(ranked=(start(next_one, statistic),))])
+    found = SimpleNamespace(
+        detector=SimpleNamespace(policy=POLICY),
+        accepted=accepted,
+        steps=[SimpleNamespace(ranked=(start(next_one, statistic),))],
+    )
     assert _more_alike(found, left) == wanted

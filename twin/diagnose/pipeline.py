@@ -32,6 +32,7 @@ from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of,
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.look import Search
+from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.sealed import judged
 from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.support import support_of
@@ -58,6 +59,7 @@ class Settings:
     form: int = FORM  # synthetic measurements for model discrepancy
     nulls: int = NULLS  # and for thresholds
     seed: int = 1
+    policy: SearchPolicy = POLICY
     plan: str | None = None  # a suspicion to plan the next experiment for; "": what the verdict leaves open
 
 
@@ -136,11 +138,12 @@ def prepare(
         tolerance,
         counts,
     )
+    families, policy = settings.families, settings.policy
     detector = cached(
         "detector", make_detector.__module__, inputs,
-        lambda: stored(make_detector(study, settings.families, instruments, form, counts, progress, differ)),
+        lambda: stored(make_detector(study, families, instruments, policy, form, counts, progress, differ)),
     )  # fmt: skip
-    return probed, study, detector.of(study), plans
+    return probed, study, detector.of(study, policy), plans
 
 
 def _closed(m: Measured) -> Measured:

@@ -25,7 +25,6 @@ from twin.diagnose.plan.suspicion import Suspicion, coefficients
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.verdict import APART, POWER
 from twin.logs.run import Run
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
@@ -99,7 +98,7 @@ def make_plan(
     now = sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J)))
     basis = Basis(tuple(columns), tuple(_hour(detector, key) for key in keys))
     lone = tuple(_foresight(detector, now, s, basis, made) for s in suspicions)
-    return Plan(lone, tuple(_apart(a, b, basis, made) for a, b in pairs), ASSUMPTIONS)
+    return Plan(lone, tuple(_apart(a, b, basis, made, detector.policy.apart) for a, b in pairs), ASSUMPTIONS)
 
 
 def _needed(
@@ -139,13 +138,13 @@ def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made:
     for k, batch, p in s.batches(detector):
         chosen = s.histories(batch)
         information = now.ready[k].information[p, chosen]
-        today = min(today, _limit(information, threshold, batch))
+        today = min(today, _limit(information, threshold, batch, detector.policy.power))
         W = np.stack([basis.spread(_rows(batch, p, h, basis.columns)) for h in chosen])  # (h, q, 2 u)
         for e, f in enumerate(made):
             without, then = (_information(F, W) for F in (f.before, f.after))
             share = np.clip(information / np.maximum(without, 1e-30), LEAST, 1.0)
             more = information + share * np.maximum(then - without, 0.0)
-            best[e] = min(best[e], _limit(more, threshold, batch))
+            best[e] = min(best[e], _limit(more, threshold, batch, detector.policy.power))
     proposals = [
         Proposal(_name(f), _words(f), told(float(size)), float(today / size))
         for f, size in zip(made, best, strict=True)
@@ -159,9 +158,9 @@ def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made:
     )  # fmt: skip
 
 
-def _limit(information: np.ndarray, threshold: float, batch: Batch) -> float:
+def _limit(information: np.ndarray, threshold: float, batch: Batch, power: float) -> float:
     """The median over histories (h,), as `verdict.limits_at` takes it."""
-    sizes = (np.sqrt(threshold) + POWER) / np.sqrt(np.maximum(information, 1e-30))
+    sizes = (np.sqrt(threshold) + power) / np.sqrt(np.maximum(information, 1e-30))
     return float(np.median(np.maximum(sizes, batch.smallest)))
 
 
@@ -190,7 +189,7 @@ def _information(F: np.ndarray, W: np.ndarray) -> np.ndarray:
     return np.asarray(1.0 / np.maximum(inverse[:, 0, 0], 1e-30))
 
 
-def _apart(a: Hypothesis, b: Hypothesis, basis: Basis, made: Sequence[Foreseen]) -> Apart:
+def _apart(a: Hypothesis, b: Hypothesis, basis: Basis, made: Sequence[Foreseen], apart: float) -> Apart:
     """What each experiment makes of LR (1 - cos^2), with the first one true at its fitted size."""
     one, two = (basis.spread(coefficients(h, basis.columns)[None])[0] for h in (a, b))
 
@@ -205,4 +204,4 @@ def _apart(a: Hypothesis, b: Hypothesis, basis: Basis, made: Sequence[Foreseen])
         found.append((f, share * before, share * explained(f.after)[1]))
     separations = sorted((Separation(_name(f), _words(f), then) for f, _, then in found), key=lambda s: -s.expected)
     today = float(np.median([before for _, before, _ in found])) if found else 0.0
-    return Apart(f"{a.family} {a.name}", f"{b.family} {b.name}", today, APART, tuple(_listed(separations)))
+    return Apart(f"{a.family} {a.name}", f"{b.family} {b.name}", today, apart, tuple(_listed(separations)))

@@ -11,7 +11,7 @@ from twin.diagnose.evidence.batch import Batch, Hypothesis
 from twin.diagnose.faults.catalogue import Family
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.verdict import APART, limits_at
+from twin.diagnose.search.verdict import limits_at
 from twin.errors import TwinError
 from twin.nearest import did_you_mean
 
@@ -99,7 +99,7 @@ def pairs_of(found: Search, most: int = 2) -> list[tuple[Hypothesis, Hypothesis]
     chosen = first.hypothesis
     near = [
         other for other, cosine in first.rivals
-        if min(chosen.statistic, other.statistic) * (1.0 - cosine**2) <= APART
+        if min(chosen.statistic, other.statistic) * (1.0 - cosine**2) <= found.detector.policy.apart
     ]  # fmt: skip
     return [(chosen, other) for other in near[:most]]
 

@@ -18,7 +18,6 @@ from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
 
 OWN = ("gain", "conductance", "total")  # how parameters of sources, films, contacts and joints are called there
-ASIDE = 0.1  # of a size, by which such a one is moved for its derivative
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,7 @@ def curved_change(detector: Detector, h: Hypothesis, size: float, x: np.ndarray 
 
 def curved_slope(detector: Detector, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
     """(m,) its derivative by the size."""
-    by = ASIDE * max(abs(size), h.batch.smallest)
+    by = detector.policy.aside * max(abs(size), h.batch.smallest)
     more, less = (curved_change(detector, h, size + d, x) for d in (by, -by))
     return np.asarray((more - less) / (2.0 * by))
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -22,25 +23,7 @@ from twin.diagnose.model.study import K
 from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import STEP, Edge, edges_of, moved, with_pulses
-from twin.diagnose.search.growth import GROWTH
-
-PASSES, WINDOW_PASSES, READ_PASSES = 3, 8, 6
-ENTRANTS = 5  # candidates of a kind that are refitted
-BEHIND = 0.15  # of the leader: who scores less cannot overtake it by being refitted
-SATURATES = 0.4  # likewise of capacities and of coolants' films: the larger they are, the worse is linearity
-EDGE = 4.0  # likelihood-ratio units that an edge gains where nothing is hidden
-GONE = -0.7  # of a relative change, linearly
-ENOUGH = 0.02  # of a size, that a pass moves it by when it has arrived
-LESS, SHARE = 1.0, 1e-3  # likelihood-ratio units and share of a statistic: a pass that changes less is the last
-HELD = 2  # passes in which its heat and edges are found for that film, before all are free
-TRIAL = 4  # passes by which coolants are compared before the best of them are refitted
-BENDS = 2.5  # prior standard deviations that only something hidden moves a parameter by
-NEAR = 1.0  # prior standard deviations: of parameters at the start of a refit, and their longest step
-LOW, HIGH = (
-    -0.97,
-    20.0,
-)  # of relative changes: from -0.98 on the integration holds a conductance, and no derivative is left
-AMPLITUDE = 8.0  # likelihood-ratio units that a second amplitude costs: of a coolant beside plain heat
+from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
 def misfit(detector: Detector, fitted: Fitted) -> float:
@@ -49,11 +32,11 @@ def misfit(detector: Detector, fitted: Fitted) -> float:
     return float(white @ fitted.projector(white))
 
 
-def worth(h: Hypothesis) -> float:
+def worth(h: Hypothesis, policy: SearchPolicy = POLICY) -> float:
     """A statistic less the price of its freedom: how many like it were tried, amplitudes, further windows."""
     tried = len(h.batch.places) * len(h.batch.histories)
     more = max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
-    return h.statistic - 2.0 * float(np.log(tried)) - AMPLITUDE * (h.batch.q - 1) - GROWTH * more
+    return h.statistic - 2.0 * float(np.log(tried)) - policy.amplitude * (h.batch.q - 1) - policy.growth * more
 
 
 def proof(detector: Detector, h: Hypothesis) -> float:
@@ -61,7 +44,11 @@ def proof(detector: Detector, h: Hypothesis) -> float:
     if fault_of(h).read:
         return h.statistic
     more = max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
-    return h.statistic - EDGE * len(edges_of(detector.study, h)) - (GROWTH - 2.0 * EDGE) * more
+    return (
+        h.statistic
+        - detector.policy.edge * len(edges_of(detector.study, h))
+        - (detector.policy.growth - 2.0 * detector.policy.edge) * more
+    )
 
 
 def judged(
@@ -73,23 +60,24 @@ def judged(
     before they are refitted, for windows with fitted edges gain by it what others would gain, too. A candidate may have
     several starts, of which the first has its score: it is the worthiest that they end at.
     """
+    worthy = partial(worth, policy=detector.policy)
     starts = {id(first): (first, *more) for first, *more in candidates}
-    waiting = sorted((c[0] for c in candidates), key=worth, reverse=True)
+    waiting = sorted((c[0] for c in candidates), key=worthy, reverse=True)
     done: list[Hypothesis] = []
     left: list[Hypothesis] = []
     lead, leads_by, count = -np.inf, -np.inf, Counter[str]()
     for h in waiting:
-        behind = SATURATES if fault_of(h).saturates else BEHIND
-        led = worth(h) < (1.0 - behind) * leads_by
+        behind = detector.policy.saturates if fault_of(h).saturates else detector.policy.behind
+        led = worthy(h) < (1.0 - behind) * leads_by
         bent = _bent(detector, h)
-        if (led and not _saturated(h)) or (bent and count[h.batch.kind] >= ENTRANTS):
+        if (led and not _saturated(detector, h)) or (bent and count[h.batch.kind] >= detector.policy.entrants):
             left.append(h)
             continue
         count[h.batch.kind] += bent
-        now = max((exact(detector, y, fitted, s) for s in starts[id(h)]), key=worth) if bent else h
-        if worth(now) > lead:
-            lead = worth(now)
-            leads_by = min(lead, max(worth(h), (1.0 - SATURATES) * lead))
+        now = max((exact(detector, y, fitted, s) for s in starts[id(h)]), key=worthy) if bent else h
+        if worthy(now) > lead:
+            lead = worthy(now)
+            leads_by = min(lead, max(worthy(h), (1.0 - detector.policy.saturates) * lead))
         done.append(now)
     straight = [h for h in left if not _bent(detector, h)]
     return _fair(detector, y, fitted, [*done, *straight]), [h for h in left if _bent(detector, h)]
@@ -101,37 +89,38 @@ def tried(
     """Candidates, most worthy first, of `judged`. Where a coolant leads, it and others within SATURATES have been
     refitted for some passes, from the last of their starts: linearity is, for a film that saturates, wrong by
     tens of per cent, more at the wetted face than at those behind it, so that it would be left aside."""
-    order = sorted(candidates, key=lambda starts: -worth(starts[0]))
+    order = sorted(candidates, key=lambda starts: -worth(starts[0], detector.policy))
     if not order or not fault_of(order[0][0]).wets:
         return order
-    least = (1.0 - SATURATES) * worth(order[0][0])
+    least = (1.0 - detector.policy.saturates) * worth(order[0][0], detector.policy)
     passed = [
-        (exact(detector, y, fitted, starts[-1], TRIAL),)
-        if fault_of(starts[0]).wets and worth(starts[0]) > least else starts
+        (exact(detector, y, fitted, starts[-1], detector.policy.trial),)
+        if fault_of(starts[0]).wets and worth(starts[0], detector.policy) > least else starts
         for starts in order
     ]  # fmt: skip
-    return sorted(passed, key=lambda starts: -worth(starts[0]))
+    return sorted(passed, key=lambda starts: -worth(starts[0], detector.policy))
 
 
 def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Candidates, most worthy first. One that leads by its score while another near it was refitted is refitted, too:
     the exact model takes some hundredths from each, and that alone would decide between the two."""
-    order, exactly = sorted(candidates, key=worth, reverse=True), set[int]()
+    worthy = partial(worth, policy=detector.policy)
+    order, exactly = sorted(candidates, key=worthy, reverse=True), set[int]()
     while True:
         lead = order[0]
-        near = [h for h in order[1:] if worth(h) > (1.0 - BEHIND) * worth(lead)]
+        near = [h for h in order[1:] if worthy(h) > (1.0 - detector.policy.behind) * worthy(lead)]
         settled = _bent(detector, lead) or id(lead) in exactly or fault_of(lead).read or lead.batch.fixed
         if settled or not any(_bent(detector, h) or id(h) in exactly for h in near):
             break
         order[0] = exact(detector, y, fitted, lead)
         exactly.add(id(order[0]))
-        order.sort(key=worth, reverse=True)
+        order.sort(key=worthy, reverse=True)
     return order
 
 
-def _saturated(h: Hypothesis) -> bool:
+def _saturated(detector: Detector, h: Hypothesis) -> bool:
     """A conductance that is nearly gone: it moves temperatures by far more than its score says."""
-    return fault_of(h).conducts and h.amplitude[0] < GONE
+    return fault_of(h).conducts and h.amplitude[0] < detector.policy.gone
 
 
 def _bent(detector: Detector, h: Hypothesis) -> bool:
@@ -151,7 +140,9 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     study, q = detector.study, h.batch.q
     a = np.array(h.amplitude)
     if fault.conducts:
-        a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, LOW, HIGH)  # as if temperatures were linear in t
+        a = np.clip(
+            1.0 / np.maximum(1.0 - a, 0.2) - 1.0, detector.policy.lowest_change, detector.policy.highest_change
+        )  # as if temperatures were linear in t
     if h.when.bell is not None:
         h = moved(study, detector.elements, h, ())  # hours found by `growth` get their windows
     before = misfit(detector, fitted)
@@ -162,19 +153,21 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     mean, inverse = fault.prior(q)
     if fault.wets:  # a strong film saturates: a score that takes it as linear says little
         a[0] = mean[0]
-    x0 = beginning(fitted.x).copy()
+    x0 = beginning(fitted.x, detector.policy).copy()
     x0[freed(study, h)] = 0.0
     now = _Point(a, x0, h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
-    held = HELD if fault.wets else 0
-    for i in range(passes or held + (PASSES if not inner else WINDOW_PASSES)):
+    held = detector.policy.held if fault.wets else 0
+    for i in range(passes or held + (detector.policy.passes if not inner else detector.policy.window_passes)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(detector, now, edges)
         J = jacobian(detector, now.x, [(h, float(now.a[0]))])
         projector = detector.fitter.projector(J, fitted.more)
         left = detector.whiten(y - fitted.beside - outputs + J @ now.x)
         removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
-        arrived = i > held and abs(removed - statistic) < max(LESS, SHARE * removed)
+        arrived = i > held and abs(removed - statistic) < max(
+            detector.policy.less, detector.policy.less_share * removed
+        )
         if removed <= statistic:  # too far: back, then less; parameters may do without a step
             if arrived:
                 break
@@ -197,10 +190,12 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
             pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
             below = np.concatenate([floor - now.a, np.full(len(edges), -np.inf)])
             found = solved(F, PD.T @ left + pulled, below)
-            after = fault.limited(study, h.name, _moved(now.a, found[:q], fault.conducts, h.batch.sign))
+            after = fault.limited(
+                study, h.name, _moved(now.a, found[:q], fault.conducts, h.batch.sign, detector.policy)
+            )
             shifts = np.clip(found[q:], -STEP, STEP)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
-            drift = np.clip(np.clip(nuisance, low, high) - now.x, -NEAR, NEAR)
+            drift = np.clip(np.clip(nuisance, low, high) - now.x, -detector.policy.near, detector.policy.near)
             step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, shifts, strict=True)))
         shifted = (
             moved(study, detector.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
@@ -219,22 +214,22 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
 def _read_anew(detector: Detector, fitted: Fitted, h: Hypothesis) -> Hypothesis:
     """A hypothesis about readings that are not in proportion to its size, at the size that removes most misfit."""
     left = fitted.projector(detector.whiten(fitted.residual))
-    size, tried, x = h.amplitude[0], list[tuple[float, float]](), beginning(fitted.x)
-    for _ in range(READ_PASSES):
+    size, tried, x = h.amplitude[0], list[tuple[float, float]](), beginning(fitted.x, detector.policy)
+    for _ in range(detector.policy.read_passes):
         change, D = (detector.whiten(f(detector, h, size, x)) for f in (curved_change, curved_slope))
         kept = left - fitted.projector(change)
         tried.append((float(change @ (left + kept)), size))
         step = float(D @ kept) / max(float(D @ fitted.projector(D)), 1e-30)
         size += float(np.clip(step, -0.5 * abs(size), abs(size)))
-        if abs(step) < ENOUGH * abs(size):
+        if abs(step) < detector.policy.enough * abs(size):
             break
     statistic, best = max(tried)
     return replace(h, statistic=max(statistic, 0.0), amplitude=(best,))
 
 
-def beginning(x: np.ndarray) -> np.ndarray:
+def beginning(x: np.ndarray, policy: SearchPolicy = POLICY) -> np.ndarray:
     """(n,) parameters from which a cause is refitted: those without it, or the description where it has bent them."""
-    return x if np.abs(x).max(initial=0.0) < BENDS else np.zeros_like(x)
+    return x if np.abs(x).max(initial=0.0) < policy.bends else np.zeros_like(x)
 
 
 def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:
@@ -287,11 +282,15 @@ def _outputs(detector: Detector, p: _Point, edges: Sequence[Edge]) -> tuple[np.n
     return np.concatenate(outputs), np.vstack(derivatives)
 
 
-def _moved(a: np.ndarray, step: np.ndarray, relative: bool, sign: int) -> np.ndarray:
+def _moved(a: np.ndarray, step: np.ndarray, relative: bool, sign: int, policy: SearchPolicy = POLICY) -> np.ndarray:
     if relative:
         t = a / (1.0 + a) + step / (1.0 + a) ** 2
-        bent = np.where(t < HIGH / (1.0 + HIGH), t / np.maximum(1.0 - t, 1e-9), HIGH)
-        return np.asarray(np.clip(bent, np.maximum(LOW, (1.0 + a) / 5.0 - 1.0), HIGH))
+        bent = np.where(
+            t < policy.highest_change / (1.0 + policy.highest_change),
+            t / np.maximum(1.0 - t, 1e-9),
+            policy.highest_change,
+        )
+        return np.asarray(np.clip(bent, np.maximum(policy.lowest_change, (1.0 + a) / 5.0 - 1.0), policy.highest_change))
     result = np.clip(a + step, a - 2.0 * np.abs(a), a + 2.0 * np.abs(a))
     if sign:
         result[0] = sign * max(sign * result[0], 0.2 * sign * a[0])  # never through zero

@@ -30,16 +30,11 @@ from twin.diagnose.search.contest import misfit
 from twin.diagnose.search.detector import Detector
 from twin.rom.drive import Drive, evaluate
 
-CLOSELY = 3  # factors that are looked at again where their parameters are; likewise of a signal, fitted exactly
-SIGNALS = 2  # of which any is fitted exactly
-PASSES = 4
-EXACT = 3  # passes likewise of the model with a corrected signal
-
 
 def declared_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Exact factors of signals that leave less misfit than the fit without a cause does, to first order."""
     before, found = misfit(detector, fitted), []
-    for h, D in _promising(detector, y, lambda fault: fault.corrects)[:CLOSELY]:
+    for h, D in _promising(detector, y, lambda fault: fault.corrects)[: detector.policy.closely]:
         statistic = before - _fitted_with(detector, y, D)
         if statistic > 0.0:
             found.append(replace(h, statistic=statistic))
@@ -49,7 +44,7 @@ def declared_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> li
 def misplaced_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Likewise of sources all of whose heat is elsewhere, with what they do there beside the described machine."""
     study, before, found = detector.study, misfit(detector, fitted), []
-    for h, _ in _promising(detector, y, lambda fault: fault.elsewhere)[:CLOSELY]:
+    for h, _ in _promising(detector, y, lambda fault: fault.elsewhere)[: detector.policy.closely]:
         units, x = units_of(study, h), np.zeros(len(fitted.x))
         there = [study.outputs(k, x, slots_with(study, detector.elements, units, k), h.amplitude) for k in study.fitted]
         change = detector.whiten(np.concatenate(there) - detector.fitter.surrogate.y0)
@@ -66,8 +61,8 @@ def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[
     factors = dict[str, list[Hypothesis]]()
     for h, _ in _promising(detector, y, lambda fault: fault.corrects):
         factors.setdefault(fault_of(h).factor(h.name)[0], []).append(h)
-    for name, own in list(factors.items())[:SIGNALS]:
-        for h in own[:CLOSELY]:
+    for name, own in list(factors.items())[: detector.policy.signals]:
+        for h in own[: detector.policy.closely]:
             corrected = with_signal(detector.study, fault_of(h).bare(name), fault_of(h).factor(h.name)[1])
             least = 0.5 * detector.thresholds[h.family]
             statistic = before - _fitted_by(detector, y, corrected, before - least)
@@ -138,7 +133,7 @@ def _fitted_with(detector: Detector, y: np.ndarray, change: np.ndarray) -> float
     """The misfit beside a white change (m,) of the outputs, parameters fitted."""
     low, high = bounds(detector.study)
     x, left = np.zeros_like(low), np.inf
-    for _ in range(PASSES):
+    for _ in range(detector.policy.first_order_passes):
         f, J = detector.fitter.surrogate.at(x)
         projector = detector.fitter.projector(J)
         white = detector.whiten(y - f + J @ x) - change
@@ -151,8 +146,8 @@ def _fitted_by(detector: Detector, y: np.ndarray, study: Study, enough: float) -
     """The misfit of a study with other loads, parameters fitted. Where it is below `enough`, with exact derivatives."""
     low, high = bounds(study)
     x, hotter, left = np.zeros(len(low)), _gains(detector.study, study), np.inf
-    for i in range(EXACT + 1):
-        if i < EXACT:
+    for i in range(detector.policy.exact_passes + 1):
+        if i < detector.policy.exact_passes:
             J = detector.fitter.surrogate.at(x + hotter)[1]
         elif left < enough:
             J = np.vstack([study.jacobian(k, x)[:, : len(x)] for k in study.fitted])

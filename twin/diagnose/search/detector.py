@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,6 +38,9 @@ from twin.diagnose.model.study import Study
 from twin.diagnose.model.surrogate import Surrogate, make_surrogate
 from twin.progress import Progress, silent
 
+if TYPE_CHECKING:  # what searches by a detector decides nothing about it
+    from twin.diagnose.search.policy import SearchPolicy
+
 FORM, NULLS = 60, 200
 MODES = 30
 OFFSET = 0.1  # K, prior of every sensor's constant error
@@ -62,6 +66,7 @@ class Detector:
     thresholds: dict[str, float]
     lost: Lost
     pulls: Pulls
+    policy: SearchPolicy  # that it is searched with: no number of its own depends on it
 
     @property
     def whiten(self) -> Whitener:
@@ -84,21 +89,13 @@ class StoredDetector:
     lost: Lost
     pulls: Pulls
 
-    def of(self, study: Study) -> Detector:
+    def of(self, study: Study, policy: SearchPolicy) -> Detector:
         """The detector of a study that differs from the one it was made for in its measured values alone."""
         fitter = Fitter(study, self.surrogate, Whitener(study, self.channels), self.others)
         return Detector(
-            study,
-            fitter,
-            self.elements,
-            self.nominal,
-            self.index,
-            self.columns,
-            self.nulls,
-            self.thresholds,
-            self.lost,
-            self.pulls,
-        )
+            study, fitter, self.elements, self.nominal, self.index, self.columns, self.nulls, self.thresholds,
+            self.lost, self.pulls, policy,
+        )  # fmt: skip
 
 
 def stored(detector: Detector) -> StoredDetector:
@@ -146,6 +143,7 @@ def make_detector(
     study: Study,
     families: Sequence[Family],
     instruments: Instruments,
+    policy: SearchPolicy,
     form: Form = Form(),
     counts: tuple[int, int] = (FORM, NULLS),
     progress: Progress = silent,
@@ -195,7 +193,9 @@ def make_detector(
     pulls = Pulls.of(study.probed.parameters, np.array([o.fitted for o in seen]), np.array([o.settled for o in seen]))
     small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
     lost = lost_conductances(study, elements, whiten, progress)
-    return Detector(study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost, pulls)
+    return Detector(
+        study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost, pulls, policy
+    )
 
 
 def bare_forms(study: Study, raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> list[np.ndarray]:

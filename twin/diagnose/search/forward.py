@@ -25,24 +25,15 @@ from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Search, Step, cosines, look, scored
+from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
 from twin.diagnose.search.settled_beside import settled
-from twin.diagnose.search.strained import COVERS, LATER, NEAR, closed, loose_ones, strained
-
-MOST = 3  # causes
-TRIES = 3  # rounds of candidates that the exact model refuses
-WINDOWS = 4  # in which a cause switches at one place; what does so more often has a history that no name tells
-FEW = 2  # windows likewise that a cause may have and still leave heat where it is
-LEFT = 0.5  # of the threshold of heat of any history: what windows may leave of it
-AHEAD = 12  # of those that pass, how many get further windows before the best is chosen
-NAMED = 0.7  # share of its own threshold that a name needs where another one passes
-MISFIT = 0.003  # of what a cause in the machine explains: a response that is wrong by a twentieth leaves so much
-STANDS = 0.5  # share of its threshold that a cause must explain beside the others
+from twin.diagnose.search.strained import closed, loose_ones, strained
 
 
-def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
+def search(detector: Detector, y: np.ndarray) -> Search:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
-    fitted = detector.fitter(y)
+    fitted, policy = detector.fitter(y), detector.policy
     described = detector
     if (detector := hotter(described, fitted.x)) is not described:
         fitted = detector.fitter(y)
@@ -72,23 +63,24 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
         steps.append(step)
         parts = step.parts
         used = sum((len(a.units) for a in accepted), 0)
-        misfits = MISFIT * max((a.statistic for a in accepted if a.units), default=0.0)
+        misfits = policy.misfit * max((a.statistic for a in accepted if a.units), default=0.0)
         limits = {
-            name: max((LATER if accepted else 1.0) * value, misfits) for name, value in detector.thresholds.items()
+            name: max((policy.later if accepted else 1.0) * value, misfits)
+            for name, value in detector.thresholds.items()
         }
         alarm = any(h.statistic > limits[h.family] and (h.family, h.name) not in refused for h in ranked)
         passing = [
             h for h in ranked
-            if alarm and h.statistic > NAMED * limits[h.family] and used + h.batch.q <= K
+            if alarm and h.statistic > policy.named * limits[h.family] and used + h.batch.q <= K
             and (h.family, h.name) not in refused and not _again(h, accepted)
             and not _reads(detector.study, h, accepted)
         ]  # fmt: skip
-        if not passing or len(accepted) >= most or fruitless >= TRIES or imitated:
+        if not passing or len(accepted) >= policy.causes or fruitless >= policy.tries or imitated:
             break
-        ahead = [_starts(seen, h) for h in passing[:AHEAD]]
+        ahead = [_starts(seen, h, policy) for h in passing[: policy.ahead]]
         rest = exchanged(detector.study, y, accepted)
         proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead))
-        standing = [h for h in proved if proof(detector, h) > NAMED * limits[h.family]]
+        standing = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
         if not any(proof(detector, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
@@ -98,8 +90,8 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
         if free > detector.thresholds["unknown"]:
             standing = [
                 h for h in standing
-                if (h.statistic > COVERS * free or fault_of(h).several)
-                and (len(h.when.windows) <= WINDOWS or h.when.bell is not None or fault_of(h).everywhere)
+                if (h.statistic > policy.covers * free or fault_of(h).several)
+                and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
             ]  # fmt: skip
             if not standing:
                 break
@@ -112,8 +104,8 @@ def search(detector: Detector, y: np.ndarray, most: int = MOST) -> Search:
                 chosen, units, start, np.eye(len(start)), chosen.statistic, detector.thresholds[chosen.family], rivals
             )
         )
-        fitted, accepted = refit(detector, y, beginning(fitted.x), accepted)
-        while weak := [a for a in accepted if not _stands(a)]:
+        fitted, accepted = refit(detector, y, beginning(fitted.x, policy), accepted)
+        while weak := [a for a in accepted if not _stands(detector, a)]:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
             fitted, accepted = _without(detector, y, fitted, accepted, weak)
         if in_turn := _in_turn(detector.study, accepted):
@@ -142,12 +134,12 @@ def _without(
     return refit(detector, y, fitted.x, left) if left else (detector.fitter(y), left)
 
 
-def _starts(seen: Sight, h: Hypothesis) -> list[Hypothesis]:
+def _starts(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis]:
     """A hypothesis in the windows that it likes best, and a coolant in the one that cold likes best, too."""
     k = next(i for i, own in enumerate(seen.ready) if own.batch is h.batch)
     block = seen.blocks[k][h.place]
-    cold = chilled(h, seen.g, block)
-    return [grown(h, seen.g, block), *([] if cold is None else [cold])]
+    cold = chilled(h, seen.g, block, policy)
+    return [grown(h, seen.g, block, policy), *([] if cold is None else [cold])]
 
 
 def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
@@ -183,7 +175,7 @@ def _restless(detector: Detector, accepted: Sequence[Accepted], parts: dict[str,
     left = max(parts.values(), default=0.0)
     return [
         a for a in accepted
-        if len(a.hypothesis.when.windows) > FEW and a.hypothesis.when.bell is None and a.units
+        if len(a.hypothesis.when.windows) > detector.policy.few and a.hypothesis.when.bell is None and a.units
         and left > max(detector.thresholds["unknown"], _misfit(a))
     ]  # fmt: skip
 
@@ -195,7 +187,7 @@ def _leaking(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, 
     return [
         a for a in accepted
         if a.hypothesis.when.windows and a.hypothesis.when.bell is None and a.units and fault_of(a.hypothesis).grows
-        and left > max(LEFT * detector.thresholds["unknown"], _misfit(a))
+        and left > max(detector.policy.left * detector.thresholds["unknown"], _misfit(a))
     ]  # fmt: skip
 
 
@@ -217,15 +209,16 @@ def _parts(study: Study, name: str) -> set[str]:
     return {spot.part}
 
 
-def _stands(a: Accepted) -> bool:
+def _stands(detector: Detector, a: Accepted) -> bool:
     """Whether a cause still explains something beside the others, with a size that physics allows."""
     batch = a.hypothesis.batch
     if batch.fixed:
         return True
     first = float(a.amplitude[0])
     return (
-        float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude) > STANDS * a.threshold
-        and abs(first) >= 0.5 * batch.smallest
+        float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude)
+        > detector.policy.stands * a.threshold
+        and abs(first) >= detector.policy.stands * batch.smallest
         and batch.possible(a.hypothesis.place, first)
     )
 
@@ -235,7 +228,7 @@ def _rivals(
 ) -> tuple[tuple[Hypothesis, float], ...]:
     """Other explanations nearly as likely, with their cosines."""
     others, seen = [], {(chosen.family, chosen.name, chosen.batch.kind)}
-    near = max(NEAR, MISFIT * chosen.statistic)
+    near = max(detector.policy.rival, detector.policy.misfit * chosen.statistic)
     for h in sorted(ranked, key=lambda h: -h.statistic):
         key = (h.family, h.name, h.batch.kind)
         if key not in seen and h.statistic > max(chosen.statistic - near, 0.5 * detector.thresholds[h.family]):

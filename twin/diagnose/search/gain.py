@@ -10,13 +10,9 @@ import numpy as np
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.faults.readings import readings_of
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.accepted import in_place, stepped, with_shifts
 from twin.diagnose.search.look import Search
-
-BLOCK = 2.0 * 3600.0  # s, of the bootstrap
-NOTICED = 0.5  # of a channel's noise, by which causes must move it to count as affected
 
 
 @dataclass(frozen=True)
@@ -61,7 +57,7 @@ def gains(
     found: Search, k: int, sealed: Measured, seed: int, floors: tuple[np.ndarray, np.ndarray]
 ) -> tuple[Gain, ...]:
     """Per channel of the sealed run k; its measurements are opened here. floors: noise of sensors (s,) and TCP (3,)."""
-    study: Study = found.detector.study
+    study, policy = found.detector.study, found.detector.policy
     planned = study.runs[k]
     models = [planned.split(v) for v in vars(predicted(found, k)).values()]
     rng = np.random.default_rng(seed)
@@ -69,13 +65,13 @@ def gains(
     result = []
     for i, name in enumerate(sealed.sensors):
         errors = [read[:, i] - T[:, i] for read, (T, _) in zip(readings, models, strict=True)]
-        affected = bool(_moved(errors) > NOTICED * floors[0][i])
-        result.append(_gain(sealed.name, name, "K", errors, sealed.bin_time, affected, rng))
+        affected = bool(_moved(errors) > policy.noticed * floors[0][i])
+        result.append(_gain(sealed.name, name, "K", errors, sealed.bin_time, affected, rng, policy.block))
     for c in range(3 if len(sealed.tcp) else 0):
         errors = [sealed.tcp[:, c] - w[:, c] for _, w in models]
         axis = ("dx", "dy", "dz")[c]
-        affected = bool(_moved(errors) > NOTICED * floors[1][c])
-        result.append(_gain(sealed.name, axis, "m", errors, sealed.tcp_time, affected, rng))
+        affected = bool(_moved(errors) > policy.noticed * floors[1][c])
+        result.append(_gain(sealed.name, axis, "m", errors, sealed.tcp_time, affected, rng, policy.block))
     return tuple(result)
 
 
@@ -87,14 +83,21 @@ def _moved(errors: Sequence[np.ndarray]) -> float:
 
 
 def _gain(
-    run: str, name: str, unit: str, errors: list[np.ndarray], time: np.ndarray, affected: bool, rng: np.random.Generator
+    run: str,
+    name: str,
+    unit: str,
+    errors: list[np.ndarray],
+    time: np.ndarray,
+    affected: bool,
+    rng: np.random.Generator,
+    length: float,
 ) -> Gain:
     good = np.all(np.isfinite(errors), axis=0)
     if not good.any():
         return Gain(run, name, unit, np.nan, np.nan, np.nan, (np.nan, np.nan), False)
     own = [e[good] for e in errors]
     rms = [float(np.sqrt(np.mean(e**2))) for e in own]
-    block = ((time[good] - time[good][0]) // BLOCK).astype(int)
+    block = ((time[good] - time[good][0]) // length).astype(int)
     members = [np.flatnonzero(block == b) for b in np.unique(block)]
     draws = []
     for _ in range(400):

@@ -10,27 +10,24 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import RIDGE, History, Hypothesis
 from twin.diagnose.faults.table import fault_of
+from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.machine.effects.effect import Window
 
-GROWTH = 12.0  # likelihood-ratio units that another window must bring
-SHARE = 0.05  # and the least share of what the others explain: a strong cause has misfits that windows imitate
-WINDOWS = 8
 
-
-def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
+def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis:
     """A hypothesis that acts in one window, with further windows of the same size where the data ask for them.
 
     block (L, L): D^T Pi D among the columns of its place. Greedy: the window that brings most, then again.
     """
     if h.when.bell is not None:
-        return _elsewhere(h, g, block)
+        return _elsewhere(h, g, block, policy)
     if len(h.when.windows) == 0 or h.batch.fixed or not fault_of(h).grows:
         return h
     own = g[h.batch.columns[h.place]]
     others = [w for w in h.batch.histories if w.windows]
     W = np.stack([w.weights for w in others])  # (h, q, L)
     current = h
-    for _ in range(WINDOWS - 1):
+    for _ in range(policy.most_windows - 1):
         now = current.when.weights
         free = np.flatnonzero((np.abs(W) * np.abs(now)).sum(axis=(1, 2)) == 0.0)
         if not len(free):
@@ -46,7 +43,7 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
         if h.batch.sign:
             statistic = np.where(h.batch.sign * a[:, 0] < 0.0, 0.0, statistic)
         k = int(np.argmax(statistic))
-        if statistic[k] < current.statistic + max(GROWTH, SHARE * current.statistic):
+        if statistic[k] < current.statistic + max(policy.growth, policy.growth_share * current.statistic):
             break
         more = others[int(free[k])]
         windows = tuple(sorted((*current.when.windows, *more.windows), key=lambda w: (w.run, w.start)))
@@ -57,7 +54,7 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
     return current
 
 
-def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis | None:
+def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis | None:
     """A coolant in the windows that plain cold likes best; None where it has those, or heat explains more than cold.
 
     A score takes a film as linear, in which cold and film cancel over hours that have neither: a window that
@@ -65,7 +62,7 @@ def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis | Non
     """
     if not fault_of(h).wets or len(h.when.windows) == 0:
         return None
-    cold, hot = _plain(h, g, block, -1), _plain(h, g, block, 1)
+    cold, hot = (_plain(h, g, block, sign, policy) for sign in (-1, 1))
     if cold is None or (hot is not None and hot.statistic > cold.statistic):
         return None
     windows = _joined(cold.when.windows)
@@ -78,7 +75,7 @@ def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis | Non
     )
 
 
-def _plain(h: Hypothesis, g: np.ndarray, block: np.ndarray, sign: int) -> Hypothesis | None:
+def _plain(h: Hypothesis, g: np.ndarray, block: np.ndarray, sign: int, policy: SearchPolicy) -> Hypothesis | None:
     """A coolant's heat of one sign without its film, in the windows that it likes best; None if it explains nothing."""
     histories = tuple(replace(w, weights=w.weights[1:]) for w in h.batch.histories)
     own = g[h.batch.columns[h.place]]
@@ -90,7 +87,9 @@ def _plain(h: Hypothesis, g: np.ndarray, block: np.ndarray, sign: int) -> Hypoth
         return None
     batch = replace(h.batch, histories=histories, sign=sign, smallest=0.0)
     amplitude = float(num[k] / F[k])
-    return grown(Hypothesis(batch, h.place, histories[k], float(statistic[k]), (amplitude,), float(F[k])), g, block)
+    return grown(
+        Hypothesis(batch, h.place, histories[k], float(statistic[k]), (amplitude,), float(F[k])), g, block, policy
+    )
 
 
 def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:
@@ -104,7 +103,7 @@ def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:
     return tuple(result)
 
 
-def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
+def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy) -> Hypothesis:
     """A bell with its best hour in every run: runs may start at other hours of the day. Greedy, run by run."""
     own, current = g[h.batch.columns[h.place]], h
     for i in range(2 * h.batch.q):
@@ -118,7 +117,7 @@ def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray) -> Hypothesis:
             F = weights @ block @ weights.T
             a = np.linalg.solve(F + (np.trace(F) * RIDGE + 1e-12) * np.eye(len(F)), weights @ own)
             statistic = float(a @ weights @ own)
-            if statistic > current.statistic + GROWTH and a[0] >= h.batch.smallest:
+            if statistic > current.statistic + policy.growth and a[0] >= h.batch.smallest:
                 centres = tuple(other.bell.centres[run] if r == run else c for r, c in enumerate(bell.centres))
                 when = replace(current.when, weights=weights, bell=replace(bell, centres=centres))
                 current = replace(current, when=when, statistic=statistic, amplitude=tuple(map(float, a)))

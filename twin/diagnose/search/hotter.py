@@ -13,7 +13,6 @@ import numpy as np
 from twin.diagnose.model.study import Study
 from twin.diagnose.search.detector import Detector
 
-MUCH = 1.4  # times the described rise of a channel: parameters within their tolerances stay below
 LEAST = 1.0, 5e-6  # K, m: rms of a described rise that a ratio is taken to
 
 
@@ -21,7 +20,7 @@ def hotter(detector: Detector, x: np.ndarray) -> Detector:
     """The detector at parameters x (n,) in prior standard deviations; itself where no channel is MUCH hotter."""
     surrogate = detector.fitter.surrogate
     times = _rise(detector.study, surrogate.at(x)[0]) / _rise(detector.study, surrogate.y0)
-    times = np.where(times > MUCH, times, 1.0)
+    times = np.where(times > detector.policy.hotter, times, 1.0)
     if np.all(times == 1.0):
         return detector
     others = times[:, None] * detector.fitter.others

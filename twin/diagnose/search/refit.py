@@ -27,19 +27,10 @@ from twin.diagnose.search.accepted import (
     readings_columns,
     shifted,
 )
-from twin.diagnose.search.contest import LOW, lowest, solved
+from twin.diagnose.search.contest import lowest, solved
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import shape_errors
-
-WIDE = 1e3  # standard deviations that an accepted amplitude may take: as good as free
-REFITS = 10  # passes
-LONGEST = 0.7  # step of the logarithm of a factor
-STILL, LESS = (
-    0.1,
-    0.5,
-)  # standard deviations of amplitudes, and likelihood-ratio units: a pass that changes less is the last
-ANEW = 5  # passes in which derivatives beyond all bounds are made anew
-RISES = 2  # passes in a row that make it worse, after which it runs away
+from twin.diagnose.search.policy import SearchPolicy
 
 
 @dataclass(frozen=True)
@@ -85,9 +76,9 @@ def refit(
     misfit, rises = np.inf, 0
     best: _Pass | None = None
     J = np.zeros((len(y), len(x)))
-    for i in range(REFITS):
+    for i in range(detector.policy.refits):
         there = shifted(study, x, gains, amplitude)
-        J = jacobian(detector, x, _sizes(accepted, amplitude), None if i < ANEW else J)
+        J = jacobian(detector, x, _sizes(accepted, amplitude), None if i < detector.policy.anew else J)
         first, bent = 0, np.zeros(len(y))
         for a in accepted:
             own = slice(first, first + len(a.amplitude))
@@ -129,12 +120,16 @@ def refit(
         before, misfit = misfit, float(left @ projector(left))
         if best is None or misfit < best.misfit:
             best = _Pass(misfit, x, amplitude, J, D.copy(), F, errors, residual, f, there, white)
-        x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted))
+        x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted, detector.policy))
         # parameters that the data hardly determine drift on for long, and nothing gets better
-        rises = rises + 1 if misfit > before + LESS else 0
-        if (step < STILL and misfit > before - LESS) or rises == RISES:
+        rises = rises + 1 if misfit > before + detector.policy.refit_less else 0
+        if (
+            step < detector.policy.still and misfit > before - detector.policy.refit_less
+        ) or rises == detector.policy.rises:
             break
-    if best is not None and misfit > best.misfit + LESS:  # it has not arrived: what curves strongly swings about
+    if (
+        best is not None and misfit > best.misfit + detector.policy.refit_less
+    ):  # it has not arrived: what curves strongly swings about
         x, amplitude, J, D, F = best.x, best.amplitude, best.J, best.D, best.F
         errors, residual, f, there = best.errors, best.residual, best.f, best.there
         white, projector = best.white, fitter.projector(J, errors)
@@ -145,7 +140,7 @@ def refit(
         replace(a, amplitude=amplitude[i:j], covariance=inverse[i:j, i:j], by_run=of_runs)
         for a, of_runs, (i, j) in zip(accepted, alone, pairwise(ends), strict=True)
     ]
-    more = np.hstack([WIDE * D * np.sqrt(np.diag(inverse)), errors])
+    more = np.hstack([detector.policy.wide * D * np.sqrt(np.diag(inverse)), errors])
     bare = np.concatenate([study.outputs(k, there) for k in study.fitted]) if units else f
     return Fitted(x, J, residual, fitter.projector(J, more), f - bare, more), result
 
@@ -173,17 +168,17 @@ def _sizes(accepted: Sequence[Accepted], amplitude: np.ndarray) -> list[tuple[Hy
     return [(a.hypothesis, float(amplitude[i])) for a, i in zip(accepted, first, strict=False)]
 
 
-def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
+def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted], policy: SearchPolicy) -> np.ndarray:
     """Amplitudes after a step; factors move by their logarithms, of which a step is no longer than LONGEST."""
     result, first = found.copy(), 0
     for a in accepted:
         fault, old, new = fault_of(a.hypothesis), before[first], found[first]
         if fault.curve is Curve.RELATIVE:
-            old = max(old, LOW)  # what a score says beyond it would be an exchange the wrong way
-            step = np.clip((new - old) / (1.0 + old), -LONGEST, LONGEST)
-            result[first] = max((1.0 + old) * np.exp(step) - 1.0, LOW)
+            old = max(old, policy.lowest_change)  # what a score says beyond it would be an exchange the wrong way
+            step = np.clip((new - old) / (1.0 + old), -policy.longest, policy.longest)
+            result[first] = max((1.0 + old) * np.exp(step) - 1.0, policy.lowest_change)
         elif fault.curve is Curve.LOGARITHM:
-            result[first] = np.clip(new, old - LONGEST, old + LONGEST)
+            result[first] = np.clip(new, old - policy.longest, old + policy.longest)
         elif fault.curved:
             result[first] = np.clip(new, old - 0.5 * abs(old), old + 0.5 * abs(old))
         first += len(a.amplitude)

@@ -20,8 +20,6 @@ from twin.diagnose.search.gain import gains
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.verdict import CALIBRATED
 
-NOISE = 0.1  # K, of a sensor that no fitted run has: that of a thermocouple
-
 
 @dataclass(frozen=True)
 class Judged:
@@ -67,5 +65,5 @@ def _noise(detector: Detector, m: Measured) -> tuple[np.ndarray, np.ndarray]:
     own = detector.study.runs[0].measured.sensors
     known = dict(zip(own, sensors.sigma, strict=True))
     return np.array(
-        [known.get(s, float(np.median(sensors.sigma)) if len(own) else NOISE) for s in m.sensors]
+        [known.get(s, float(np.median(sensors.sigma)) if len(own) else detector.policy.thermocouple) for s in m.sensors]
     ), tcp.sigma

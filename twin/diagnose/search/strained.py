@@ -19,32 +19,12 @@ from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.loss_law import is_source
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.model.study import Study
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns
 from twin.diagnose.search.contest import beginning, misfit
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search, Step, look
-from twin.diagnose.search.refit import WIDE, refit
+from twin.diagnose.search.refit import refit
 from twin.diagnose.search.settled_beside import settled
-
-PULLED = 2.5  # standard deviations by which data without its tolerance must tell a number from the declared one
-BEYOND = 3.0  # prior standard deviations that a number out of its tolerance keeps beside any other explanation
-OUTSIDE = 1.0  # prior standard deviations: the declared tolerance itself
-# of a bound, from which the surrogate of the settled calibration says little of a size (chosen on a tenth of a joint in
-# the lumped machine of the tests; the joints at 0.3 of drawn networks lie within)
-NEARLY = 0.75
-SURE = 1.96  # standard deviations of its own that a number without its tolerance is off: its 95 % interval
-LATER = 2.5  # times its threshold that a cause beside another one needs: the first one's misfits look like causes
-COVERS = 0.9  # of the evidence for heat of any history that a name must explain
-NEAR = 10.0  # likelihood-ratio units within which another explanation is a rival
-ALIKE = 0.9  # cosine of what a signal's factor and a declared number do, from which the one may be the other
-SAME = 0.998  # cosine likewise of what is read nowhere else
-DISTANT = 1.0  # logarithm of a source's factor, beyond which derivatives of the described machine say little
-FORM = 0.1  # of the logarithm of a source's factor, that model discrepancy takes
-FAINT = 0.2  # of what explains most: a declared number that scores less leaves that, whatever it is freed to
-ROUGHLY = 2.0  # times the linear estimate of what the data determine: a number that may come out so sure is freed
-FAR = 2  # numbers that are freed, each alone: the farthest may be another one's doing
-OTHERS = 12  # other explanations that are looked at
 
 
 def closed(
@@ -57,18 +37,18 @@ def closed(
     fitted, one = relaxed
     _, ranked, first = glance
     seen, left, last = look(detector, fitted)
-    misfits = (1.0 - COVERS) * one.statistic  # that it may leave
+    misfits = (1.0 - detector.policy.covers) * one.statistic  # that it may leave
     room = max(detector.thresholds["unknown"], misfits)
     if not _weak(detector, left, misfits) or max(last.parts.values(), default=0.0) > room:
         return None
     removed = misfit(detector, before) - misfit(detector, fitted)
-    more = [h for h in ranked if h.statistic - NEAR * any(h is d for d in declared) > removed]
+    more = [h for h in ranked if h.statistic - detector.policy.rival * any(h is d for d in declared) > removed]
     if any(h.statistic > detector.thresholds[h.family] for h in more) and not _stays(
-        detector, before, one, more[:OTHERS]
+        detector, before, one, more[: detector.policy.others]
     ):
         return None
     # both begin at the declared number: what either explains is the same but for what is left
-    fits = {h.name for h in declared if h.statistic > removed - NEAR}
+    fits = {h.name for h in declared if h.statistic > removed - detector.policy.rival}
     rivals = tuple(
         (Hypothesis(batch, i, batch.histories[0], one.statistic, (1.0,), 0.0), 1.0)
         for batch in detector.columns.batches if fault_of(batch).corrects
@@ -76,7 +56,7 @@ def closed(
         if _does_the_same(detector, detector.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
     )  # fmt: skip
     (j,) = freed(detector.study, one.hypothesis)
-    amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector.study)
+    amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
     one = replace(
         one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals,
         amplitude=np.array([amplitude]), covariance=np.array([[variance]]),
@@ -95,10 +75,10 @@ def loose_ones(detector: Detector, y: np.ndarray, fitted: np.ndarray, settled: n
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
         x, covariance = settled_alone(detector.fitter, y, (j,))
         sigma = float(np.sqrt(covariance[j, j]))
-        if np.sign(fitted[j]) * x[j] > max(OUTSIDE, SURE * sigma):
+        if np.sign(fitted[j]) * x[j] > max(detector.policy.outside, detector.policy.sure * sigma):
             rivals = _signals(detector, j, float(x[j]), sigma, float(strain[j]) ** 2)
             found.append(Loose(j, float(x[j]), sigma, float(strain[j]), rivals))
-        if len(found) == FAR:
+        if len(found) == detector.policy.far:
             break
     return tuple(found)
 
@@ -120,19 +100,24 @@ def _signals(
             along = float(signal @ own)
             cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
             heat = 1.0 + along / size
-            if abs(cosine) >= SAME and heat > 0.0 and abs(np.log(heat) - scale * x) < SURE * scale * sigma:
+            if (
+                abs(cosine) >= detector.policy.same
+                and heat > 0.0
+                and abs(np.log(heat) - scale * x) < detector.policy.sure * scale * sigma
+            ):
                 found.append((Hypothesis(batch, i, batch.histories[0], statistic, (1.0,), 0.0), float(cosine)))
     return tuple(found)
 
 
-def _size(one: Accepted, loose: Loose, study: Study) -> tuple[float, float]:
+def _size(one: Accepted, loose: Loose, detector: Detector) -> tuple[float, float]:
     """The amplitude of a number out of its tolerance as the settled calibration has it without one, and its variance.
 
     The fit that finds causes leaves to model discrepancy what looks like it, and frees the number to make up for that.
     But it knows sizes beyond the parameter's bounds, where the settled one ends, and steps the exact model there.
     """
+    study = detector.study
     scale = float(study.scale[loose.index])
-    low, high = (NEARLY * float(ends[loose.index]) for ends in bounds(study))
+    low, high = (detector.policy.nearly * float(ends[loose.index]) for ends in bounds(study))
     if not low < loose.x < high:
         return float(one.amplitude[0]), float(one.covariance[0, 0])
     change, sigma = scale * loose.x, scale * loose.sigma
@@ -151,14 +136,14 @@ def _does_the_same(detector: Detector, signal: np.ndarray, one: Accepted, fits: 
     n = len(detector.study.probed.parameters)
     own = detector.whiten(detector.fitter.surrogate.at(np.zeros(n))[1][:, j]) / detector.study.scale[j]
     along, size = float(signal @ own), float(own @ own)
-    if abs(along) < (ALIKE if fits else SAME) * np.sqrt(size * float(signal @ signal)):
+    if abs(along) < (detector.policy.alike if fits else detector.policy.same) * np.sqrt(size * float(signal @ signal)):
         return False
     if fits:
         return True
     heat = 1.0 + along / size  # times what the source emits
     factor = float(one.amplitude[0])
-    sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), FORM * factor))
-    far = fault_of(one.hypothesis).parameter and abs(factor) > DISTANT
+    sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), detector.policy.form * factor))
+    far = fault_of(one.hypothesis).parameter and abs(factor) > detector.policy.distant
     return far and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
 
 
@@ -167,8 +152,12 @@ def _stays(detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[H
     (j,) = freed(detector.study, one.hypothesis)
     white = detector.whiten(fitted.residual)
     return all(
-        abs(detector.fitter.projector(fitted.J, WIDE * _unit(readings_columns(detector, h))).most_likely(white)[j])
-        > BEYOND
+        abs(
+            detector.fitter.projector(
+                fitted.J, detector.policy.wide * _unit(readings_columns(detector, h))
+            ).most_likely(white)[j]
+        )
+        > detector.policy.beyond
         for h in others
     )
 
@@ -180,7 +169,7 @@ def _unit(columns: np.ndarray) -> np.ndarray:
 
 def _weak(detector: Detector, ranked: Sequence[Hypothesis], misfits: float) -> bool:
     """Whether nothing is strong enough to be named beside another cause."""
-    return all(h.statistic < max(LATER * detector.thresholds[h.family], misfits) for h in ranked)
+    return all(h.statistic < max(detector.policy.later * detector.thresholds[h.family], misfits) for h in ranked)
 
 
 def strained(
@@ -200,7 +189,7 @@ def strained(
                 continue
             always = next(h for h in batch.histories if not h.windows)
             size = fault.amplitude(float(fitted.x[j] * detector.study.scale[j]))
-            likelihood = float((PULLED * strain[j]) ** 2)
+            likelihood = float((detector.policy.pulled * strain[j]) ** 2)
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(detector.study.scale[j] ** -2.0)))
     seen, ranked, _ = glance
     most = ranked[0].statistic if ranked else 0.0
@@ -208,11 +197,16 @@ def strained(
     for h in sorted(found, key=lambda h: -h.statistic):
         # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
         # leave as much as its own discrepancy makes
-        likely = fault_of(h).faint or _scored(detector, fitted, seen, h) > FAINT * most
-        if not likely and ROUGHLY * (1.0 - COVERS) * _told_alone(detector, fitted, h) < most:
+        likely = fault_of(h).faint or _scored(detector, fitted, seen, h) > detector.policy.faint * most
+        if (
+            not likely
+            and detector.policy.roughly * (1.0 - detector.policy.covers) * _told_alone(detector, fitted, h) < most
+        ):
             continue
         made = _freed(detector, y, fitted, h)
-        if made and (likely or ((1.0 - COVERS) * made[1].statistic > most and misfit(detector, made[0]) < before)):
+        if made and (
+            likely or ((1.0 - detector.policy.covers) * made[1].statistic > most and misfit(detector, made[0]) < before)
+        ):
             freed_ones.append(made)
     return min(freed_ones, key=lambda made: misfit(detector, made[0]), default=None)
 
@@ -242,8 +236,10 @@ def _freed(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> 
     None where it has run to where it changes nothing or beyond what physics has, or where the data alone leave it
     within its tolerance.
     """
-    one = Accepted(h, units_of(detector.study, h), np.array(h.amplitude), np.eye(1), h.statistic, PULLED**2, ())
-    fitted, (one,) = refit(detector, y, beginning(fitted.x), [one])
+    one = Accepted(
+        h, units_of(detector.study, h), np.array(h.amplitude), np.eye(1), h.statistic, detector.policy.pulled**2, ()
+    )
+    fitted, (one,) = refit(detector, y, beginning(fitted.x, detector.policy), [one])
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
     if not sigma > 0.0 or not h.batch.possible(h.place, change):
         return None

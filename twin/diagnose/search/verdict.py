@@ -17,20 +17,14 @@ from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, freed
-from twin.diagnose.search.contest import AMPLITUDE
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.forward import MOST
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.strained import COVERS
+from twin.diagnose.search.policy import POLICY, SearchPolicy
 
-APART = 10.0  # likelihood-ratio units that LR (1 - cos^2) must exceed for two causes to be distinguished
-CLOSE = 6.0  # within which a rival of another family, or another part, makes a verdict ambiguous
-POWER = 1.645  # one-sided 95 %
-REMAINDER = 0.35  # of the evidence for unknown heat before all names: the share that may be left beside them
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
 
 
-def cause_of(a: Accepted, study: Study) -> Cause:
+def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
     """A cause as reports and edits take it: factors as factors, differences as differences.
 
     The interval counts that the model's own form is wrong (`Fault.own`).
@@ -47,7 +41,7 @@ def cause_of(a: Accepted, study: Study) -> Cause:
         family=h.family, place=said.place, parameter="", amplitude=value, ci95=(low, high), unit=h.batch.unit,
         statistic=float(a.statistic), threshold=float(a.threshold), history=h.when.name, signal=h.when.signal,
         exponent=h.when.exponent, windows=said.windows, settings=settings,
-        rivals=tuple(_rival(a.hypothesis, other, cosine) for other, cosine in a.rivals),
+        rivals=tuple(_rival(a.hypothesis, other, cosine, policy.apart) for other, cosine in a.rivals),
     )  # fmt: skip
 
 
@@ -64,8 +58,8 @@ def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
     return Rival(h.family, place, h.when.name, told(value), h.batch.unit, h.statistic, cosine, remedy, ci95)
 
 
-def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float) -> Rival:
-    separable = min(chosen.statistic, other.statistic) * (1.0 - cosine**2) > APART
+def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float, apart: float) -> Rival:
+    separable = min(chosen.statistic, other.statistic) * (1.0 - cosine**2) > apart
     return rival_of(other, cosine, "" if separable else remedy(chosen, other))
 
 
@@ -102,13 +96,17 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     """The verdict, and the causes it rests on."""
     entries = {f.name: f for f in families}
     groups = {f.name: f.group for f in families}
-    thresholds = found.detector.thresholds
+    thresholds, policy = found.detector.thresholds, found.detector.policy
     left = max(found.steps[-1].parts.values(), default=0.0)
     # a declared number out of its tolerance had been fitted before, as far as its tolerance went
     relaxed = [a.statistic for a in found.accepted if freed(found.detector.study, a.hypothesis)]
     before = max([*found.steps[0].parts.values(), *relaxed], default=0.0)
-    causes = tuple(cause_of(a, found.detector.study) for a in found.accepted)
-    if left > thresholds["unknown"] and (not causes or left > REMAINDER * before) and not _more_alike(found, left):
+    causes = tuple(cause_of(a, found.detector.study, found.detector.policy) for a in found.accepted)
+    if (
+        left > thresholds["unknown"]
+        and (not causes or left > policy.remainder * before)
+        and not _more_alike(found, left)
+    ):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
     if not causes:
@@ -118,9 +116,9 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         return "ambiguous" if strained[0].rivals else "out_of_tolerance", strained
     lead, chosen = causes[0], found.accepted[0]
     for other, cosine in chosen.rivals:
-        more = AMPLITUDE * (other.batch.q - chosen.hypothesis.batch.q)
-        near = other.statistic - more > chosen.hypothesis.statistic - CLOSE
-        apart = min(chosen.hypothesis.statistic, other.statistic) * (1.0 - cosine**2) > APART
+        more = policy.amplitude * (other.batch.q - chosen.hypothesis.batch.q)
+        near = other.statistic - more > chosen.hypothesis.statistic - policy.close
+        apart = min(chosen.hypothesis.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
         same = other.family == lead.family and _part(other.name) == _part(chosen.hypothesis.name)
         if same and chosen.hypothesis.when.signal and other.when.name != chosen.hypothesis.when.name:
             same = False
@@ -142,10 +140,10 @@ def _more_alike(found: Search, left: float) -> bool:
     """Whether a search ended with as many causes as it takes, all of a family that comes part by part, and one more of
     them explains what is left: a body that was warm has more parts than that, and nothing about it is unknown."""
     alike = {(a.hypothesis.family, Spot.read(a.hypothesis.name).within) for a in found.accepted}
-    best = next(iter(found.steps[-1].ranked), None)
+    best, policy = next(iter(found.steps[-1].ranked), None), found.detector.policy
     return (
-        len(found.accepted) >= MOST and best is not None and fault_of(best).several
-        and alike == {(best.family, Spot.read(best.name).within)} and best.statistic > COVERS * left
+        len(found.accepted) >= policy.causes and best is not None and fault_of(best).several
+        and alike == {(best.family, Spot.read(best.name).within)} and best.statistic > policy.covers * left
     )  # fmt: skip
 
 
@@ -246,7 +244,9 @@ def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
         batch = own.batch
         if batch.fixed:
             continue
-        sizes = (np.sqrt(detector.thresholds[batch.family]) + POWER) / np.sqrt(np.maximum(own.information, 1e-30))
+        sizes = (np.sqrt(detector.thresholds[batch.family]) + detector.policy.power) / np.sqrt(
+            np.maximum(own.information, 1e-30)
+        )
         sizes = np.maximum(sizes, batch.smallest)
         for windowed in (False, True):
             chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
