@@ -14,8 +14,8 @@ from twin.diagnose.search.policy import POLICY, Origin, rules
 from twin.diagnose.search.verdict import limits_at
 
 SEARCH = Path(__file__).parents[2] / "twin" / "diagnose" / "search"
-# what a detector is made by, and how finely edges in time are moved: not what a search decides by
-APART = {"detector.py", "edges.py", "hotter.py", "policy.py"}
+# what a detector is made by, and how finely edges in time are differentiated: no search decides by these
+APART = {"detector.py", "edges.py", "policy.py"}
 
 
 def numbers(text: str) -> list[str]:

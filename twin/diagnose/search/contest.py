@@ -22,7 +22,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K
 from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.edges import STEP, Edge, edges_of, moved, with_pulses
+from twin.diagnose.search.edges import Edge, edges_of, moved, with_pulses
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
@@ -186,14 +186,14 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
             D = detector.whiten(D)
             PD = projector(D)
             stiff = 1e9 * inverse if i < held else inverse
-            F = D.T @ PD + np.diag([*stiff, *(e.prior**-2.0 for e in edges)])
+            F = D.T @ PD + np.diag([*stiff, *(e.prior(detector.policy) ** -2.0 for e in edges)])
             pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
             below = np.concatenate([floor - now.a, np.full(len(edges), -np.inf)])
             found = solved(F, PD.T @ left + pulled, below)
             after = fault.limited(
                 study, h.name, _moved(now.a, found[:q], fault.conducts, h.batch.sign, detector.policy)
             )
-            shifts = np.clip(found[q:], -STEP, STEP)
+            shifts = np.clip(found[q:], -detector.policy.edge_step, detector.policy.edge_step)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
             drift = np.clip(np.clip(nuisance, low, high) - now.x, -detector.policy.near, detector.policy.near)
             step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, shifts, strict=True)))

@@ -22,14 +22,11 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.policy import SearchPolicy
 
 PULSE = 600.0  # s
 SHORTEST = 600.0  # s, of a window
 BRIEF = 7200.0  # s, the shortest bell
-PRIOR = 1800.0  # s: standard deviation of an edge about the hour that the search found
-STEP = 1800.0  # s, the longest step of an edge
-EXPONENT = 0.12  # standard deviation of a signal's exponent about the one of the catalogue
-LONGER = 1800.0  # s, likewise of the length of a bell that was fitted
 
 
 @dataclass(frozen=True)
@@ -44,10 +41,9 @@ class Edge:
         """The response to a shift by 1 s, in units of that to its pulse."""
         return (-1.0 if self.what == "begin" else 1.0) / PULSE
 
-    @property
-    def prior(self) -> float:
+    def prior(self, policy: SearchPolicy) -> float:
         """Standard deviation [s] about what the search found."""
-        return 2.0 * PRIOR if self.what == "length" else PRIOR
+        return 2.0 * policy.edge_prior if self.what == "length" else policy.edge_prior
 
 
 def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
@@ -128,7 +124,7 @@ def with_pulses(
     return slots
 
 
-def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarray) -> list[Unit]:
+def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarray, policy: SearchPolicy) -> list[Unit]:
     """Units whose responses at amplitude one are what the shape of a cause leaves open, one standard deviation each.
 
     The exponent of a logged signal, the length of a bell, the first edges of windows, what its fault says.
@@ -140,19 +136,21 @@ def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarr
         for k in range(len(study.runs)):
             t = np.asarray(study.runs[k].run.drive.time)
             middle, centre = (t[:-1] + t[1:]) / 2, bell.centres[study.fitted.index(k)] if k in study.fitted else 0.0
-            changes.append(bells.level(middle, centre, bell.length + LONGER) - bells.level(middle, centre, bell.length))
+            changes.append(
+                bells.level(middle, centre, bell.length + policy.longer) - bells.level(middle, centre, bell.length)
+            )
         return [
             replace(u, shapes=tuple(v * c * s.any() for c, s in zip(changes, u.shapes, strict=True)))
             for u, v in zip(units, a, strict=True)
         ]
     if h.when.windows:
         return [
-            replace(u, shapes=tuple(v * _wide(study, h, edge, k) for k in range(len(study.runs))))
+            replace(u, shapes=tuple(v * _wide(study, h, edge, k, policy) for k in range(len(study.runs))))
             for edge in edges_of(study, h) for u, v in zip(units, a, strict=True)
         ]  # fmt: skip
     if not h.when.signal or h.when.exponent == 0.0:
         return []
-    by = EXPONENT / h.when.exponent  # d(s^e) / de = s^e ln s = (s^e ln s^e) / e
+    by = policy.exponent / h.when.exponent  # d(s^e) / de = s^e ln s = (s^e ln s^e) / e
     return [
         replace(u, shapes=tuple(v * by * s * np.log(np.maximum(s, 1e-12)) for s in u.shapes))
         for u, v in zip(units, a, strict=True)
@@ -180,11 +178,11 @@ def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray | None
     return np.asarray(shape / (t[1] - t[0]))
 
 
-def _wide(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray:
+def _wide(study: Study, h: Hypothesis, edge: Edge, k: int, policy: SearchPolicy) -> np.ndarray:
     """(n_fine,) likewise by one prior standard deviation, zero in other runs."""
     pulse = _pulse(study, h, edge, k)
     n = study.runs[k].run.drive.n_steps
-    return np.zeros(n) if pulse is None else pulse * edge.prior / PULSE
+    return np.zeros(n) if pulse is None else pulse * edge.prior(policy) / PULSE
 
 
 def _span(study: Study, k: int) -> float:

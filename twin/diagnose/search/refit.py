@@ -57,7 +57,9 @@ def refit(
     study, fitter = detector.study, detector.fitter
     low, high = bounds(study)
     units = [u for a in accepted for u in a.units]
-    open_shapes = [u for a in accepted if a.units for u in shape_errors(study, a.hypothesis, a.units, a.amplitude)]
+    open_shapes = [
+        u for a in accepted if a.units for u in shape_errors(study, a.hypothesis, a.units, a.amplitude, detector.policy)
+    ]
     open_shapes = open_shapes[: K - len(units)]
     slots = [slots_with(study, detector.elements, [*units, *open_shapes], k) for k in study.fitted] if units else []
     # amplitudes in the order of the accepted: those of slots are stepped, those of readings are linear
