@@ -9,11 +9,11 @@ from tests.diagnose import small_case
 from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.elements import FORCINGS, slim
 from twin.diagnose.faults.fault import Unit
-from twin.diagnose.faults.table import OF_KIND
+from twin.diagnose.faults.table import FAULTS, OF_KIND
 from twin.diagnose.model.bank import Column, respond
 
 LITTLE = {"heat": 0.5, "film": 0.05, "joint": 2e-3, "contact": 5e-3, "capacity": 50.0, "group": 5e-3, "air": 0.02,
-          "zone": 0.02, "source": 0.5, "group_film": 0.05}  # fmt: skip
+          "zone": 0.02, "source": 0.5, "group_film": 0.05, "start": 0.05, "signal": 0.01}  # fmt: skip
 
 
 def history(key, elements, study):
@@ -23,29 +23,31 @@ def history(key, elements, study):
     return tuple(np.zeros(k) if h is None else h for h, k in zip(column.histories, n, strict=True))
 
 
-@pytest.mark.parametrize(
-    "key",
-    [
-        ("heat", "housing", "always"),
-        ("heat", "stator", "block 2"),
-        ("heat", "bed", "spindle_current^2"),
-        ("film", "slide", "always"),
-        ("film", "housing", "block 1"),
-        ("film", "nut", "x_speed^0.6"),
-        ("group", "air", "always"),
-        ("group_film", "moving", "x_speed^0.6"),
-        ("zone", "moving", "always"),
-        ("air", "shop", "block 3"),
-        ("joint", "flange", "block 2"),
-        ("contact", "x_screw", "block 2"),
-        ("capacity", "housing", "always"),
-        ("source", "front", "spindle_speed^2.67"),
-    ],
-    ids=".".join,
-)
+KEYS = [
+    ("heat", "housing", "always"),
+    ("heat", "stator", "block 2"),
+    ("heat", "bed", "spindle_current^2"),
+    ("film", "slide", "always"),
+    ("film", "housing", "block 1"),
+    ("film", "nut", "x_speed^0.6"),
+    ("group", "air", "always"),
+    ("group_film", "moving", "x_speed^0.6"),
+    ("zone", "moving", "always"),
+    ("air", "shop", "block 3"),
+    ("joint", "flange", "block 2"),
+    ("contact", "x_screw", "block 2"),
+    ("capacity", "housing", "always"),
+    ("source", "front", "spindle_speed^2.67"),
+    ("start", "", ""),  # the first of its kind
+    ("signal", "", ""),
+]
+
+
+@pytest.mark.parametrize("key", KEYS, ids=".".join)
 def test_against_differences(key):
     """On the machine whose laws read no temperature, where responses leave out nothing."""
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
+    key = key if key[1] else next(other for other in elements.index if other[0] == key[0])
     kind, place, _ = key
     unit = Unit(OF_KIND[kind], place, elements.index[key], history(key, elements, study))
     x = np.zeros(len(study.probed.parameters))
@@ -64,6 +66,12 @@ def test_against_differences(key):
     cosine = got @ wanted / np.sqrt((got @ got) * (wanted @ wanted))
     assert cosine > 1.0 - most / 10
     assert got @ wanted / (wanted @ wanted) == pytest.approx(1.0, abs=most)
+
+
+def test_every_fault_in_a_machine_is_compared():
+    """But those that a lumped machine has not, and a coolant, which is a film and heat."""
+    acting = {fault.kind for fault in FAULTS.values() if not fault.read}
+    assert acting - {"gradient", "moved", "coolant"} == {kind for kind, _, _ in KEYS}
 
 
 def test_reactions_of_laws_are_small():
