@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import pickle
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -86,3 +87,19 @@ def test_no_other_room_compares_the_name_of_a_family_or_kind():
 )  # fmt: skip
 def test_comparisons_are_seen(text, count):
     assert len(list(comparisons(text))) == count
+
+
+def test_the_catalogue_can_be_sent_to_another_process():
+    again = pickle.loads(pickle.dumps(FAMILIES))
+    assert [f.name for f in again] == [f.name for f in FAMILIES]
+    assert all(a == b for a, b in zip(again, FAMILIES, strict=True))
+
+
+def test_every_fault_belongs_to_its_family():
+    assert {family for family, _ in FAULTS} | {"coarse_model"} == {f.name for f in FAMILIES}
+    for (family, kind), fault in FAULTS.items():
+        assert (fault.family, fault.kind) == (family, kind)
+        assert fault.largest is None or fault.largest > fault.least
+        assert fault.bare(f"{fault.prefix}a.b") == "a.b"
+        assert not (fault.curved and not fault.read), kind
+        assert bool(fault.sizes) == fault.curved, kind

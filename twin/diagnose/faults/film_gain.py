@@ -19,7 +19,7 @@ from twin.diagnose.model.study import Study
 
 @dataclass(frozen=True)
 class Film(Fault):
-    """More film on a surface, to the air that it is in."""
+    """More film on a surface, or less, to the air that it is in."""
 
     def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
         p, probed = place_number(study, unit.place), study.probed
@@ -28,17 +28,13 @@ class Film(Fault):
         slots.A[s], slots.M[s], slots.gate[:, s] = probed.A[p], probed.M[p], coarse(unit, k)
         slots.rise[:, :, s] = air.reshape(-1, INNER)
 
-
-@dataclass(frozen=True)
-class EitherFilm(Film):
-    """More or less."""
-
     def lowest(self, study: Study, nominal: Sequence[Nominal], h: Hypothesis) -> np.ndarray:
         """Less than the described film cannot lack at a surface."""
         result, probed = super().lowest(study, nominal, h), study.probed
-        film = next(p.film for p in probed.places if p.name == h.name)
-        own = [f for f, described in enumerate(probed.base.load_model.films) if described.name == film]  # perhaps none
-        result[0] = -max(float(nominal[k].total[:, own].max(initial=0.0)) for k in study.fitted)
+        if not h.batch.sign:
+            film = next(p.film for p in probed.places if p.name == h.name)
+            own = [f for f, described in enumerate(probed.base.load_model.films) if described.name == film]  # or none
+            result[0] = -max(float(nominal[k].total[:, own].max(initial=0.0)) for k in study.fitted)
         return result
 
 
@@ -61,7 +57,7 @@ GROUP = Group(
     "film_gain", "group", "1", "films.", least=0.2, own=0.12, curve=Curve.RELATIVE, conducts=True, bent=True,
     faint=True, largest=9.0,  # still air 2 to 5, a strong draught 20 to 50 W/(m^2 K): a factor of ten
 )  # fmt: skip
-SURFACE = EitherFilm(
+SURFACE = Film(
     "film_gain", "film", "W/(m^2*K)", least=1.0, own=0.12, bent=True,
     largest=100.0,  # W/(m^2 K): air at some 20 m/s
 )  # fmt: skip

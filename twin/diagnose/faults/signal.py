@@ -13,6 +13,7 @@ from twin.diagnose.faults.fault import Described, Family, Fault
 from twin.diagnose.faults.readings import late
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.spot import Of, Spot
 from twin.machine.effects.effect import Window
 
@@ -58,11 +59,16 @@ def batches(context: Context) -> list[Batch]:
     return [*called(context, SIGNAL, "factor"), *called(context, CLOCK, "clock")]
 
 
+def editable(cause: Cause) -> bool:
+    """A factor, and no clock."""
+    return Spot.read(cause.place).of is Of.SIGNAL
+
+
 FAMILY = Family(
     10, "signal", "A load signal is declared wrongly",
     "Peak logged as rms, line as phase current, 1/s as 1/min, or a clock that is off.",
     "u_k times an exact factor;  y(t - a)", "an exact factor in everything that reads the signal; a shift of all",
     "an exact factor; 0.5 min", "-", "every load signal with factors 2, sqrt 2, sqrt 3, 60; the clock of every run",
     "signal", batches, what="a logged signal at fault", channel=True, kind_told=True,
-    editable=lambda cause: Spot.read(cause.place).of is Of.SIGNAL,
+    editable=editable,
 )  # fmt: skip
