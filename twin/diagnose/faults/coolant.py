@@ -18,7 +18,7 @@ from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.numbers import size_words
-from twin.machine.effects.effect import Effect, Window
+from twin.machine.effects.effect import Effect
 
 WET = 60.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
 HARDLY = 35.0  # W/(m^2 K), likewise: less than the discrepancy in 95 of 100 cases is no film of a warm liquid
@@ -74,25 +74,19 @@ class Coolant(Fault):
     def uncertain(self, value: float) -> float:
         return self.own * max(value, WET)
 
-    def described(
-        self, study: Study, name: str, a: np.ndarray, covariance: np.ndarray, size: tuple[float, float, float],
-        windows: tuple[Window, ...],
-    ) -> Described:  # fmt: skip
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
         """With the temperature [degC] of the medium, and its standard deviation [K].
 
         T_ref + Q / (h A) of the film h and the heat Q at the reference temperature.
         """
-        if len(a) < 2 or not size[0] > 0:
-            return Described(name, size, windows)
+        if len(a) < 2 or not d.size[0] > 0:
+            return d
         h, Q = map(float, a)
-        area = next(p.area for p in study.probed.places if p.name == name)
+        area = next(p.area for p in study.probed.places if p.name == d.place)
         slope = np.array([-Q / (h**2 * area), 1.0 / (h * area)])
-        variance = float(slope @ covariance @ slope) + (slope[0] * MEDIUM * size[0]) ** 2
+        variance = float(slope @ covariance @ slope) + (slope[0] * MEDIUM * d.size[0]) ** 2
         temperature = study.probed.base.reference_temperature + Q / (h * area)
-        settings: dict[str, float | str] = {
-            "temperature": temperature, "temperature_sigma": float(np.sqrt(variance)),
-        }  # fmt: skip
-        return Described(name, size, windows, settings)
+        return replace(d, settings={"temperature": temperature, "temperature_sigma": float(np.sqrt(variance))})
 
 
 def _ramp(shape: np.ndarray) -> np.ndarray:

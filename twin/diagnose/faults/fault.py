@@ -183,12 +183,9 @@ class Fault:
         """What is corrected, and by what, of a place of what `corrects`."""
         raise NotImplementedError(f"{self.kind} has no exact factor")
 
-    def described(
-        self, study: Study, name: str, a: np.ndarray, covariance: np.ndarray, size: tuple[float, float, float],
-        windows: tuple[Window, ...],
-    ) -> Described:  # fmt: skip
-        """A cause as reports and edits take it; size: value, low and high of the first amplitude, as told."""
-        return Described(name, size, windows)
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
+        """A cause as reports and edits take it, of one at its place with the size of its first amplitude as told."""
+        return d
 
 
 def forced(slots: Slots, s: int, vector: np.ndarray, history: np.ndarray) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.spot import Spot
-from twin.machine.effects.effect import Window
 
 
 @dataclass(frozen=True)
@@ -31,12 +30,9 @@ class Moved(Fault):
         if j in layout.following_losses:  # mean temperature: what spreads heat over a surface, transposed
             slots.reads[s, layout.following_losses.index(j)] = vector
 
-    def described(
-        self, study: Study, name: str, a: np.ndarray, covariance: np.ndarray, size: tuple[float, float, float],
-        windows: tuple[Window, ...],
-    ) -> Described:  # fmt: skip
-        spot = Spot.read(name)
-        return Described(spot.owner, size, windows, {"surface": spot.partner})
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
+        spot = Spot.read(d.place)
+        return replace(d, place=spot.owner, settings={"surface": spot.partner})
 
 
 MOVED = Moved(

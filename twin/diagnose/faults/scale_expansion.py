@@ -12,19 +12,16 @@ from twin.diagnose.faults.fault import Described, Family, Fault, as_found
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.spot import Spot
-from twin.machine.effects.effect import Effect, Window
+from twin.machine.effects.effect import Effect
 
 
 @dataclass(frozen=True)
 class Scale(Fault):
     """Of an axis, as warm as a part; its place is axes.AXIS<PART."""
 
-    def described(
-        self, study: Study, name: str, a: np.ndarray, covariance: np.ndarray, size: tuple[float, float, float],
-        windows: tuple[Window, ...],
-    ) -> Described:  # fmt: skip
-        spot = Spot.read(name)
-        return Described(spot.owner, size, windows, {"part": spot.partner})
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
+        spot = Spot.read(d.place)
+        return replace(d, place=spot.owner, settings={"part": spot.partner})
 
 
 SCALE = Scale(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.spot import Of, Spot
-from twin.machine.effects.effect import Window
 
 
 @dataclass(frozen=True)
@@ -26,12 +25,9 @@ class Factor(Fault):
         spot = Spot.read(name)
         return spot.owner, float(spot.partner)
 
-    def described(
-        self, study: Study, name: str, a: np.ndarray, covariance: np.ndarray, size: tuple[float, float, float],
-        windows: tuple[Window, ...],
-    ) -> Described:  # fmt: skip
-        place, factor = self.factor(name)
-        return Described(place, (factor, factor, factor), windows)
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
+        place, factor = self.factor(d.place)
+        return replace(d, place=place, size=(factor, factor, factor))
 
 
 @dataclass(frozen=True)

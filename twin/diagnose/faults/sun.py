@@ -14,7 +14,6 @@ from twin.diagnose.faults.fault import Described, Family
 from twin.diagnose.faults.heat_source import Heat
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
-from twin.machine.effects.effect import Window
 
 HOUR = 3600.0  # s
 SOLAR = 1000.0  # W/m^2: the sun at the ground, upright on a surface that keeps all of it
@@ -29,19 +28,16 @@ class Sun(Heat):
         """On no day does it cool."""
         return np.zeros(h.batch.q)
 
-    def described(
-        self, study: Study, name: str, a: np.ndarray, covariance: np.ndarray, size: tuple[float, float, float],
-        windows: tuple[Window, ...],
-    ) -> Described:  # fmt: skip
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
         """One size, a level per day."""
         if len(a) < 2:
-            return Described(name, size, windows)
-        scale = float(max(a)) / size[0] if size[0] else 1.0
-        value, low, high = (v * scale for v in size)
+            return d
+        scale, windows = float(max(a)) / d.size[0] if d.size[0] else 1.0, d.windows
+        value, low, high = (v * scale for v in d.size)
         if value > 0:
             order = list(dict.fromkeys(w.run for w in windows))
             windows = tuple(replace(w, level=w.level * max(float(a[order.index(w.run)]), 0.0) / value) for w in windows)
-        return Described(name, (value, low, high), windows)
+        return replace(d, size=(value, low, high), windows=windows)
 
 
 SUN = Sun("sun", "heat", "W", "", 1, 2.0, own=0.12, grows=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from twin.diagnose.faults.fault import Described, Family, Fault, Unit, forced
 from twin.diagnose.model.integration import INNER
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
-from twin.machine.effects.effect import Window
 
 WARMEST = 20.0  # K: a hall in winter with its door open
 
@@ -39,13 +38,10 @@ class Zone(Fault):
 class Gradient(Fault):
     """Warmer air above."""
 
-    def described(
-        self, study: Study, name: str, a: np.ndarray, covariance: np.ndarray, size: tuple[float, float, float],
-        windows: tuple[Window, ...],
-    ) -> Described:  # fmt: skip
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
         """About which height."""
         names = [e.name for e in study.probed.base.load_model.environments]
-        return Described(name, size, windows, {"height": pivot(study, names.index(self.bare(name)))})
+        return replace(d, settings={"height": pivot(study, names.index(self.bare(d.place)))})
 
 
 SWITCHED = (

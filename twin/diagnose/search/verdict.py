@@ -11,7 +11,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.evidence.sight import sight
 from twin.diagnose.evidence.unknown import history
-from twin.diagnose.faults.fault import Family
+from twin.diagnose.faults.fault import Described, Family
 from twin.diagnose.faults.table import family_of_parameter, fault_of
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
@@ -34,7 +34,7 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), fault.uncertain(value)))
     told = fault.curve.told
     size = told(value), told(value - 1.96 * sigma), told(value + 1.96 * sigma)
-    said = fault.described(study, h.name, a.amplitude, a.covariance, size, h.when.windows)
+    said = fault.described(study, Described(h.name, size, h.when.windows), a.amplitude, a.covariance)
     value, low, high = said.size
     settings = said.settings | ({"reference": h.when.reference} if h.when.signal else {})
     return Cause(
