@@ -18,18 +18,18 @@ from benchmarks.five_axis import EXPERIMENT, machine
 from twin.atomic import atomic_path
 from twin.build.workers import each
 from twin.calibrate.fit.measured import Measured, measured
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.channels_check import broken_sensors, stuck_sensors
-from twin.diagnose.detector import Detector
-from twin.diagnose.diagnose import Settings, prepare
-from twin.diagnose.gain import predicted
-from twin.diagnose.gaps import emptied
-from twin.diagnose.search import search
-from twin.diagnose.search_look import Search
-from twin.diagnose.settled_beside import settled
-from twin.diagnose.study import with_measured
-from twin.diagnose.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
-from twin.diagnose.whiten import measured_of
+from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.model.study import with_measured
+from twin.diagnose.pipeline import Settings, prepare
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.gaps import emptied
+from twin.diagnose.search.look import Search
+from twin.diagnose.search.settled_beside import settled
+from twin.diagnose.search.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
 from twin.inject.draw.trial import draw
 from twin.inject.hidden import Hidden, Trial
 from twin.inject.judge.items import Item, items

@@ -21,15 +21,15 @@ import numpy as np
 
 from twin.calibrate.fit.measured import measured
 from twin.cli.main import run as command
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.channels_check import broken_sensors, stuck_sensors
-from twin.diagnose.diagnose import Settings, prepare
-from twin.diagnose.gaps import emptied
-from twin.diagnose.sealed import judged as on_sealed
-from twin.diagnose.search import search
-from twin.diagnose.study import with_measured
-from twin.diagnose.verdict import verdict_of, with_faults
-from twin.diagnose.whiten import measured_of
+from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.model.study import with_measured
+from twin.diagnose.pipeline import Settings, prepare
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.gaps import emptied
+from twin.diagnose.search.sealed import judged as on_sealed
+from twin.diagnose.search.verdict import verdict_of, with_faults
 from twin.inject.machines.drawn import RUNS, DrawnMachine, draw_machine
 from twin.inject.machines.other import other
 from twin.logs.read import read_run

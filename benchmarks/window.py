@@ -14,10 +14,10 @@ from twin.build.place_training import EVERY, Shared, stepped
 from twin.build.places import pruned
 from twin.build.workers import each
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.integration import INNER
-from twin.diagnose.probed_model import ProbedModel, fine_drive, make_probed_model
-from twin.diagnose.rich_probed_model import rich_probed_model
-from twin.diagnose.study import Study, make_study
+from twin.diagnose.model.integration import INNER
+from twin.diagnose.model.probed_model import ProbedModel, fine_drive, make_probed_model
+from twin.diagnose.model.rich_probed_model import rich_probed_model
+from twin.diagnose.model.study import Study, make_study
 from twin.inject.draw.trial import draw
 from twin.machine.parameters import parameters
 from twin.progress import bar

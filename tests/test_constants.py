@@ -138,7 +138,7 @@ def test_no_test_sets_a_tuned_number():
         ("from twin.build import tanks as t\nprint(t.MOST)", ["twin.build.tanks.MOST"]),
         ("from twin.calibrate.score.regression import STRENGTHS", ["twin.calibrate.score.regression.STRENGTHS"]),
         ("from twin.physics.laws import LAWS", []),
-        ("from twin.diagnose.catalogue import FAMILIES", []),
+        ("from twin.diagnose.faults.catalogue import FAMILIES", []),
         ("from tests.diagnose.small_case import HOURS", []),
     ],
 )

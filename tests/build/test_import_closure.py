@@ -72,7 +72,7 @@ def test_a_module_that_is_not_there_is_an_error(tmp_path):
 
 
 def test_everything_that_python_imports_with_a_module_is_in_its_closure():
-    module = "twin.diagnose.detector"
+    module = "twin.diagnose.search.detector"
     show = f"import sys, {module}; print(*(m for m in sys.modules if m.startswith('twin.')))"
     done = subprocess.run([sys.executable, "-c", show], capture_output=True, text=True, check=True, cwd=ROOT)
     loaded = set(done.stdout.split())
@@ -81,27 +81,29 @@ def test_everything_that_python_imports_with_a_module_is_in_its_closure():
 
 
 def test_what_only_uses_thresholds_does_not_decide_about_them():
-    closure = import_closure("twin.diagnose.detector").modules
+    closure = import_closure("twin.diagnose.search.detector").modules
     assert {
-        "twin.diagnose.diagnosis",
-        "twin.diagnose.batch",
-        "twin.diagnose.probed_model",
+        "twin.diagnose.result.diagnosis",
+        "twin.diagnose.evidence.batch",
+        "twin.diagnose.model.probed_model",
         "twin.calibrate.fit.window",
     } <= set(closure)
-    users = {"diagnose", "search", "verdict", "settled_beside", "gain", "refit", "report_page", "hide", "damage"}
-    assert not users & {name.rpartition(".")[2] for name in closure if name.startswith("twin.diagnose.")}
-    assert not [name for name in closure if name.startswith(("twin.cli", "twin.pictures"))]
+    own = {name for name in closure if name.startswith("twin.diagnose.")}
+    assert {name for name in own if name.startswith("twin.diagnose.search.")} == {"twin.diagnose.search.detector"}
+    users = ("pipeline", "extend", "report", "plan")
+    assert not [name for name in own if name.startswith(tuple(f"twin.diagnose.{user}" for user in users))]
+    assert not [name for name in closure if name.startswith(("twin.cli", "twin.pictures", "twin.inject"))]
 
 
 def test_an_edit_two_imports_away_in_this_package_is_a_miss(tmp_path):
-    """twin.diagnose.detector -> twin.diagnose.probed_model -> twin.calibrate.fit.window."""
+    """twin.diagnose.search.detector -> twin.diagnose.model.probed_model -> twin.calibrate.fit.window."""
     hashes = {}
-    for name, edited in (("as it is", None), ("in", "calibrate/fit/window.py"), ("out", "diagnose/verdict.py")):
+    for name, edited in (("as it is", None), ("in", "calibrate/fit/window.py"), ("out", "diagnose/search/verdict.py")):
         root = tmp_path / name
         shutil.copytree(ROOT / "twin", root / "twin", ignore=shutil.ignore_patterns("__pycache__"))
         if edited:
             path = root / "twin" / edited
             path.write_text(path.read_text() + "\n")
-        hashes[name] = closure_hash("twin.diagnose.detector", root)
+        hashes[name] = closure_hash("twin.diagnose.search.detector", root)
     assert hashes["as it is"] == hashes["out"] != hashes["in"]
-    assert hashes["as it is"] == closure_hash("twin.diagnose.detector")
+    assert hashes["as it is"] == closure_hash("twin.diagnose.search.detector")

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnose.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival, Series, Unknown, Verdict, Window
-from twin.diagnose.plan_result import Apart, Foresight, Plan, Proposal, Separation
-from twin.diagnose.shown_place import Network, Scene, Shell, Support
+from twin.diagnose.result.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival, Series, Unknown, Verdict, Window
+from twin.diagnose.result.place import Network, Scene, Shell, Support
+from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
 
 FAMILIES = ("heat_source", "film_gain", "forced_convection", "joint", "zone", "sensor", "signal", "coolant", "sun")
 

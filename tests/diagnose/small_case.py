@@ -12,12 +12,13 @@ import numpy as np
 
 from tests.calibrate import lumped_case
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.bank import Nominal, nominal_run, respond
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.detector import Detector, instruments_of, make_detector
-from twin.diagnose.elements import Elements, elements_of
-from twin.diagnose.probed_model import ProbedModel, make_probed_model
-from twin.diagnose.study import Study, make_study
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.elements import Elements, elements_of
+from twin.diagnose.model.bank import Nominal, nominal_run, respond
+from twin.diagnose.model.probed_model import ProbedModel, make_probed_model
+from twin.diagnose.model.study import Study, make_study
+from twin.diagnose.search.detector import Detector, instruments_of, make_detector
+from twin.diagnose.search.policy import POLICY
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.machine.description import Machine
@@ -124,4 +125,4 @@ def responses(linear: bool = False) -> np.ndarray:
 @cache
 def made_detector() -> Detector:
     """From few synthetic measurements: thresholds are rough."""
-    return make_detector(study(), FAMILIES, instruments_of(study(), NOISE, TCP_NOISE), counts=(24, 40))
+    return make_detector(study(), FAMILIES, instruments_of(study(), NOISE, TCP_NOISE), POLICY, counts=(24, 40))

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.acted import Unit, slots_with
-from twin.diagnose.bank import Column, respond
-from twin.diagnose.elements import FORCINGS, slim
+from twin.diagnose.faults.acted import slots_with
+from twin.diagnose.faults.elements import FORCINGS, slim
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import FAULTS, OF_KIND
+from twin.diagnose.model.bank import Column, respond
 
 LITTLE = {"heat": 0.5, "film": 0.05, "joint": 2e-3, "contact": 5e-3, "capacity": 50.0, "group": 5e-3, "air": 0.02,
-          "zone": 0.02, "source": 0.5, "group_film": 0.05}  # fmt: skip
+          "zone": 0.02, "source": 0.5, "group_film": 0.05, "start": 0.05, "signal": 0.01}  # fmt: skip
 
 
 def history(key, elements, study):
@@ -21,31 +23,33 @@ def history(key, elements, study):
     return tuple(np.zeros(k) if h is None else h for h, k in zip(column.histories, n, strict=True))
 
 
-@pytest.mark.parametrize(
-    "key",
-    [
-        ("heat", "housing", "always"),
-        ("heat", "stator", "block 2"),
-        ("heat", "bed", "spindle_current^2"),
-        ("film", "slide", "always"),
-        ("film", "housing", "block 1"),
-        ("film", "nut", "x_speed^0.6"),
-        ("group", "air", "always"),
-        ("group_film", "moving", "x_speed^0.6"),
-        ("zone", "moving", "always"),
-        ("air", "shop", "block 3"),
-        ("joint", "flange", "block 2"),
-        ("contact", "x_screw", "block 2"),
-        ("capacity", "housing", "always"),
-        ("source", "front", "spindle_speed^2.67"),
-    ],
-    ids=".".join,
-)
+KEYS = [
+    ("heat", "housing", "always"),
+    ("heat", "stator", "block 2"),
+    ("heat", "bed", "spindle_current^2"),
+    ("film", "slide", "always"),
+    ("film", "housing", "block 1"),
+    ("film", "nut", "x_speed^0.6"),
+    ("group", "air", "always"),
+    ("group_film", "moving", "x_speed^0.6"),
+    ("zone", "moving", "always"),
+    ("air", "shop", "block 3"),
+    ("joint", "flange", "block 2"),
+    ("contact", "x_screw", "block 2"),
+    ("capacity", "housing", "always"),
+    ("source", "front", "spindle_speed^2.67"),
+    ("start", "", ""),  # the first of its kind
+    ("signal", "", ""),
+]
+
+
+@pytest.mark.parametrize("key", KEYS, ids=".".join)
 def test_against_differences(key):
     """On the machine whose laws read no temperature, where responses leave out nothing."""
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
+    key = key if key[1] else next(other for other in elements.index if other[0] == key[0])
     kind, place, _ = key
-    unit = Unit(kind, place, elements.index[key], history(key, elements, study))
+    unit = Unit(OF_KIND[kind], place, elements.index[key], history(key, elements, study))
     x = np.zeros(len(study.probed.parameters))
     got = small_case.responses(linear=True)[:, elements.index[key]]
     parts = []
@@ -64,11 +68,17 @@ def test_against_differences(key):
     assert got @ wanted / (wanted @ wanted) == pytest.approx(1.0, abs=most)
 
 
+def test_every_fault_in_a_machine_is_compared():
+    """But those that a lumped machine has not, and a coolant, which is a film and heat."""
+    acting = {fault.kind for fault in FAULTS.values() if not fault.read}
+    assert acting - {"gradient", "moved", "coolant"} == {kind for kind, _, _ in KEYS}
+
+
 def test_reactions_of_laws_are_small():
     """Bearings that run easier when warm, and radiation."""
     study, elements = small_case.study(), small_case.elements()
     key = ("heat", "housing", "always")
-    unit = Unit("heat", "housing", elements.index[key], history(key, elements, study))
+    unit = Unit(OF_KIND["heat"], "housing", elements.index[key], history(key, elements, study))
     x = np.zeros(len(study.probed.parameters))
     slots = slots_with(study, elements, [unit], 0)
     exact = study.outputs(0, x, slots, [0.5]) - study.outputs(0, x, slots, [-0.5])
@@ -96,7 +106,7 @@ def test_one_run_leaves_the_other_alone():
 
 
 def test_many_columns_are_stepped_in_portions(monkeypatch):
-    import twin.diagnose.bank as bank
+    import twin.diagnose.model.bank as bank
 
     study, nominal, elements = small_case.study(), small_case.nominal(), small_case.elements()
     some = elements.columns[:7]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.cli.main import run
-from twin.diagnose.batch import best, prepared
-from twin.diagnose.catalogue import FAMILIES, explained, family, with_own
-from twin.diagnose.hypotheses import Context
-from twin.diagnose.report_catalogue import BEGIN, END, catalogue_table, renewed
-from twin.diagnose.whiten import Projector
+from twin.diagnose.evidence.batch import best, prepared
+from twin.diagnose.evidence.whiten import Projector
+from twin.diagnose.faults.catalogue import FAMILIES, explained, family, with_own
+from twin.diagnose.faults.context import Context
+from twin.diagnose.report.catalogue import BEGIN, END, catalogue_table, renewed
+from twin.diagnose.result.diagnosis import Cause, Window
 from twin.errors import TwinError
-from twin.machine.effects.edits import EDITS
+from twin.machine.effects.edits import EDITS, extended_description
 
 PAGE = Path(__file__).parents[2] / "docs" / "diagnosis.md"
 
@@ -40,7 +42,7 @@ def test_nineteen_entries_each_once():
 
 def test_the_page_shows_the_catalogue():
     page = PAGE.read_text("utf-8")
-    assert renewed(page) == page, "run: python -m twin.diagnose.report_catalogue docs/diagnosis.md"
+    assert renewed(page) == page, "run: python -m twin.diagnose.report.catalogue docs/diagnosis.md"
     rows = page.split(BEGIN)[1].split(END)[0].strip().splitlines()
     assert len(rows) == 2 + 19
     assert all(row.replace("\\|", "").count("|") == 9 for row in rows)
@@ -99,6 +101,21 @@ def test_the_example_finds_its_lamp(lamp):
     assert (first.family, first.name) == ("lamp", "housing")
     assert first.when.name == "for 2 h after every start"
     assert first.amplitude[0] == pytest.approx(30.0, abs=5.0)
+
+
+def test_the_example_is_written_into_a_description(lamp):
+    """As what its `edit` says: a heat source that a switch turns on for the hours that it was found in."""
+    entry = family("lamp", with_own(lamp))
+    windows = (Window("day", 0.0, 7200.0),)
+    cause = Cause(
+        "lamp", "housing", "", 30.0, (25.0, 35.0), "W", 90.0, 36.0, "for 2 h after every start", windows=windows
+    )
+    assert entry.changes(cause)
+    text = (small_case.machine().folder / "machine.toml").read_text("utf-8")
+    edit = extended_description(text, [entry.edit(cause, small_case.study())])
+    added = {k: v for k, v in tomllib.loads(edit.text)["sources"].items() if k not in tomllib.loads(text)["sources"]}
+    assert [source["surface"] for source in added.values()] == ["housing"]
+    assert set(edit.signals.values()) == {windows}
 
 
 def test_an_entry_of_a_known_name_takes_its_place(lamp, tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.diagnose.channels_check import stuck_sensors
+from twin.diagnose.faults.channels_check import stuck_sensors
 from twin.logs.run import Run, Table
 
 HOUR = 3600.0
@@ -93,7 +93,7 @@ def test_a_run_at_rest_is_not_a_frozen_channel():
 
 def test_a_sensor_that_breaks_is_named_and_left_out_of_what_is_fitted():
     from tests.logs.faults.test_usable import changed, made
-    from twin.diagnose.channels_check import broken_sensors
+    from twin.diagnose.faults.channels_check import broken_sensors
 
     run = made()
     broken = run.temperatures.columns["t3"].copy()

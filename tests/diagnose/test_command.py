@@ -16,8 +16,8 @@ from tests.diagnose.made_up import diagnosis
 from twin.build.cache import machine_hash
 from twin.cli.diagnose import command
 from twin.cli.main import run
-from twin.diagnose.diagnose import Result, Settings, diagnose, machine_of
-from twin.diagnose.diagnosis import Cause, Window
+from twin.diagnose.pipeline import Result, Settings, diagnose, machine_of
+from twin.diagnose.result.diagnosis import Cause, Window
 from twin.errors import ArtefactError
 from twin.logs.read import read_run
 from twin.logs.run import Table
@@ -150,7 +150,7 @@ def test_a_stuck_sensor_that_is_left_out_is_not_looked_at(exclude, monkeypatch):
         seen.append(runs[0].temperatures.columns["front"])
         raise InterruptedError
 
-    monkeypatch.setattr("twin.diagnose.diagnose.prepare", prepare)
+    monkeypatch.setattr("twin.diagnose.pipeline.prepare", prepare)
     time = 60.0 * np.arange(200)
     columns = {name: 20.0 + np.random.default_rng(k).random(200) for k, name in enumerate(("front", "housing"))}
     columns["front"][100:] = 20.5
@@ -178,9 +178,9 @@ def found(monkeypatch):
             cosine=np.zeros((0, 0)), nulls={}, thresholds={}, observed={}, whiteness=(),
         )  # fmt: skip
         search = SimpleNamespace(detector=SimpleNamespace(study=SimpleNamespace(probed=None)))
-        monkeypatch.setattr("twin.diagnose.diagnose.diagnose", lambda *_: Result(made, search, causes))
+        monkeypatch.setattr("twin.diagnose.pipeline.diagnose", lambda *_: Result(made, search, causes))
 
-    monkeypatch.setattr("twin.diagnose.extension.build_artefact", lambda _, to, **more: to.write_bytes(b"built"))
+    monkeypatch.setattr("twin.diagnose.extend.build_artefact", lambda _, to, **more: to.write_bytes(b"built"))
     return give
 
 
@@ -224,7 +224,7 @@ def test_an_interrupted_build_leaves_the_report(artefact, tmp_path, found, monke
 
     found(HEAT)
     out = tmp_path / "out"
-    monkeypatch.setattr("twin.diagnose.extension.build_artefact", interrupted)
+    monkeypatch.setattr("twin.diagnose.extend.build_artefact", interrupted)
     assert run(["diagnose", str(artefact), str(RUN), "-o", str(out)]) == 130
     assert files(out) == sorted([*REPORT, "machine.toml"])
     assert report(out)["causes"][0]["parameter"] == "sources.found_1.gain"

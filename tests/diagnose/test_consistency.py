@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.diagnose.consistency import Size, differs, sizes
+from twin.diagnose.evidence.consistency import Size, differs, sizes
 
 ROWS = [slice(0, 150), slice(150, 260), slice(260, 400)]
 

@@ -9,24 +9,23 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import Accepted
-from twin.diagnose.acted import slots_with, units_of
-from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.contest import (
-    _liquid,
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.contest import (
     _moved,
     beginning,
     exact,
     judged,
     lowest,
-    priors,
     proof,
     solved,
     tried,
     worth,
 )
-from twin.diagnose.diagnosis import Window
-from twin.diagnose.verdict import cause_of
+from twin.diagnose.search.verdict import cause_of
 
 pytestmark = pytest.mark.long
 
@@ -105,14 +104,14 @@ def test_what_a_cause_may_be():
     coolant = hypothesis(q=2)
     coolant = replace(coolant, batch=replace(coolant.batch, kind="coolant", family="coolant", smallest=5.0))
     np.testing.assert_array_equal(lowest(detector, coolant), [5.0, -np.inf])
-    mean, inverse = priors(coolant)
+    mean, inverse = fault_of(coolant).prior(2)
     assert 20.0 < mean[0] < 200.0  # W/(m^2 K), of a liquid that runs down a wall
     assert inverse[0] ** -0.5 == pytest.approx(mean[0])
     assert (mean[1], inverse[1]) == (0.0, 0.0)  # its heat is left to the data
     sun = hypothesis(q=2)
     assert np.all(lowest(detector, replace(sun, batch=replace(sun.batch, family="sun"))) == 0.0)
     assert np.all(np.isneginf(lowest(detector, sun)))
-    assert not np.any(priors(sun)[1])
+    assert not np.any(fault_of(sun).prior(2)[1])
 
 
 def test_a_surface_lacks_no_more_film_than_it_has():
@@ -148,11 +147,11 @@ def test_no_medium_is_frozen():
     area = next(p.area for p in detector.study.probed.places if p.name == h.name)
     above = detector.study.probed.base.reference_temperature  # K above 0 degC, at which water freezes
     cold = -10.0 * area * above
-    np.testing.assert_allclose(_liquid(detector.study, h, np.array([5.0, cold])), [10.0, cold])
+    np.testing.assert_allclose(fault_of(h).limited(detector.study, h.name, np.array([5.0, cold])), [10.0, cold])
     for kept in ([12.0, cold], [5.0, -cold]):
-        np.testing.assert_array_equal(_liquid(detector.study, h, np.array(kept)), kept)
+        np.testing.assert_array_equal(fault_of(h).limited(detector.study, h.name, np.array(kept)), kept)
     plain = hypothesis()
-    np.testing.assert_array_equal(_liquid(detector.study, plain, np.array([-1e9])), [-1e9])
+    np.testing.assert_array_equal(fault_of(plain).limited(detector.study, plain.name, np.array([-1e9])), [-1e9])
 
 
 def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):

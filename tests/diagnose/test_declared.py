@@ -11,16 +11,16 @@ import pytest
 from tests.calibrate import lumped_case
 from tests.diagnose import small_case
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.accepted import Accepted, jacobian
-from twin.diagnose.acted import slots_with, units_of
-from twin.diagnose.batch import Hypothesis
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.contest import misfit
-from twin.diagnose.probed_model import make_probed_model
-from twin.diagnose.search import _reads, search
-from twin.diagnose.search_declared import declared_candidates, declared_exactly, misplaced_candidates, with_signal
-from twin.diagnose.study import Study, make_study
-from twin.diagnose.verdict import verdict_of
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.study import Study, make_study
+from twin.diagnose.search.accepted import Accepted, jacobian
+from twin.diagnose.search.contest import misfit
+from twin.diagnose.search.declared import declared_candidates, declared_exactly, misplaced_candidates, with_signal
+from twin.diagnose.search.forward import _reads, search
+from twin.diagnose.search.verdict import verdict_of
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.discretisation import _acting, differences, inside_of, with_insides
-from twin.diagnose.probed_model import make_probed_model
-from twin.diagnose.pulls import Pulls
-from twin.diagnose.study import make_study
-from twin.diagnose.surrogate import make_surrogate
+from twin.diagnose.evidence.discretisation import _acting, differences, inside_of, with_insides
+from twin.diagnose.evidence.pulls import Pulls
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.study import make_study
+from twin.diagnose.model.surrogate import make_surrogate
 from twin.machine.check_lumped import node_capacity, total_capacity
 from twin.machine.description import Machine
 from twin.machine.parameters import parameters

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.acted import units_of
-from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.bells import Bell, by_blocks, name
-from twin.diagnose.diagnosis import Window
-from twin.diagnose.edges import Edge, edges_of, moved, with_pulses
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.bells import Bell, by_blocks, name
+from twin.diagnose.faults.acted import units_of
+from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.edges import Edge, edges_of, moved, with_pulses
 
 HOUR = 3600.0
 
@@ -35,16 +35,16 @@ def test_edges_are_the_ends_within_a_run():
     first, second = names()[:2]
     end = float(study.runs[0].run.drive.time[-1])
     assert edges_of(study, heat(Window(first, 0.0, end))) == []
-    assert edges_of(study, heat(Window(first, HOUR, end))) == [Edge("start", 0)]
+    assert edges_of(study, heat(Window(first, HOUR, end))) == [Edge("begin", 0)]
     both = heat(Window(first, HOUR, 2 * HOUR), Window(second, 0.0, HOUR))
-    assert edges_of(study, both) == [Edge("start", 0), Edge("end", 0), Edge("start", 1), Edge("end", 1)]
+    assert edges_of(study, both) == [Edge("begin", 0), Edge("end", 0), Edge("begin", 1), Edge("end", 1)]
     lasting = heat(Window(first, HOUR, end), Window(second, 0.0, float(study.runs[1].run.drive.time[-1])))
-    assert edges_of(study, lasting) == [Edge("start", 0)]
-    assert edges_of(study, replace(both, batch=replace(both.batch, family="not_thermal"))) == []
+    assert edges_of(study, lasting) == [Edge("begin", 0)]
+    assert edges_of(study, replace(both, batch=replace(both.batch, family="not_thermal", kind="step"))) == []
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("edge", [Edge("start", 0), Edge("end", 0)])
+@pytest.mark.parametrize("edge", [Edge("begin", 0), Edge("end", 0)])
 def test_the_derivative_by_an_edge_is_that_of_outputs(edge):
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
     h = heat(Window(names()[0], HOUR, 2 * HOUR))
@@ -101,7 +101,7 @@ def test_moved_windows_stay_in_their_run_and_are_named_anew():
         study,
         small_case.elements(),
         heat(Window(first, HOUR, 2 * HOUR)),
-        [(Edge("start", 0), -9e9), (Edge("end", 0), 900.0)],
+        [(Edge("begin", 0), -9e9), (Edge("end", 0), 900.0)],
     )
     assert h.when.windows == (Window(first, 0.0, 2.25 * HOUR),)
     assert h.when.name == f"from 0.0 h to 2.2 h of {first}"
@@ -109,5 +109,5 @@ def test_moved_windows_stay_in_their_run_and_are_named_anew():
     assert HOUR + 60.0 <= short.when.windows[0].end < 1.5 * HOUR  # some steps in time are left
     last = heat(Window(first, HOUR, end), Window(second, 0.0, float(study.runs[1].run.drive.time[-1])))
     assert (
-        moved(study, small_case.elements(), last, [(Edge("start", 0), 360.0)]).when.name == f"from 1.1 h of {first} on"
+        moved(study, small_case.elements(), last, [(Edge("begin", 0), 360.0)]).when.name == f"from 1.1 h of {first} on"
     )

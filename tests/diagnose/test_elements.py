@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.hypotheses import Context
-from twin.diagnose.readings import readings_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.context import Context
+from twin.diagnose.faults.readings import readings_of
 
 
 @pytest.fixture(scope="module")

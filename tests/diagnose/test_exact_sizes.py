@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import Accepted, curved_change, freed, parameter_of
-from twin.diagnose.acted import slots_with, units_of
-from twin.diagnose.batch import Hypothesis
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.contest import exact
-from twin.diagnose.gain import gains
-from twin.diagnose.readings import late
-from twin.diagnose.refit import refit
-from twin.diagnose.search import search
-from twin.diagnose.sizes import sized_candidates
-from twin.diagnose.verdict import verdict_of
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.readings import late
+from twin.diagnose.search.accepted import Accepted, curved_change, freed, parameter_of
+from twin.diagnose.search.contest import exact
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.gain import gains
+from twin.diagnose.search.refit import refit
+from twin.diagnose.search.sizes import sized_candidates
+from twin.diagnose.search.verdict import verdict_of
 
 pytestmark = pytest.mark.long
 

@@ -10,8 +10,8 @@ import pytest
 
 from tests.diagnose.small_case import runs, study
 from twin.build.full_model import assemble
-from twin.diagnose.actuators import actuators_of
-from twin.diagnose.experiments import experiments_of, longest_of
+from twin.diagnose.plan.actuators import actuators_of
+from twin.diagnose.plan.experiments import experiments_of, longest_of
 from twin.logs.signals import signal_values
 from twin.machine.load import load_machine
 from twin.rom.load_model import AxisWiring, EnvironmentWiring, Film, LawUse, LoadModel, Pair, Signal, Source

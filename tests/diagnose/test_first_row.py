@@ -11,9 +11,10 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.gain import _read
-from twin.diagnose.readings import late, play, readings_of
-from twin.diagnose.study import Study, make_study
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.faults.readings import late, play, readings_of
+from twin.diagnose.model.study import Study, make_study
+from twin.diagnose.search.gain import _read
 from twin.inject.damage.channels import Damage
 from twin.inject.damage.kinds import damaged
 from twin.logs.run import Run
@@ -155,9 +156,9 @@ def test_every_reading_of_the_tcp_counts_from_the_first_row():
 
 @pytest.mark.parametrize(("kind", "name"), [("probe", "tcp.dx"), ("frame", "tcp.dy:x"), ("slip", "tcp.dz")])
 def test_a_sealed_run_that_counts_from_its_first_row_does_so_in_what_is_predicted(kind, name):
-    cause = SimpleNamespace(
-        hypothesis=SimpleNamespace(batch=SimpleNamespace(kind=kind), name=name), amplitude=np.array([SIZE])
-    )
+    always = History("always", np.ones((1, 1)))
+    batch = Batch("", kind, "", (name,), np.zeros((1, 1), dtype=int), (always,))
+    cause = SimpleNamespace(hypothesis=Hypothesis(batch, 0, always, 1.0, (SIZE,), 1.0), amplitude=np.array([SIZE]))
     added = []
     for reference in ("first", "absolute"):
         study = read(reference)[0]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.bells import Bell, by_blocks, name
-from twin.diagnose.diagnosis import Window
-from twin.diagnose.growth import chilled, grown
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.bells import Bell, by_blocks, name
+from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.growth import chilled, grown
 
 BLOCKS = 6
 

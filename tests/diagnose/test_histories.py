@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.elements import histories_of
-from twin.diagnose.probed_model import _means, fine_drive
-from twin.diagnose.study import Study
+from twin.diagnose.faults.elements import histories_of
+from twin.diagnose.model.probed_model import _means, fine_drive
+from twin.diagnose.model.study import Study
 from twin.logs.run import Run
 
 HOURS, ON, CYCLE = 2.0, 12.0, 60.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import parameter_of
-from twin.diagnose.hotter import hotter
+from twin.diagnose.search.accepted import parameter_of
+from twin.diagnose.search.hotter import hotter
 
 
 @pytest.mark.long

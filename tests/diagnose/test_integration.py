@@ -11,13 +11,15 @@ from tests.calibrate import lumped_case
 from tests.diagnose import small_case
 from twin.calibrate.fit import integration as plain
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.acted import Unit, slots_with
-from twin.diagnose.bank import nominal_run
-from twin.diagnose.elements import elements_of
-from twin.diagnose.integration import loads_for, states_of
-from twin.diagnose.probed_model import make_probed_model
-from twin.diagnose.slots import no_slots
-from twin.diagnose.study import Study, make_study
+from twin.diagnose.faults.acted import slots_with
+from twin.diagnose.faults.elements import elements_of
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import OF_KIND
+from twin.diagnose.model.bank import nominal_run
+from twin.diagnose.model.integration import loads_for, states_of
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.slots import no_slots
+from twin.diagnose.model.study import Study, make_study
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 
@@ -31,7 +33,7 @@ def units(kinds, study):
         gate = np.zeros(planned.run.drive.n_steps)
         gate[60:-30] = 1.0
         gates.append(gate)
-    return [Unit(kind, place, -1, tuple(gates)) for kind, place in kinds]
+    return [Unit(OF_KIND[kind], place, -1, tuple(gates)) for kind, place in kinds]
 
 
 @pytest.mark.long
@@ -160,7 +162,7 @@ def test_a_misplaced_source_is_as_warm_as_where_it_is():
     x[[p.path for p in study.probed.parameters].index("sources.front.gain")] = 0.5
     column = elements.index["moved", "front>housing", "always"]
     always = tuple(np.ones(planned.run.drive.n_steps) for planned in study.runs)
-    slots = slots_with(study, elements, [Unit("moved", "sources.front>housing", column, always)], 0)
+    slots = slots_with(study, elements, [Unit(OF_KIND["moved"], "front>housing", column, always)], 0)
     np.testing.assert_allclose(study.outputs(0, x, slots, [1.0]), other.outputs(0, x), rtol=1e-9, atol=1e-12)
     assert np.abs(study.outputs(0, x) - other.outputs(0, x)).max() > 1.0
     slots.reads[:] = 0.0  # nor is it as warm as where it was described
@@ -184,7 +186,7 @@ def test_more_amplitudes_than_slots_are_refused():
 
 
 def test_a_plan_for_every_run():
-    from twin.diagnose.study import make_study
+    from twin.diagnose.model.study import make_study
     from twin.errors import TwinError
 
     study = small_case.study()

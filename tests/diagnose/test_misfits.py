@@ -11,17 +11,17 @@ import pytest
 
 from tests.diagnose import small_case
 from tests.diagnose.test_search import measured
-from twin.diagnose.accepted import Accepted
-from twin.diagnose.acted import units_of
-from twin.diagnose.batch import Hypothesis
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.diagnosis import Window
-from twin.diagnose.search import _leaking, _restless, refit, search
-from twin.diagnose.search_declared import declared_candidates
-from twin.diagnose.search_look import look
-from twin.diagnose.search_strained import _weak, closed, loose_ones, strained
-from twin.diagnose.settled_beside import settled
-from twin.diagnose.verdict import verdict_of
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.faults.acted import units_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.declared import declared_candidates
+from twin.diagnose.search.forward import _leaking, _restless, refit, search
+from twin.diagnose.search.look import look
+from twin.diagnose.search.settled_beside import settled
+from twin.diagnose.search.strained import _weak, closed, loose_ones, strained
+from twin.diagnose.search.verdict import verdict_of
 
 pytestmark = pytest.mark.long
 

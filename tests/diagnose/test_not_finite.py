@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.surrogate import make_surrogate
+from twin.diagnose.model.surrogate import make_surrogate
 from twin.errors import ModelError
 
 

@@ -13,11 +13,11 @@ from tests.diagnose.made_up import SHELL, diagnosis
 from tests.diagnose.test_search import measured
 from tests.support.descriptions import SLIDE
 from twin.build.places import Place
-from twin.diagnose.report_pictures import inline_svg
-from twin.diagnose.report_place import place_picture
-from twin.diagnose.scene import scene_of
-from twin.diagnose.search import search
-from twin.diagnose.support import shared, support_of
+from twin.diagnose.report.pictures import inline_svg
+from twin.diagnose.report.place import place_picture
+from twin.diagnose.report.scene import scene_of
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.support import shared, support_of
 from twin.machine.load import load_machine
 from twin.pictures.marked import best_camera, marked_view
 from twin.pictures.network import layout

@@ -10,13 +10,13 @@ import pytest
 
 from tests.diagnose.made_up import planned
 from tests.diagnose.small_case import NOISE, machine, made_detector, runs
-from twin.diagnose.batch import Hypothesis
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.plan import Basis, make_plan
-from twin.diagnose.plan_result import Foresight, Plan
-from twin.diagnose.report_plan import plan_lines, plan_section
-from twin.diagnose.suspicion import known_family, known_suspicions, named, worst_of_machine
-from twin.diagnose.verdict import limits_of
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.plan.plan import Basis, make_plan
+from twin.diagnose.plan.suspicion import known_family, known_suspicions, named, worst_of_machine
+from twin.diagnose.report.plan import plan_lines, plan_section
+from twin.diagnose.result.plan import Foresight, Plan
+from twin.diagnose.search.verdict import limits_of
 from twin.errors import TwinError
 
 ASKED = ("heat_source bed", "heat_source slide", "joint contacts.screw_bearing", "coolant bed", "sensor sensors.front")

@@ -14,18 +14,19 @@ import pytest
 from tests.hidden import small
 from twin.build.simulate import Noise, simulate_run
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.actuators import actuators_of
-from twin.diagnose.batch import score
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.detector import Detector, instruments_of, make_detector
-from twin.diagnose.experiments import experiments_of
-from twin.diagnose.plan import make_plan
-from twin.diagnose.plan_result import Foresight
-from twin.diagnose.probed_model import make_probed_model
-from twin.diagnose.sight import sight
-from twin.diagnose.study import make_study, with_measured
-from twin.diagnose.suspicion import named
-from twin.diagnose.whiten import measured_of
+from twin.diagnose.evidence.batch import score
+from twin.diagnose.evidence.sight import sight
+from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.study import make_study, with_measured
+from twin.diagnose.plan.actuators import actuators_of
+from twin.diagnose.plan.experiments import experiments_of
+from twin.diagnose.plan.plan import make_plan
+from twin.diagnose.plan.suspicion import named
+from twin.diagnose.result.plan import Foresight
+from twin.diagnose.search.detector import Detector, instruments_of, make_detector
+from twin.diagnose.search.policy import POLICY
 from twin.logs.read import read_run
 from twin.logs.run import Run
 from twin.machine.effects.edits import extended_description
@@ -74,7 +75,7 @@ def detector_of(path: Path, text: str, runs: list[Run]) -> Detector:
     probed = make_probed_model(machine, parameters(machine), runs)
     plans = [measured(probed.base, run, own.drive, own.name) for run, own in zip(runs, probed.runs, strict=True)]
     study = make_study(probed, plans, range(len(runs)))
-    return make_detector(study, FAMILIES, instruments_of(study, NOISE, TCP_NOISE), counts=COUNTS)
+    return make_detector(study, FAMILIES, instruments_of(study, NOISE, TCP_NOISE), POLICY, counts=COUNTS)
 
 
 def statistic(detector: Detector, runs: list[Run], place: str, history: str) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.ports_first import basis, factor, held, solved, turned, within
+from twin.diagnose.model.ports_first import basis, factor, held, solved, turned, within
 
 
 def some(states, ports, rank, seed):

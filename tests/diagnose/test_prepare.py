@@ -9,10 +9,11 @@ import pytest
 from tests.build.test_cache_codec import equal
 from tests.diagnose import small_case
 from twin.build.cache_file import read_entry, write_entry
-from twin.diagnose import diagnose
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.detector import instruments_of, make_detector, stored
-from twin.diagnose.probed_model import ProbedModel
+from twin.diagnose import pipeline as diagnose
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.model.probed_model import ProbedModel
+from twin.diagnose.search.detector import instruments_of, make_detector, stored
+from twin.diagnose.search.policy import POLICY
 
 
 @pytest.fixture
@@ -48,8 +49,8 @@ def test_a_detector_belongs_to_the_coordinates_it_was_made_in(keys, monkeypatch)
 
 def test_a_detector_comes_back_from_its_entry_as_it_was_made(tmp_path):
     study = small_case.study()
-    made = make_detector(study, FAMILIES[:4], instruments_of(study, 0.05, 0.3e-6), counts=(2, 4))
+    made = make_detector(study, FAMILIES[:4], instruments_of(study, 0.05, 0.3e-6), POLICY, counts=(2, 4))
     write_entry(tmp_path / "entry.npz", stored(made), 10**9)
-    read = read_entry(tmp_path / "entry.npz").of(study)
+    read = read_entry(tmp_path / "entry.npz").of(study, POLICY)
     assert equal(stored(read), stored(made))
     assert read.study is read.fitter.study is read.whiten.study is study

@@ -13,20 +13,16 @@ import pytest
 from tests.calibrate import lumped_case
 from tests.diagnose import small_case
 from tests.diagnose.made_up import SENSOR, SIGNAL, STEP, STRAINED, diagnosis, heat, made_gains, planned, series
-from twin.diagnose.accepted import Accepted
-from twin.diagnose.batch import Hypothesis
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.diagnose import Result
-from twin.diagnose.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Limit, Pull, Rival, Window
-from twin.diagnose.extension import write_extension
-from twin.diagnose.gain import gains
-from twin.diagnose.report_evidence import candidates_picture, cosine_picture, nulls_picture
-from twin.diagnose.report_gain import broken
-from twin.diagnose.report_numbers import customary, number, quantity, size_words
-from twin.diagnose.report_page import page, plain, summary_lines, write_report
-from twin.diagnose.report_residuals import load_rows, loudest, on_masks, residual_map, with_gaps
-from twin.diagnose.report_tables import gain_table, table, when
-from twin.diagnose.report_text import (
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.extend import write_extension
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.pipeline import Result
+from twin.diagnose.report.evidence import candidates_picture, cosine_picture, nulls_picture
+from twin.diagnose.report.gain import broken
+from twin.diagnose.report.page import page, plain, summary_lines, write_report
+from twin.diagnose.report.residuals import load_rows, loudest, on_masks, residual_map, with_gaps
+from twin.diagnose.report.tables import gain_table, table, when
+from twin.diagnose.report.text import (
     cause_evidence,
     cause_words,
     chance,
@@ -35,8 +31,12 @@ from twin.diagnose.report_text import (
     pull_of,
     verdict_sentence,
 )
-from twin.diagnose.search import search
-from twin.diagnose.verdict import pulls_of, verdict_of
+from twin.diagnose.result.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Limit, Pull, Rival, Window
+from twin.diagnose.result.numbers import customary, number, quantity, size_words
+from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.gain import gains
+from twin.diagnose.search.verdict import pulls_of, verdict_of
 from twin.errors import TwinError
 
 SECTIONS = {"evidence", "gain", "residuals", "decision", "pulls", "unknown", "limits", "notes"}

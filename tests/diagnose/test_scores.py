@@ -7,12 +7,12 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.calibrate.fit.noise import Channels
-from twin.diagnose.batch import Batch, History, best, prepared, score
-from twin.diagnose.detector import thresholds_of
-from twin.diagnose.diagnosis import Window
-from twin.diagnose.growth import grown
-from twin.diagnose.unknown import evidence, heat_of, history, with_information
-from twin.diagnose.whiten import Projector, Whitener, measured_of, missing, offsets
+from twin.diagnose.evidence.batch import Batch, History, best, prepared, score
+from twin.diagnose.evidence.unknown import evidence, heat_of, history, with_information
+from twin.diagnose.evidence.whiten import Projector, Whitener, measured_of, missing, offsets
+from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.detector import thresholds_of
+from twin.diagnose.search.growth import grown
 
 M, L = 60, 4
 
@@ -175,7 +175,7 @@ def seen():
     weight = 1.0 / np.concatenate(sigma)
     J = np.vstack([study.jacobian(k, x)[:, : len(x)] for k in study.fitted])
     white, projector = D * weight[:, None], Projector.of(J * weight[:, None])
-    bare = heat_of(study, elements)
+    bare = heat_of(study, elements.histories.blocks, elements.heat_blocks)
     return with_information(bare, [white[:, c].T @ projector(white[:, c]) for c in bare.columns]), white, projector
 
 

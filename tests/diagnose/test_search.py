@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import exchanged
-from twin.diagnose.acted import Unit, slots_with
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.gain import predicted
-from twin.diagnose.search import search
-from twin.diagnose.verdict import limits_of, pulls_of, verdict_of
+from twin.diagnose.faults.acted import slots_with
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import OF_KIND
+from twin.diagnose.search.accepted import exchanged
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.verdict import limits_of, pulls_of, verdict_of
 
 
 def measured(kind="", place="", size=0.0, seed=0, levels=(1.0,)):
@@ -23,7 +25,7 @@ def measured(kind="", place="", size=0.0, seed=0, levels=(1.0,)):
     x = 0.5 * rng.standard_normal(len(study.probed.parameters))
     steps = [p.run.drive.n_steps for p in study.runs]
     shapes = tuple(np.array(levels)[np.arange(n) * len(levels) // n] for n in steps)
-    units = [Unit(kind, place, -1, shapes)] if kind else []
+    units = [Unit(OF_KIND[kind], place, -1, shapes)] if kind else []
     parts = []
     for k in study.fitted:
         slots = slots_with(study, small_case.elements(), units, k)

@@ -10,21 +10,22 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.accepted import parameter_of
-from twin.diagnose.batch import Batch, History, Hypothesis
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.pulls import Loose
-from twin.diagnose.search import search
-from twin.diagnose.search_look import look
-from twin.diagnose.search_strained import loose_ones, strained
-from twin.diagnose.verdict import (
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.pulls import Loose
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.table import OF_KIND
+from twin.diagnose.search.accepted import parameter_of
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.look import look
+from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.strained import loose_ones, strained
+from twin.diagnose.search.verdict import (
     CALIBRATED,
     _more_alike,
     limits_at,
     limits_of,
     rival_of,
     strained_of,
-    told,
     verdict_of,
 )
 
@@ -60,7 +61,7 @@ def test_limits_of_factors_are_factors():
         size for (family, unit, _, _), size in limits_at(detector).items() if (family, unit) == (gain.family, "1")
     )
     (limit,) = (x for x in limits_of(detector) if (x.family, x.unit) == (gain.family, "1"))
-    assert limit.smallest == pytest.approx(told("gain", at[0])) == pytest.approx(np.exp(at[0]))
+    assert limit.smallest == pytest.approx(OF_KIND["gain"].curve.told(at[0])) == pytest.approx(np.exp(at[0]))
     assert limit.largest == pytest.approx(np.exp(at[-1]))
 
 
@@ -153,8 +154,12 @@ def test_contacts_that_calibration_strains_are_told_with_what_they_became():
 )
 def test_what_one_more_part_of_a_warm_body_explains_is_not_unknown(causes, next_one, statistic, left, wanted):
     def start(name, statistic=500.0):
-        return SimpleNamespace(family="initial_state", name=name, statistic=statistic)
+        return SimpleNamespace(family="initial_state", kind="start", name=name, statistic=statistic)
 
     accepted = [SimpleNamespace(hypothesis=start(f"runs.a.{part}")) for part in "bcx"[:causes]]
-    found = SimpleNamespace(accepted=accepted, steps=[SimpleNamespace(ranked=(start(next_one, statistic),))])
+    found = SimpleNamespace(
+        detector=SimpleNamespace(policy=POLICY),
+        accepted=accepted,
+        steps=[SimpleNamespace(ranked=(start(next_one, statistic),))],
+    )
     assert _more_alike(found, left) == wanted

@@ -18,7 +18,7 @@ import numpy as np
 from tests.golden.compute import Values, command, flat, numbers
 from tests.hidden.found import QUICK, Said, made_detector, said
 from twin.build.workers import each
-from twin.diagnose.detector import Detector
+from twin.diagnose.search.detector import Detector
 
 LUMPED = Path(__file__).parents[1] / "diagnose" / "four_nodes"
 TRIALS = (  # nothing is hidden in the first two

@@ -12,17 +12,17 @@ from tests.hidden.trials import MODEL, STATES, trial
 from twin.build.cache import folder
 from twin.build.project import orthonormalise, project
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.channels_check import broken_sensors, stuck_sensors
-from twin.diagnose.coarse import Coarse, too_coarse
-from twin.diagnose.detector import Detector
-from twin.diagnose.diagnose import Settings, prepare
-from twin.diagnose.diagnosis import Cause, Verdict
-from twin.diagnose.gaps import emptied
-from twin.diagnose.search import search
-from twin.diagnose.study import with_measured
-from twin.diagnose.verdict import unknown_of, verdict_of, with_faults
-from twin.diagnose.whiten import measured_of
+from twin.diagnose.evidence.coarse import Coarse, too_coarse
+from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.model.study import with_measured
+from twin.diagnose.pipeline import Settings, prepare
+from twin.diagnose.result.diagnosis import Cause, Verdict
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.gaps import emptied
+from twin.diagnose.search.verdict import unknown_of, verdict_of, with_faults
 from twin.machine.load import load_machine
 from twin.rom.model import MachineModel
 

@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import binom
 
 from tests.hidden.trials import EXPERIMENT
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.diagnosis import Limit
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.result.diagnosis import Limit
 from twin.inject.judge.figures import goals, lower, per_family, recovered, several, upper
 from twin.inject.judge.match import Known, covered, effect, known_of, place_of, said, same_part, same_place, size_of
 from twin.inject.judge.page import confusion, mistakes, page

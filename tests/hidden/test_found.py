@@ -15,8 +15,8 @@ from tests.golden.compute import Values
 from tests.hidden.found import OWN, QUICK, SETTINGS, Said, made_detector, said
 from tests.hidden.trials import DRAWN, EXPERIMENT, STATES, TRIALS, expected
 from twin.build.workers import each
-from twin.diagnose.diagnose import Settings
-from twin.diagnose.verdict import limits_at, limits_of
+from twin.diagnose.pipeline import Settings
+from twin.diagnose.search.verdict import limits_at, limits_of
 from twin.inject.judge.match import effect, known_of, place_of, same_place
 
 KNOWN = known_of(EXPERIMENT)

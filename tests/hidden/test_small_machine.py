@@ -8,14 +8,14 @@ import pytest
 
 from tests.hidden import small
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.detector import Detector
-from twin.diagnose.diagnose import Settings, prepare
-from twin.diagnose.diagnosis import Cause, Verdict
-from twin.diagnose.search import search
-from twin.diagnose.study import with_measured
-from twin.diagnose.verdict import verdict_of
-from twin.diagnose.whiten import measured_of
+from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.model.study import with_measured
+from twin.diagnose.pipeline import Settings, prepare
+from twin.diagnose.result.diagnosis import Cause, Verdict
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.verdict import verdict_of
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 

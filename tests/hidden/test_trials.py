@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.hidden.trials import EXPERIMENT, MODEL, SIMULATED, TRIALS, TRUTH, expected, stored, trial
-from twin.diagnose.diagnosis import VERDICTS
+from twin.diagnose.result.diagnosis import VERDICTS
 from twin.inject.damage.kinds import DAMAGES
 from twin.inject.experiment import HOUR, RUNS
 from twin.inject.stored.files import Truth, measured

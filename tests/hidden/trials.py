@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from twin.diagnose.diagnosis import Verdict
+from twin.diagnose.result.diagnosis import Verdict
 from twin.inject.experiment import Experiment
 from twin.inject.hidden import Hidden, Trial
 from twin.inject.stored.recipe import trial_of

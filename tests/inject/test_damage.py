@@ -13,8 +13,8 @@ import pytest
 
 from tests.support.descriptions import MACHINES
 from twin.cli.main import run as twin
-from twin.diagnose.catalogue import FAMILIES
-from twin.diagnose.readings import _within_set
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.readings import _within_set
 from twin.errors import LogError, TwinError
 from twin.inject.damage.channels import Damage
 from twin.inject.damage.kinds import DAMAGES, damaged

@@ -67,7 +67,7 @@ def command(
     if output is None:
         raise TwinError("no folder for the report", "-o", "name one, for example -o out/diagnosis")
 
-    from twin.diagnose.extension import build_extension
+    from twin.diagnose.extend import build_extension
     from twin.progress import bar
 
     report = diagnose(artefact, runs, sealed, machine, options, output, bar).report(output, build=False)

@@ -14,10 +14,10 @@ from twin.progress import Progress, reporter
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from twin.diagnose.catalogue import Family
-    from twin.diagnose.diagnose import Result, Settings
-    from twin.diagnose.diagnosis import Cause
-    from twin.diagnose.diagnosis import Diagnosis as Findings
+    from twin.diagnose.faults.catalogue import Family
+    from twin.diagnose.pipeline import Result, Settings
+    from twin.diagnose.result.diagnosis import Cause
+    from twin.diagnose.result.diagnosis import Diagnosis as Findings
     from twin.face.machine import Machine
     from twin.face.model import Model
     from twin.logs.run import Run
@@ -42,13 +42,13 @@ class DiagnoseOptions:
 
     def families(self) -> tuple[Family, ...]:
         """The catalogue, with entries of one's own."""
-        from twin.diagnose.catalogue import FAMILIES, with_own
+        from twin.diagnose.faults.catalogue import FAMILIES, with_own
 
         return with_own(Path(self.catalogue)) if self.catalogue else FAMILIES
 
     def settings(self) -> Settings:
         """In SI."""
-        from twin.diagnose.diagnose import Settings
+        from twin.diagnose.pipeline import Settings
 
         return Settings(
             positive("noise", self.noise, "K"),
@@ -86,7 +86,7 @@ class Diagnosis:
         return self.findings.causes
 
     def __str__(self) -> str:
-        from twin.diagnose.report_page import summary_lines
+        from twin.diagnose.report.page import summary_lines
 
         return "\n".join(summary_lines(self.findings))
 
@@ -122,7 +122,7 @@ class Diagnosis:
 
         Raises TwinError where the folder holds what is read, or files of others.
         """
-        from twin.diagnose.extension import build_extension, write_extension
+        from twin.diagnose.extend import build_extension, write_extension
 
         target = Path(folder)
         _refuse(target, self.model, self.machine, self.runs)
@@ -149,7 +149,7 @@ class Report:
     @property
     def machine(self) -> Machine:
         """The extended machine. Raises DescriptionError where there is none."""
-        from twin.diagnose.extension import DESCRIPTION
+        from twin.diagnose.extend import DESCRIPTION
         from twin.face.machine import load
 
         return load(self.folder / DESCRIPTION)
@@ -157,14 +157,14 @@ class Report:
     @property
     def model(self) -> Model:
         """The extended model. Raises ArtefactError where there is none."""
-        from twin.diagnose.extension import ARTEFACT
+        from twin.diagnose.extend import ARTEFACT
         from twin.face.model import read
 
         return read(self.folder / ARTEFACT)
 
     def __str__(self) -> str:
-        from twin.diagnose.report_page import summary_lines
-        from twin.diagnose.report_plan import plan_lines
+        from twin.diagnose.report.page import summary_lines
+        from twin.diagnose.report.plan import plan_lines
 
         planned = plan_lines(self.findings.plan) if self.findings.plan else []
         return "\n".join([*summary_lines(self.findings), *planned, *self.said])
@@ -197,8 +197,8 @@ def diagnose(
     """
     import twin.run.jax_setup  # noqa: F401  isort: skip  first: it prepares JAX before NumPy is loaded
 
-    from twin.diagnose.diagnose import diagnose as search
-    from twin.diagnose.diagnose import machine_of
+    from twin.diagnose.pipeline import diagnose as search
+    from twin.diagnose.pipeline import machine_of
     from twin.face.machine import Machine
     from twin.face.model import read
 
@@ -228,8 +228,8 @@ def diagnose(
 
 def explained(family: str, options: DiagnoseOptions | None = None) -> str:
     """An entry of the catalogue in words, or all of them ("all"). Raises TwinError for an unknown one."""
-    from twin.diagnose.catalogue import explained as words
-    from twin.diagnose.catalogue import family as entry
+    from twin.diagnose.faults.catalogue import explained as words
+    from twin.diagnose.faults.catalogue import family as entry
 
     families = (options or DiagnoseOptions()).families()
     chosen = families if family == "all" else (entry(family, families),)
@@ -252,7 +252,7 @@ def _refuse_folder(folder: Path) -> None:
 
 def _refuse(folder: Path, model: Model, machine: Description, runs: Sequence[Run]) -> None:
     """Raises TwinError where the folder is no place for a report."""
-    from twin.diagnose.extension import refuse_target
+    from twin.diagnose.extend import refuse_target
 
     _refuse_folder(folder)
     refuse_target(folder, Path(model.source) if model.source else machine.folder, machine, runs)

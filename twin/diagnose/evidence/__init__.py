@@ -1,0 +1,1 @@
+"""What data can tell, whatever the cause: whitening, what calibration absorbs, model discrepancy, nulls, scores."""

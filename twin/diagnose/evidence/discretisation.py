@@ -1,0 +1,116 @@
+"""What another discretisation of the same machine would show: model discrepancy that is this machine's own.
+
+Two sensors beside one rail differ by 0.1 K between two meshes, and the nut of a ball screw sits between two elements:
+no drawn coefficient looks like that, and a joint or an expansion does. So the machine is described once more, with
+linear elements on its mesh, with bars of half the element size, with nodes that are not at one temperature, and what
+the measurements of both differ by is known in its shape, and unknown in its share.
+
+    y_other(x) - y(x) = d + D x,      share ~ N(0, 1)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.build.mesh_error import OF_LINEAR
+from twin.calibrate.fit.measured import Measured
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.study import Study, make_study
+from twin.diagnose.model.surrogate import Surrogate, jacobian_of
+from twin.logs.run import Run
+from twin.machine.check_lumped import VOLUMETRIC, node_capacity
+from twin.machine.description import Contact, Machine, Node
+from twin.progress import Progress, silent
+from twin.rom.parameter import Parameter
+
+FINER = 2  # times the elements of a bar: the half size of a Richardson extrapolation
+OF_BARS = 4.0 / 3.0  # of the difference to half the size: the error of linear elements, which goes with its square
+DIFFUSIVITY = 1.3e-5  # m^2/s, of steel and cast iron (VDI Heat Atlas, 2nd ed., D6.1)
+LONG = 2.0  # times the edge of a cube of its capacity that a node's heat has to go: machine parts are no cubes
+SPLIT_FROM = 120.0  # s, of a node's inside behind its surface: two steps of 60 s
+
+
+@dataclass(frozen=True)
+class Difference:
+    """m measurements, n parameters: another discretisation minus the described one, by one standard deviation."""
+
+    d: np.ndarray  # (m,) K, m, at the description
+    D: np.ndarray  # (m, n) by parameters in prior standard deviations
+
+    def at(self, x: np.ndarray) -> np.ndarray:
+        """(m,) at parameters x (n,)."""
+        return np.asarray(self.d + self.D @ x)
+
+
+def differences(
+    machine: Machine, study: Study, surrogate: Surrogate, parameters: Sequence[Parameter], runs: Sequence[Run],
+    plans: Sequence[Measured], progress: Progress = silent,
+) -> tuple[Difference, ...]:  # fmt: skip
+    """What other discretisations of a machine measure otherwise in the fitted runs of its study.
+
+    plans: without numbers. Raises ModelError and DescriptionError as assembling the machine does.
+    """
+    x = np.zeros(len(parameters))
+    J = surrogate.J * surrogate.rate(x)
+    found = []
+    for other, share, linear in _others(machine):
+        known = [_acting(p, other) for p in parameters]
+        probed = make_probed_model(other, known, runs, progress, linear)
+        of_other = make_study(probed, plans, study.fitted)
+        y = np.concatenate([of_other.outputs(k, x) for k in study.fitted])
+        found.append(Difference(share * (y - surrogate.y0), share * (jacobian_of(of_other, x) - J)))
+    return tuple(found)
+
+
+def _others(machine: Machine) -> Iterator[tuple[Machine, float, bool]]:
+    """Other discretisations: a machine, the share of its difference that is one standard deviation, linear elements."""
+    if not machine.lumped:
+        yield machine, OF_LINEAR, True
+    if machine.bars:
+        finer = {n: b.model_copy(update={"elements": FINER * b.elements}) for n, b in machine.bars.items()}
+        yield machine.model_copy(update={"bars": finer}), OF_BARS, False
+    if machine.nodes and (split := with_insides(machine)) is not machine:
+        yield split, 1.0, False
+
+
+def with_insides(machine: Machine) -> Machine:
+    """A lumped machine whose heavy nodes have an inside of half their capacity, behind half a path of conduction.
+
+    Heat crosses a body of length l in l^2 / (pi^2 a), the time constant of the slowest cosine (Carslaw and Jaeger,
+    Conduction of heat in solids, 2nd ed. 1959, 3.3); l is LONG times the edge of a cube of steel of its capacity.
+    """
+    nodes, contacts, expansion = dict(machine.nodes), dict(machine.contacts), dict(machine.tcp.expansion)
+    for name, node in machine.nodes.items():
+        capacity = node_capacity(machine, name)
+        settles = (LONG * (capacity / VOLUMETRIC) ** (1.0 / 3.0)) ** 2 / (np.pi**2 * DIFFUSIVITY)
+        inside = inside_of(name)
+        if settles < SPLIT_FROM or inside in machine.nodes or inside in machine.contacts:
+            continue
+        nodes[name] = Node(capacity=capacity / 2, area=node.area, position=node.position)
+        nodes[inside] = Node(capacity=capacity / 2)
+        contacts[inside] = Contact(kind="fixed", surfaces=(name, inside), total=capacity / (4.0 * settles))
+        if (row := machine.tcp.expansion.get(name)) is not None:
+            half = (row[0] / 2, row[1] / 2, row[2] / 2)
+            expansion[name], expansion[inside] = half, half
+    if len(nodes) == len(machine.nodes):
+        return machine
+    tcp = machine.tcp.model_copy(update={"expansion": expansion})
+    return machine.model_copy(update={"nodes": nodes, "contacts": contacts, "tcp": tcp})
+
+
+def inside_of(node: str) -> str:
+    """The name of its inside."""
+    return f"{node}--inside"
+
+
+def _acting(parameter: Parameter, other: Machine) -> Parameter:
+    """The parameter in another discretisation: a capacity is that of the inside, too, and each half of a node that
+    grows takes half of the change."""
+    insides = [inside_of(t) for t in parameter.targets if inside_of(t) in other.nodes]
+    if parameter.kind not in ("capacity", "expansion") or not insides:
+        return parameter
+    share = 0.5 if parameter.component >= 0 else 1.0
+    return replace(parameter, targets=(*parameter.targets, *insides), sigma=share * parameter.sigma)

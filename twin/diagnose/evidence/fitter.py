@@ -1,0 +1,75 @@
+"""Calibration without and with causes: what every synthetic and every measured set of data goes through alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from twin.diagnose.evidence.whiten import Projector, Whitener
+from twin.diagnose.model.study import Study
+from twin.diagnose.model.surrogate import Surrogate
+
+PASSES, INNER = 2, 4
+CLOSE = 0.03  # prior standard deviations
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Parameters, the residual linearised there, and the projector that belongs to it."""
+
+    x: np.ndarray  # (n,) in prior standard deviations
+    J: np.ndarray  # (m, n) there
+    residual: np.ndarray  # (m,) y - f(x) + J x; NaN where nothing was measured
+    projector: Projector
+    beside: np.ndarray | float = 0.0  # (m,) what accepted causes add to the outputs
+    more: np.ndarray | None = None  # (m, k) their white columns in the projector
+
+
+@dataclass(frozen=True)
+class Fitter:
+    """What a calibration needs."""
+
+    study: Study
+    surrogate: Surrogate
+    whiten: Whitener
+    others: np.ndarray  # (m, q) white nuisance columns besides the parameters: offsets, modes of model discrepancy
+
+    @cached_property
+    def gram(self) -> np.ndarray:
+        """(q, q) of the other columns: the same for all data."""
+        return np.asarray(self.others.T @ self.others)
+
+    def projector(self, J: np.ndarray, more: np.ndarray | None = None) -> Projector:
+        """For parameters with Jacobian J; more: white columns without prior (large variance), (m, k)."""
+        own = self.whiten(J) if more is None else np.hstack([self.whiten(J), more])
+        cross = own.T @ self.others
+        return Projector.of(np.hstack([own, self.others]), np.block([[own.T @ own, cross], [cross.T, self.gram]]))
+
+    def __call__(self, y: np.ndarray) -> Fitted:
+        """Most likely parameters of measurements y (m,), NaN where missing."""
+        low, high = bounds(self.study)
+        n = len(low)
+        x, offset = np.zeros(n), np.zeros(len(y))
+        for _ in range(PASSES):
+            before = x
+            for _ in range(INNER):
+                f, J = self.surrogate.at(x)
+                found = np.clip(self.projector(J).most_likely(self.whiten(y - offset - f + J @ x))[:n], low, high)
+                moved, x = float(np.abs(found - x).max(initial=0.0)), found
+                if moved < CLOSE:
+                    break
+            exact = np.concatenate([self.study.outputs(k, x) for k in self.study.fitted])
+            f, J = self.surrogate.at(x)
+            offset = exact - f
+            if np.abs(x - before).max(initial=0.0) < 5 * CLOSE:
+                break
+        return Fitted(x, J, y - exact + J @ x, self.projector(J))
+
+
+def bounds(study: Study) -> tuple[np.ndarray, np.ndarray]:
+    """Low and high (n,) of the parameters in prior standard deviations."""
+    ends = [(p.coordinate(p.low), p.coordinate(p.high)) for p in study.probed.parameters]
+    low, high = np.array(ends).reshape(-1, 2).T
+    return low, high

@@ -1,0 +1,113 @@
+"""Model discrepancy that is known by kind: nuisance columns with priors, from the same sizes that synthetic data use.
+
+What the modes of `detector` would have to learn from hundreds of synthetic measurements is mostly known beforehand:
+where a source's heat enters, each face's coefficient, each film's reaction to speed, each sensor's place, each zone's
+air, and each channel's own reading of every source. Only the rest is left to be learned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.diagnose.evidence.nulls import Form
+from twin.diagnose.evidence.whiten import Whitener
+from twin.diagnose.model.bank import Nominal
+from twin.diagnose.model.study import Study
+
+CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
+READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
+LEAST = 0.7  # standard deviations over all its rows that a direction of a channel's readings must have
+
+
+@dataclass(frozen=True)
+class Described:
+    """What the elementary causes of a machine say of its form, of raw responses (m, n) in physical units."""
+
+    columns: np.ndarray  # (m, k) of unit prior variance
+    slow: tuple[np.ndarray, ...]  # per film the columns of its coefficient in every block, of raw
+    blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first fine step, end)
+
+
+def known_forms(
+    study: Study, described: Described, nominal: tuple[Nominal, ...], raw: np.ndarray, J: np.ndarray, wind: np.ndarray,
+    whiten: Whitener, form: Form,
+) -> np.ndarray:  # fmt: skip
+    """White columns (m, k) of unit prior variance; raw (m, n) responses in physical units, J (m, n_parameters).
+
+    wind (m, w): columns of `windy`.
+    """
+    columns = np.hstack([described.columns, _aside(study, nominal, len(J), form)])
+    parts = [whiten(np.hstack([columns, wind]))] if columns.shape[1] else []
+    parts += _wobbles(study, described, raw, whiten, form)
+    return np.hstack([*parts, *_readings(study, J, whiten, form)]) if parts else np.zeros((len(J), 0))
+
+
+def _aside(study: Study, nominal: tuple[Nominal, ...], m: int, form: Form) -> np.ndarray:
+    """(m, k): every sensor some millimetres beside where it is described."""
+    probed = study.probed
+    (body,) = probed.base.bodies
+    first = {k: sum(study.runs[i].size for i in study.fitted if i < k) for k in study.fitted}
+    columns = []
+    for s in range(len(probed.base.sensors)):
+        moved = np.zeros(m)
+        for k in study.fitted:
+            planned = study.runs[k]
+            read = planned.measured
+            if s in read.column:
+                i = int(np.flatnonzero(read.column == s)[0])
+                own = read.mean_of @ (nominal[k].states @ (probed.displaced[s] - body.C[s]))
+                (b, n), _ = planned.shapes
+                moved[first[k] + np.arange(b) * n + i] = form.aside * own
+        if np.any(moved):
+            columns.append(moved)
+    return np.stack(columns, axis=1) if columns else np.zeros((m, 0))
+
+
+def _wobbles(study: Study, described: Described, raw: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
+    """Per film the leading directions of its slow variation within runs."""
+    blocks = described.blocks
+    run = np.array([i for i, _, _ in blocks])
+    when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)
+    time = study.runs[study.fitted[0]].run.drive.time
+    memory = form.shape_time / (time[1] - time[0])
+    R = np.exp(-0.5 * ((when[:, None] - when) / memory) ** 2) * (run[:, None] == run)
+    root = np.linalg.cholesky(R + 1e-6 * np.eye(len(R)))
+    result = []
+    for own in described.slow:
+        U, s, _ = np.linalg.svd(whiten(form.shape * raw[:, own].astype(float) @ root), full_matrices=False)
+        kept = s > LEAST
+        result.append(U[:, kept] * s[kept])
+    return result
+
+
+def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.ndarray:
+    """(m, k) columns of unit prior variance: every channel's own error of a white response (m,)."""
+    label = np.concatenate([_labels(study, k) for k in study.fitted])
+    columns = [np.where(label == channel, share * white, 0.0) for channel in np.unique(label)]
+    kept = [c for c in columns if np.linalg.norm(c) > LEAST]
+    return np.stack(kept, axis=1) if kept else np.zeros((len(white), 0))
+
+
+def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
+    """Per channel the leading directions of what sources and contacts do to it, in all runs."""
+    own = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
+    white = whiten(form.reading * J[:, own] / study.scale[own])
+    label = np.concatenate([_labels(study, k) for k in study.fitted])
+    result = []
+    for channel in np.unique(label):
+        rows = np.flatnonzero(label == channel)
+        U, s, _ = np.linalg.svd(white[rows], full_matrices=False)
+        kept = s > LEAST
+        block = np.zeros((len(white), int(kept.sum())))
+        block[rows] = U[:, kept] * s[kept]
+        result.append(block)
+    return result
+
+
+def _labels(study: Study, k: int) -> np.ndarray:
+    """(size,) which channel every number of a run is of: sensors by number, TCP components -1 to -3."""
+    planned = study.runs[k]
+    (b, _), (rows, _) = planned.shapes
+    return np.concatenate([np.tile(planned.measured.column, b), np.tile([-1, -2, -3], rows)])

@@ -1,0 +1,266 @@
+"""Synthetic measurements of a machine without any hidden cause, by a model that differs from the twin in its form.
+
+On the user's own loads: parameters drawn from their tolerances, and besides them everything that no parameter stands
+for: coefficients that differ from face to face and with load, heat that enters partly beside where it is described,
+sensors some millimetres off and with their own reading of every source, air that fluctuates locally, parts that do not
+start equally warm, white noise. What the twin's calibration leaves of these measurements is the null distribution of
+every statistic: model discrepancy is learned from some of them, thresholds from the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.build.places import beside
+from twin.diagnose.evidence.discretisation import Difference
+from twin.diagnose.model.integration import INNER
+from twin.diagnose.model.slots import Slots
+from twin.diagnose.model.sources import heated_places, own_place
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.spot import Spot
+from twin.machine.description import Machine
+from twin.run.system import Array
+
+SPREAD = 0.6  # of parameters, in prior standard deviations: tolerances are stated with care
+# of the logarithm of a contact's conductance in a lumped machine, beyond its tolerance (chosen among 0, 0.2 and 0.5 on
+# the drawn networks of even seeds 0 to 20)
+LUMPED = 0.2
+EXPONENTS = (0.5, 0.8)  # of speeds in films: from laminar to turbulent
+
+
+@dataclass(frozen=True)
+class Form:
+    """How wrong the form of a description may be; standard deviations."""
+
+    local_film: float = 0.12  # of each face's coefficient against its group's
+    shape: float = 0.05  # of a film group's coefficient, slowly varying within a run
+    shape_time: float = 5400.0  # s, over which it does
+    wind: float = 0.25  # of a film group's coefficient at the top speed of its law against that at rest
+    contact: float = 0.5  # of the logarithm of a contact's conductance beyond its tolerance: the mesh at its patch
+    beside: float = 0.02  # share of a source's heat that enters another face of its part
+    lump: float = 3000.0  # J/K, at the patch of a source: how far its heat reaches at once
+    aside: float = 0.4  # of 8 mm, by which sensors are off
+    reading: float = 0.02  # of what every source and every contact does to every channel
+    air: float = 0.12  # K, fluctuation of a zone's air
+    air_time: float = 1500.0  # s, its memory
+    start: float = 0.10  # K, of the machine's initial temperature
+    start_apart: float = 0.03  # K, of single parts on top
+    offset: float = 0.05  # K, of sensors
+    tcp_zero: float = 0.3e-6  # m
+
+
+def form_of(machine: Machine) -> Form:
+    """That of a machine: a lumped one has no mesh at the patch of a contact."""
+    return Form(contact=LUMPED) if machine.lumped else Form()
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """White noise of single readings."""
+
+    temperature: float = 0.1  # K
+    tcp: float = 1e-6  # m
+
+
+def null(
+    study: Study, J: list[np.ndarray], seed: int, instruments: Instruments, form: Form = Form(), spread: float = SPREAD,
+    differences: Sequence[Difference] = (),
+) -> np.ndarray:  # fmt: skip
+    """Measurements (m,) of the fitted runs without a cause; NaN where the plan has none. J: nominal Jacobians by run.
+
+    spread: of the parameters, in prior standard deviations.
+    """
+    rng = np.random.default_rng([seed, 17])
+    probed = study.probed
+    x = spread * np.clip(rng.standard_normal(len(probed.parameters)), -2.5, 2.5)
+    (body,) = probed.base.bodies
+    load = probed.base.load_model
+    local = np.clip(form.local_film * rng.standard_normal(len(probed.places)), -0.8, 0.8)
+    contact = np.expm1(form.contact * np.clip(rng.standard_normal(study.slots(0).contact.shape[2]), -2.0, 2.0))
+    joint = np.expm1(form.contact * np.clip(rng.standard_normal(len(load.joints)), -2.0, 2.0))
+    split = [_beside(study, j, rng, form) for j in range(len(load.sources))]
+    E = np.zeros_like(body.A0)
+    for place in heated_places(study):
+        lump = lump_of(study, place, form) * float(np.clip(rng.standard_normal(), -1.8, 1.8))
+        E += lump * np.outer(probed.B[place], probed.B[place])
+    wind = form.wind * rng.standard_normal(len(load.films))
+    exponent = rng.uniform(*EXPONENTS, len(load.films))
+    readings = _readings(study, J, rng, form)
+    aside = form.aside * rng.standard_normal(len(probed.base.sensors))
+    offset = form.offset * rng.standard_normal(len(probed.base.sensors))
+    parts = []
+    for i, k in enumerate(study.fitted):
+        planned = study.runs[k]
+        slots = study.slots(k)
+        n = slots.gate.shape[0]
+        run = planned.run
+        films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in probed.places])
+        air = run.drive.environment.reshape(n, INNER, -1)
+        usual = typical(study, k)
+        A, M, rise = np.zeros_like(body.A0), np.zeros(body.n), np.zeros((n, INNER))
+        for p in np.flatnonzero(films >= 0):
+            strength = local[p] * usual[films[p]]
+            A += strength * probed.A[p]
+            M += strength * probed.M[p]
+        surround = air[:, :, load.surroundings] - probed.base.reference_temperature
+        rise[:] = surround
+        slow = _smooth(rng, n, len(load.films), form.shape_time / (INNER * (run.drive.time[1] - run.drive.time[0])))
+        wobble = form.shape * slow + wind * winds(study, k, exponent)
+        forcing = np.zeros((n, INNER, body.n))
+        for j, vector in enumerate(split):
+            if vector is not None:
+                forcing += _power(study, k, j)[:, :, None] * vector
+        fluctuation = _ornstein(rng, n * INNER, len(load.environments), form.air_time / 60.0) * form.air
+        initial = form.start * rng.standard_normal() * body.one if not run.stated_start else np.zeros(body.n)
+        initial = initial + form.start_apart * _body_starts(study, rng)
+        filled = Slots(
+            A=_first(slots.A, A), M=_first(slots.M, M), E=_first(slots.E, E), B=slots.B, reads=slots.reads,
+            gate=_row(slots.gate, 1.0), rise=_fill(slots.rise, rise), forcing=_fill(slots.forcing, forcing),
+            film=_row(slots.film, wobble),
+            joint=_row(slots.joint, joint), contact=_row(slots.contact, contact),
+            environment=_fill(slots.environment, fluctuation.reshape(n, INNER, -1)),
+            initial=_first(slots.initial, initial),
+        )  # fmt: skip
+        m = planned.measured
+        states = study.states(k, x, filled, (1.0,))
+        T, w = study.read(k, states, x)
+        own_T, own_w = planned.split(readings[i])
+        T, w = T + own_T, w + own_w
+        moved = m.mean_of @ (states @ (probed.displaced - body.C).T)[:, m.column]
+        count = np.where(m.count > 0, m.count, 1.0)
+        T = T + aside[m.column] * moved + offset[m.column]
+        T = T + instruments.temperature / np.sqrt(count) * rng.standard_normal(T.shape)
+        row_sigma = instruments.tcp / m.row_weight(instruments.tcp)
+        w = w + row_sigma[:, None] * rng.standard_normal(w.shape) + form.tcp_zero * rng.standard_normal(3)
+        parts.append(np.concatenate([T.ravel(), w.ravel()]))
+    y = np.concatenate(parts)
+    for difference in differences:
+        y = y + rng.standard_normal() * difference.at(x)
+    return y
+
+
+def _first(zeros: Array, value: np.ndarray) -> np.ndarray:
+    result = np.array(zeros)
+    result[0] = value
+    return result
+
+
+def _fill(zeros: Array, value: np.ndarray) -> np.ndarray:
+    result = np.array(zeros)
+    result[:, :, 0] = value
+    return result
+
+
+def _row(zeros: Array, value: np.ndarray | float) -> np.ndarray:
+    result = np.array(zeros)
+    result[:, 0] = value
+    return result
+
+
+def _ornstein(rng: np.random.Generator, n: int, columns: int, memory: float) -> np.ndarray:
+    """Unit Ornstein-Uhlenbeck noise (n, columns) with a memory of so many steps."""
+    phi = float(np.exp(-1.0 / memory))
+    white = rng.standard_normal((n, columns))
+    result = np.empty_like(white)
+    state = white[0]
+    for i in range(n):
+        state = phi * state + np.sqrt(1 - phi**2) * white[i]
+        result[i] = state
+    return result
+
+
+def _smooth(rng: np.random.Generator, n: int, columns: int, memory: float) -> np.ndarray:
+    """Unit Gaussian noise (n, columns), correlated as exp(-d^2 / (2 memory^2)) over d steps."""
+    steps = np.arange(n)
+    R = np.exp(-0.5 * ((steps[:, None] - steps) / memory) ** 2)
+    return np.asarray(np.linalg.cholesky(R + 1e-6 * np.eye(n)) @ rng.standard_normal((n, columns)))
+
+
+def winds(study: Study, k: int, exponent: np.ndarray) -> np.ndarray:
+    """(n, n_films) 0 .. 1: how fast the air of each film moves, as its law hears, to the exponent (n_films,); 0 for
+    films that hear no speed."""
+    load, run = study.probed.base.load_model, study.runs[k].run
+    units = {s.name: s.unit for s in load.signals}
+    n = run.drive.n_steps // INNER
+    result = np.zeros((n, len(load.films)))
+    for f, film in enumerate(load.films):
+        for signal in film.use.signals.values():
+            values = run.signals.get(signal)
+            if units.get(signal) in ("m/s", "1/s") and values is not None and np.any(values):
+                fast = (np.abs(values) / np.abs(values).max()) ** exponent[f]
+                result[:, f] = fast.reshape(n, INNER).mean(axis=1)
+    return result
+
+
+def typical(study: Study, k: int) -> np.ndarray:
+    """(n_films,) W/(m^2 K): the mean convection of each film in a run, at a rise of a few kelvin."""
+    drive = study.runs[k].run.drive
+    load = study.probed.base.load_model
+    result = drive.theta[:, : len(load.films)].mean(axis=0)
+    middle = drive.films.value.shape[2] // 2 + 15
+    result[list(drive.films.index)] = drive.films.value[:, :, middle].mean(axis=0)
+    return result
+
+
+def _power(study: Study, k: int, source: int) -> np.ndarray:
+    """(n, m) W of a source in a run, at a winding of 30 degC where its law follows one."""
+    drive = study.runs[k].run.drive
+    if source in drive.losses.index:
+        i = drive.losses.index.index(source)
+        place = int(np.searchsorted(drive.losses.grid, 30.0))
+        power = drive.losses.value[:, i, place]
+    else:
+        power = drive.power[:, source]
+    return power.reshape(-1, INNER)
+
+
+def lump_of(study: Study, place: int, form: Form) -> float:
+    """J/K by which the patch of a source may differ: half of what follows it at once, where that is less."""
+    (body,) = study.probed.base.bodies
+    b = study.probed.B[place]
+    return float(min(form.lump, 0.5 / (b @ np.linalg.solve(body.E, b))))
+
+
+def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> np.ndarray | None:
+    """What of 1 W of a source enters elsewhere: (r,); None for contacts and machines without places beside it."""
+    probed = study.probed
+    (body,) = probed.base.bodies
+    if probed.base.load_model.sources[source].contact:
+        return None
+    B, own = body.B[:, body.sources.index(source)], own_place(study, source)
+    near = [p for p in beside(probed.places, own) if not Spot.read(probed.places[p].name).pad]
+    share = abs(form.beside * rng.standard_normal())
+    if not near:
+        return None
+    closeness = np.array([max(float(probed.B[p] @ B), 0.0) for p in near]) + 1e-12
+    chosen = int(rng.choice(len(near), p=closeness / closeness.sum()))
+    return np.asarray(share * (probed.B[near[chosen]] - B))
+
+
+def _body_starts(study: Study, rng: np.random.Generator) -> np.ndarray:
+    """(r,) the members by a random kelvin each."""
+    (body,) = study.probed.base.bodies
+    if body.E_members is None:
+        return np.zeros(body.n)
+    weights = rng.standard_normal(len(body.members))
+    return np.asarray(np.tensordot(weights, body.E_members @ body.one, 1))
+
+
+def _readings(study: Study, J: list[np.ndarray], rng: np.random.Generator, form: Form) -> list[np.ndarray]:
+    """Per fitted run (size,): each channel's own error of what every source and contact does to it."""
+    sources = [i for i, p in enumerate(study.probed.parameters) if p.kind in ("source", "contact", "joint")]
+    sigma = study.scale[sources]
+    names = study.probed.base.sensors
+    of_sensor = form.reading * rng.standard_normal((len(names), len(sources)))
+    of_tcp = form.reading * rng.standard_normal((3, len(sources)))
+    result = []
+    for jac, k in zip(J, study.fitted, strict=True):
+        planned = study.runs[k]
+        T, w = planned.split(jac[:, sources] / sigma)
+        T = T * of_sensor[planned.measured.column]
+        w = w * of_tcp
+        result.append(np.concatenate([T.sum(axis=2).ravel(), w.sum(axis=2).ravel()]))
+    return result

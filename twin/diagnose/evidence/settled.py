@@ -1,0 +1,80 @@
+"""The calibration that is delivered: parameters that predict, with and without the causes that were named.
+
+What finds causes weighs residuals by all that model discrepancy can do, and leaves to it what it can explain: right for
+tests, but a model that keeps its parameters and forgets that discrepancy predicts badly. Here model discrepancy is
+noise that lasts as long as a run: a channel of a run counts about once, however often it was read, and the rest is
+left to the tolerances. The fit begins at the description, so that of two calibrations alike the nearer one is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from twin.diagnose.evidence.fitter import CLOSE, Fitter, bounds
+from twin.diagnose.model.study import Study
+
+PASSES, INNER = 3, 6
+LONGEST = 1.0  # prior standard deviations, of a step
+ANY = 10.0  # prior standard deviations, of a parameter without tolerance: more than its bounds are apart
+
+Outputs = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def settled_alone(fitter: Fitter, y: np.ndarray, free: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters (n,) in prior standard deviations of measurements y (m,) without a cause, and their covariance (n, n).
+
+    free: parameters that have no tolerance: the data and the tolerances of all others decide.
+    """
+    study = fitter.study
+
+    def left(x: np.ndarray) -> np.ndarray:
+        return fitter.whiten(y - np.concatenate([study.outputs(k, x) for k in study.fitted]))
+
+    return settle(fitter, fitter.surrogate.at, left, free)
+
+
+def settle(
+    fitter: Fitter, outputs: Outputs, left: Callable[[np.ndarray], np.ndarray], free: Sequence[int] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters (n,) that leave least, and their covariance (n, n).
+
+    outputs: x -> (m,), (m, n), nearly; left: x -> (m,) white, exactly. The covariance counts model discrepancy as
+    what it is: A (P + J^T W (1 + N N^T) W J) A with A = (P + J^T W J)^-1 (White, Econometrica 48, 1980, on
+    such sandwiches).
+    """
+    study, whiten = fitter.study, fitter.whiten
+    low, high = bounds(study)
+    N = fitter.others
+    W = 1.0 / (1.0 + _rows(study) * (N**2).sum(axis=1))
+    precision = np.ones(len(low))
+    precision[list(free)] = ANY**-2.0
+    P = np.diag(precision)
+    x = np.zeros(len(low))
+    for _ in range(PASSES):
+        before = x
+        white_left, there = left(x), outputs(x)[0]
+        for _ in range(INNER):
+            f, J = outputs(x)
+            white = whiten(J)
+            A = np.linalg.inv(P + white.T @ (W[:, None] * white))
+            found = A @ (white.T @ (W * (white_left + whiten(there - f + J @ x))))
+            step = np.clip(np.clip(found, low, high) - x, -LONGEST, LONGEST)
+            x = x + step
+            if np.abs(step).max(initial=0.0) < CLOSE:
+                break
+        if np.abs(x - before).max(initial=0.0) < 3 * CLOSE:
+            break
+    weighted = W[:, None] * white
+    crossed = N.T @ weighted
+    return x, A @ (P + weighted.T @ weighted + crossed.T @ crossed) @ A
+
+
+def _rows(study: Study) -> np.ndarray:
+    """(m,) how many numbers the channel of each number has in its run."""
+    parts = []
+    for k in study.fitted:
+        (bins, sensors), (rows, _) = study.runs[k].shapes
+        parts += [np.full(bins * sensors, float(bins)), np.full(3 * rows, float(rows))]
+    return np.concatenate(parts) if parts else np.zeros(0)

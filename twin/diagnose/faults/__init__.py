@@ -1,0 +1,1 @@
+"""What may be wrong with a simulation: candidates, responses and exact terms of every family."""

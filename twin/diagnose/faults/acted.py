@@ -1,0 +1,78 @@
+"""Hypotheses as slots of the time integration: the exact model with a cause switched on, for refits and for the sealed
+run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.diagnose.evidence import bells
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.faults.elements import Elements
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.slots import Slots
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Window
+
+
+def units_of(study: Study, h: Hypothesis) -> tuple[Unit, ...]:
+    """The amplitudes of a hypothesis in every run of the study, the sealed one included; none for readings.
+
+    Histories of logged signals and the sun go on in the sealed run; windows are there only where the hypothesis lasts.
+    """
+    return fault_of(h).units(h, lambda which: _shapes(study, h, which))
+
+
+def _shapes(study: Study, h: Hypothesis, which: int) -> tuple[np.ndarray, ...]:
+    """Of the amplitude `which`."""
+    when = h.when
+    result = []
+    for k, planned in enumerate(study.runs):
+        run = planned.run
+        n = run.drive.n_steps
+        if when.windows:
+            shape, t = np.zeros(n), np.asarray(run.drive.time)
+            if when.bell is not None:  # an amplitude per run, the mean of them in others
+                middle = (t[:-1] + t[1:]) / 2 - t[0]
+                if k == study.fitted[which]:
+                    shape = when.bell.level(middle, which)
+                elif k not in study.fitted:
+                    shape = bells.level(middle, when.bell.middle, when.bell.length) / len(study.fitted)
+            else:
+                for w in when.windows:
+                    if w.run == run.name:
+                        within = np.clip(np.minimum(t[1:], w.end) - np.maximum(t[:-1], w.start), 0.0, None)
+                        shape += w.level * within / (t[1] - t[0])
+            if when.bell is None and k not in study.fitted and _lasts(study, when.windows):
+                shape[:] = 1.0
+        elif when.signal:
+            values = run.signals.get(when.signal)
+            shape = np.zeros(n) if values is None else np.abs(values / when.reference) ** when.exponent
+        else:
+            shape = np.ones(n)
+        result.append(shape)
+    return tuple(result)
+
+
+def _lasts(study: Study, windows: Sequence[Window]) -> bool:
+    """Whether windows end with the last fitted run: the cause has come to stay."""
+    last = study.runs[study.fitted[-1]].run
+    end = last.drive.time[-1] - last.drive.time[0]
+    return (
+        any(w.run == last.name and w.end >= end - 1.0 for w in windows)
+        and len(windows) > 0
+        and all(w.level == 1.0 for w in windows)
+    )
+
+
+def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) -> Slots:
+    """The slots of run k with these amplitudes, in their order. Raises ValueError for more than there are slots."""
+    slots = study.slots(k)
+    if len(units) > slots.gate.shape[1]:
+        raise ValueError("more amplitudes than slots")
+    for s, unit in enumerate(units):
+        unit.fault.fill(slots, s, unit, k, study, elements)
+    return slots

@@ -1,0 +1,375 @@
+"""Elementary causes: every (kind, place, history) whose first-order response the bank holds.
+
+Kinds by what they do to the model x' = A(theta) x + B(theta) u, y = C x:
+
+    heat     P          B_p s(t)                              1 W
+    film     p          s(t) (-A_p x + M_p (T_air - T_ref))   1 W/(m^2 K) more on a surface
+    group    f          s(t) h_f (-A_f x + M_f (...))         100 % more of a film's convection
+    zone     f          s(t) h_f M_f                          1 K warmer air at a film
+    air      e          s(t) sum_f h_f M_f                    1 K warmer air of an environment
+    gradient e          sum_f h_f H_f                         1 K/m
+    joint    j, contact c                                     100 % more conductance
+    capacity p          -b_p b_p^T x'                         1 J/K
+    source   j          s(t) B_j                              1 W of another history at a source
+    moved    j>p        P_j(t) (B_p - B_j)                    all of a source's heat elsewhere
+    signal   q*f                                              a load channel times a factor
+    start    m          T(0) of a member                      1 K
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.build.places import beside
+from twin.diagnose.model.bank import Column, Nominal
+from twin.diagnose.model.integration import INNER, gammas
+from twin.diagnose.model.sources import own_place
+from twin.diagnose.model.study import Study
+from twin.rom.drive import Drive, evaluate
+from twin.rom.following import read_table, temperature_place
+from twin.run.system import System
+
+BLOCK = 3600.0  # s
+FACTORS = (0.5, 2.0, 2.0**0.5, 0.5**0.5, 3.0**0.5, 3.0**-0.5, 60.0, 1 / 60.0)
+EXPONENT = 0.6  # of speeds in forced convection
+LAWS = (1.0, 5.0 / 3.0, 2.0, 8.0 / 3.0)  # exponents of speeds in losses
+
+Key = tuple[str, str, str]  # kind, place, history
+
+
+@dataclass(frozen=True)
+class Histories:
+    """Named histories s(t) of order one, per run of the study (n_fine,); the sealed ones have no blocks."""
+
+    signals: dict[str, tuple[np.ndarray, ...]]  # "spindle_speed^1.67": of losses
+    speeds: dict[str, tuple[np.ndarray, ...]]  # "x_speed^0.6": of convection
+    blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first fine step, end)
+    unit: dict[str, tuple[str, float, float]]  # history -> signal, exponent, value [SI] at which s = 1
+    same: dict[str, str]  # signal -> the one of its shape that stands for it
+
+
+@dataclass(frozen=True)
+class Elements:
+    """All elementary causes of a study with what the time integration needs."""
+
+    histories: Histories
+    vectors: tuple[tuple[np.ndarray, ...], ...]  # per run of the study: (r,) or (n_fine, r) each
+    columns: tuple[Column, ...]
+    index: dict[Key, int]  # of the columns
+    block_of: dict[tuple[str, str], np.ndarray]  # (kind, place) -> indices of its block columns
+
+    @property
+    def heat_blocks(self) -> dict[str, np.ndarray]:
+        """Place -> its block columns of heat."""
+        return {place: own for (kind, place), own in self.block_of.items() if kind == "heat"}
+
+
+FORCINGS = frozenset({"zone", "gradient", "signal"})  # kinds whose vectors exact refits step; others have slots
+
+
+def slim(elements: Elements) -> Elements:
+    """Without the vectors that nothing needs once the responses are there: a tenth of the memory."""
+    needed = {elements.columns[c].vector for (kind, _, _), c in elements.index.items() if kind in FORCINGS}
+    none = np.zeros((0, 0), dtype=np.float32)
+    vectors = tuple(
+        tuple(v if v.ndim == 1 else v.astype(np.float32) if i in needed else none for i, v in enumerate(of_run))
+        for of_run in elements.vectors
+    )
+    return replace(elements, vectors=vectors)
+
+
+def histories_of(study: Study) -> Histories:
+    """Histories of the logged signals that tell how hard a drive works, and blocks of an hour."""
+    load = study.probed.base.load_model
+    runs = [planned.run for planned in study.runs]
+    positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
+    units = {s.name: s.unit for s in load.signals}
+    bounds = {s.name: max(abs(s.low), abs(s.high)) for s in load.signals}
+    n = [run.drive.n_steps for run in runs]
+    signals: dict[str, tuple[np.ndarray, ...]] = {"always": tuple(np.ones(k) for k in n)}
+    speeds: dict[str, tuple[np.ndarray, ...]] = {}
+    unit: dict[str, tuple[str, float, float]] = {"always": ("", 1.0, 1.0)}
+
+    def add(table: dict[str, tuple[np.ndarray, ...]], name: str, signal: str, exponent: float, scale: float) -> None:
+        values = tuple(np.abs(run.signals[signal] / scale) ** exponent for run in runs)
+        if max(float(v.max()) for v in values) > 0.02:
+            table[name] = values
+            unit[name] = (signal, exponent, scale)
+
+    seen: dict[str, np.ndarray] = {}
+    same: dict[str, str] = {}
+    for signal in units:
+        if signal in positions or any(signal not in run.signals for run in runs):
+            continue
+        whole = np.abs(np.concatenate([run.signals[signal] for run in runs]))
+        top = float(whole.max())
+        if top <= 1e-9 * max(bounds[signal], 1e-30):
+            continue
+        shape = whole / top
+        same[signal] = next((name for name, other in seen.items() if np.abs(shape - other).max() < 1e-3), signal)
+        if same[signal] != signal:
+            continue  # motor speed and axis speed are one history
+        seen[signal] = shape
+        if units[signal] == "A":
+            add(signals, f"{signal}^2", signal, 2.0, top)
+        elif units[signal] in ("m/s", "1/s"):
+            exponents = (1.0, 5.0 / 3.0) if units[signal] == "1/s" else (1.0,)
+            for e in exponents:
+                add(signals, f"{signal}^{e:.2f}" if e != 1.0 else signal, signal, e, top)
+            add(speeds, f"{signal}^{EXPONENT:g}", signal, EXPONENT, top)
+        elif units[signal] in ("W", "1"):
+            add(signals, signal, signal, 1.0, top)
+    blocks = []
+    for i, run in enumerate(runs[: len(study.fitted)]):
+        per = max(INNER, round(BLOCK / (run.drive.time[1] - run.drive.time[0])))
+        edges = list(range(0, run.drive.n_steps, per))
+        if run.drive.n_steps - edges[-1] < per / 2 and len(edges) > 1:
+            edges.pop()
+        blocks += [(i, a, b) for a, b in zip(edges, [*edges[1:], run.drive.n_steps], strict=True)]
+    return Histories(signals, speeds, tuple(blocks), unit, same)
+
+
+def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
+    """Every elementary cause of a study; nominal: of all its runs."""
+    probed, load = study.probed, study.probed.base.load_model
+    (body,) = probed.base.bodies
+    system = probed.system
+    histories = histories_of(study)
+    runs = [planned.run for planned in study.runs]
+    n = [run.drive.n_steps for run in runs]
+    vectors: list[list[np.ndarray]] = [[] for _ in runs]
+    columns: list[Column] = []
+    index: dict[Key, int] = {}
+    block_of: dict[tuple[str, str], np.ndarray] = {}
+
+    def vector(of: Sequence[np.ndarray]) -> int:
+        for own, v in zip(vectors, of, strict=True):
+            own.append(np.asarray(v))
+        return len(vectors[0]) - 1
+
+    def column(key: Key, v: int, history: Sequence[np.ndarray | None]) -> None:
+        index[key] = len(columns)
+        columns.append(Column(v, tuple(history)))
+
+    def blocks(kind: str, place: str, v: int) -> None:
+        first = len(columns)
+        for b, (i, start, end) in enumerate(histories.blocks):
+            gate = np.zeros(n[i])
+            gate[start:end] = 1.0
+            column((kind, place, f"block {b}"), v, [gate if j == i else None for j in range(len(runs))])
+        block_of[kind, place] = np.arange(first, len(columns))
+
+    always = histories.signals["always"]
+    z = [own.middle for own in nominal]
+    films = [f.name for f in load.films]
+    air = [run.drive.environment - probed.base.reference_temperature for run in runs]
+    film_env = [f.environment for f in load.films]
+    A, M = np.asarray(system.A[0]), np.asarray(system.M)
+    # heat and film at places
+    for p, place in enumerate(probed.places):
+        v = vector([probed.B[p]] * len(runs))
+        for name, history in histories.signals.items():
+            column(("heat", place.name, name), v, history)
+        blocks("heat", place.name, v)
+        e = film_env[films.index(place.film)] if place.film else load.surroundings
+        v = vector([-x @ probed.A[p].T + a[:, [e]] * probed.M[p] for x, a in zip(z, air, strict=True)])
+        column(("film", place.name, "always"), v, always)
+        for name, history in histories.speeds.items():
+            column(("film", place.name, name), v, history)
+        blocks("film", place.name, v)
+        b = probed.B[p]
+        v = vector([-np.outer(np.diff(own.states @ b, axis=0) * own.rate, b) for own in nominal])
+        column(("capacity", place.name, "always"), v, always)
+    for f, name in enumerate(films):
+        flow = [-x @ A[f].T + own.outer[:, [f]] * M[:, f] for x, own in zip(z, nominal, strict=True)]
+        v = vector([own.convection[:, [f]] * q for own, q in zip(nominal, flow, strict=True)])
+        column(("group", name, "always"), v, always)
+        blocks("group", name, v)
+        v = vector(flow)
+        for speed, history in histories.speeds.items():
+            column(("group_film", name, speed), v, history)
+        v = vector([own.total[:, [f]] * M[:, f] for own in nominal])
+        column(("zone", name, "always"), v, always)
+        blocks("zone", name, v)
+    for e, environment in enumerate(load.environments):
+        own_films = [f for f in range(len(films)) if film_env[f] == e]
+        v = vector([own.total[:, own_films] @ M[:, own_films].T for own in nominal])
+        blocks("air", environment.name, v)
+        lifted = probed.H[:, own_films] - pivot(study, e) * M[:, own_films]
+        if np.abs(probed.H[:, own_films]).max(initial=0.0) > 0.0:
+            v = vector([own.convection[:, own_films] @ lifted.T for own in nominal])
+            column(("gradient", environment.name, "always"), v, always)
+    for j, joint in enumerate(load.joints):
+        term = A[len(films) + j]
+        conductance = [np.asarray(run.drive.theta)[:, [len(films) + j]] for run in runs]
+        v = vector([-k * (x @ term.T) for k, x in zip(conductance, z, strict=True)])
+        blocks("joint", joint.name, v)
+    for c, name in enumerate(probed.base.load_model.contacts):
+        v = vector([_contact_flow(study, k, c, x) for k, x in enumerate(z)])
+        blocks("contact", name, v)
+    powers = [_powers(study, k, own) for k, own in enumerate(nominal)]
+    for j, source in enumerate(load.sources):
+        if source.contact:
+            continue
+        B = body.B[:, body.sources.index(j)]
+        v = vector([B] * len(runs))
+        for name, history in _law_histories(study, j, histories).items():
+            column(("source", source.name, name), v, history)
+        for p in beside(probed.places, own_place(study, j)):
+            v = vector([probed.B[p] - B] * len(runs))
+            column(("moved", f"{source.name}>{probed.places[p].name}", "always"), v, [q[:, j] for q in powers])
+    for name, factor, of in _signals(study, nominal, powers):
+        column(("signal", f"{name}*{factor:.6g}", "always"), vector(of), always)
+    for i in range(len(study.fitted)):
+        for m, field in _fields(study):
+            pulse = np.zeros(n[i])
+            pulse[0] = nominal[i].rate
+            only_here = [pulse if j == i else None for j in range(len(runs))]
+            column(("start", f"{runs[i].name}.{m}", "always"), vector([field] * len(runs)), only_here)
+    return Elements(histories, tuple(tuple(v) for v in vectors), tuple(columns), index, block_of)
+
+
+def pivot(study: Study, e: int) -> float:
+    """Height [m] at which the air of an environment is as measured: told, or the middle of its films.
+
+    A gradient about another height is an offset as well, which calibration resists.
+    """
+    probed, load = study.probed, study.probed.base.load_model
+    if load.environments[e].height != 0.0 or load.environments[e].gradient != 0.0:
+        return float(load.environments[e].height)
+    (body,) = probed.base.bodies
+    own = [f for f, film in enumerate(load.films) if film.environment == e]
+    area = float((body.one @ np.asarray(probed.system.M)[:, own]).sum())
+    return float((body.one @ probed.H[:, own]).sum() / area) if area > 0.0 else 0.0
+
+
+def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:
+    """-P Gamma_c P^T z (n_fine, r) of one contact at its nominal conductance."""
+    probed = study.probed
+    loads = study.runs[k].run.loads
+    P = np.asarray(probed.system.P[0])
+    mask = np.zeros(len(probed.base.load_model.contacts))
+    mask[c] = 1.0
+    gamma = gammas(probed.contacts, loads, mask)
+    return np.asarray(-np.einsum("tij,tj->ti", gamma, z @ P) @ P.T)
+
+
+def _powers(study: Study, k: int, nominal: Nominal) -> np.ndarray:
+    """(n_fine, n_sources) W of all sources of a run at the nominal windings."""
+    return _power_of(study.probed.system, study.runs[k].run.drive, nominal)
+
+
+def _power_of(system: System, drive: Drive, nominal: Nominal) -> np.ndarray:
+    power = drive.power.copy()
+    if drive.losses.index:
+        winding = float(system.reference_temperature) + nominal.states[:-1] @ np.asarray(system.source_rows).T
+        power[:, list(drive.losses.index)] = read_table(np, drive.losses.value, temperature_place(np, winding))
+    return np.asarray(power)
+
+
+def _law_histories(study: Study, j: int, histories: Histories) -> dict[str, tuple[np.ndarray, ...]]:
+    """Other shapes of a source that reads a speed: |n| to another exponent."""
+    load = study.probed.base.load_model
+    runs = [planned.run for planned in study.runs]
+    units = {s.name: s.unit for s in load.signals}
+    result: dict[str, tuple[np.ndarray, ...]] = {}
+    for signal in load.sources[j].use.signals.values():
+        if units.get(signal) not in ("m/s", "1/s") or any(signal not in run.signals for run in runs):
+            continue
+        top = max(float(np.abs(run.signals[signal]).max()) for run in runs)
+        if top <= 0.0:
+            continue
+        for exponent in LAWS:
+            name = f"{signal}^{exponent:.2f}"
+            result[name] = tuple(np.abs(run.signals[signal] / top) ** exponent for run in runs)
+            histories.unit[name] = (signal, exponent, top)
+    return result
+
+
+def _signals(
+    study: Study, nominal: Sequence[Nominal], powers: Sequence[np.ndarray]
+) -> list[tuple[str, float, list[np.ndarray]]]:
+    """(signal, factor, per run (n_fine, r)): what all laws that read a signal would add, were it larger by a factor."""
+    probed, load = study.probed, study.probed.base.load_model
+    (body,) = probed.base.bodies
+    positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
+    uses = [s.use for s in load.sources] + [f.use for f in load.films]
+    read = {s for use in uses for s in use.signals.values()}
+    A, M = np.asarray(probed.system.A[0]), np.asarray(probed.system.M)
+    result = []
+    for signal in load.signals:
+        if signal.name in positions or signal.name not in read or signal.unit == "degC":
+            continue
+        for factor in FACTORS:
+            per_run, moves = [], False
+            for k, (own, power) in enumerate(zip(nominal, powers, strict=True)):
+                run = study.runs[k].run
+                if signal.name not in run.signals or not np.any(run.signals[signal.name]):
+                    per_run.append(np.zeros((run.drive.n_steps, body.n)))
+                    continue
+                sources, films, drive = _evaluated(study, k, signal.name, factor)
+                small = replace(probed.system, source_rows=np.asarray(probed.system.source_rows)[[
+                    probed.layout.following_losses.index(j) for j in sources if j in probed.layout.following_losses
+                ]])  # fmt: skip
+                grown_power = np.zeros_like(power)
+                grown_power[:, sources] = _power_of(small, drive, own) - power[:, sources]
+                ratio = grown_power / np.where(power > 0.0, power, 1.0)
+                moving = list(load.contact_sources)
+                forcing = _without_contacts(study, grown_power) @ _all_sources(study).T
+                forcing = forcing + np.einsum("ts,tsp->tp", ratio[:, moving], run.drive.contact_heat) @ body.P.T
+                for i, f in enumerate(films):
+                    grown = _convection(drive, i, own) - _convection(run.drive, f, own)
+                    if np.any(grown):
+                        flow = -own.middle @ A[f].T + own.outer[:, [f]] * M[:, f]
+                        forcing = forcing + np.clip(grown, -50.0, 200.0)[:, None] * flow
+                moves |= bool(np.abs(forcing).max() > 0.0)
+                per_run.append(np.asarray(forcing))
+            if moves:
+                result.append((signal.name, factor, per_run))
+    return result
+
+
+def _evaluated(study: Study, k: int, signal: str, factor: float) -> tuple[list[int], list[int], Drive]:
+    """Sources and films that read a signal, and a drive of these alone with the signal multiplied."""
+    run, load = study.runs[k].run, study.probed.base.load_model
+    sources = [j for j, s in enumerate(load.sources) if signal in s.use.signals.values()]
+    films = [f for f, film in enumerate(load.films) if signal in film.use.signals.values()]
+    reading = tuple(replace(load.sources[j], contact="") for j in sources)
+    only = replace(load, pairs=(), joints=(), rails=(), ports=(), axes=(), sources=reading,
+                   films=tuple(load.films[f] for f in films))  # fmt: skip
+    signals = {name: values * (factor if name == signal else 1.0) for name, values in run.signals.items()}
+    dt = run.drive.time[1] - run.drive.time[0]
+    return sources, films, evaluate(only, run.drive.time[:-1], signals, dt, run.drive.n_steps)
+
+
+def _without_contacts(study: Study, power: np.ndarray) -> np.ndarray:
+    result = power.copy()
+    result[:, list(study.probed.base.load_model.contact_sources)] = 0.0
+    return result
+
+
+def _all_sources(study: Study) -> np.ndarray:
+    (body,) = study.probed.base.bodies
+    B = np.zeros((body.n, len(study.probed.base.load_model.sources)))
+    B[:, list(body.sources)] = body.B
+    return B
+
+
+def _convection(drive: Drive, f: int, nominal: Nominal) -> np.ndarray:
+    if f not in drive.films.index:
+        return np.asarray(drive.theta[:, f])
+    i = drive.films.index.index(f)
+    middle = drive.films.value.shape[2] // 2 + 15
+    return np.asarray(drive.films.value[:, i, middle])
+
+
+def _fields(study: Study) -> list[tuple[str, np.ndarray]]:
+    """Initial fields: the whole machine, and each member, by 1 K."""
+    (body,) = study.probed.base.bodies
+    result = [("machine", np.asarray(body.one))]
+    if body.E_members is not None and len(body.members) > 1:
+        result += [(m, E @ body.one) for m, E in zip(body.members, body.E_members, strict=True)]
+    return result

@@ -1,0 +1,247 @@
+"""What is special about a family, asked of objects: a `Family` per entry of the catalogue, a `Fault` per kind of
+elementary cause that it has. Other rooms ask these and know no names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.faults.elements import Elements
+from twin.diagnose.model.bank import Nominal
+from twin.diagnose.model.integration import INNER
+from twin.diagnose.model.slots import Slots
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Cause
+from twin.machine.effects.effect import Effect, Window
+
+if TYPE_CHECKING:
+    from twin.diagnose.faults.context import Context
+
+
+class Curve(Enum):
+    """What an amplitude is of the described quantity."""
+
+    LINEAR = "a difference, in its unit"
+    RELATIVE = "a relative change"
+    LOGARITHM = "the logarithm of a factor"
+
+    def told(self, amplitude: float) -> float:
+        """An amplitude as reports take it: relative changes and logarithms as factors, others as they are."""
+        if self is Curve.RELATIVE:
+            return max(1.0 + amplitude, 0.0)
+        return float(np.exp(amplitude)) if self is Curve.LOGARITHM else amplitude
+
+
+@dataclass(frozen=True)
+class Described:
+    """How a report and an edit say a cause."""
+
+    place: str
+    size: tuple[float, float, float]  # value, low, high
+    windows: tuple[Window, ...]
+    settings: dict[str, float | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One amplitude of a cause: what it is, and when it acts."""
+
+    fault: Fault
+    place: str
+    column: int  # a column of the bank of the same vector, -1 if none
+    shapes: tuple[np.ndarray, ...]  # per run of the study (n_fine,): history of unit amplitude
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One kind of cause of a family: how its size enters, its range, and what searches must know of it."""
+
+    family: str
+    kind: str  # of the elementary causes that its columns are, see `elements` and `readings`
+    unit: str
+    prefix: str = ""  # of its places, before the name that its columns have
+    sign: int = 0  # of the first amplitude; 0: either
+    least: float = 0.0  # first amplitude worth naming
+    # beyond which physics has no such cause: the model is wrong and not the machine (relative changes as factor - 1,
+    # logarithms of factors). Estimates on the generous side, chosen without looking at any case but for the one named
+    largest: float | None = None
+    fixed: bool = False  # amplitudes are one
+    own: float = 0.05  # relative standard deviation of its size, by what the form of the model may have wrong
+    curve: Curve = Curve.LINEAR
+    conducts: bool = False  # its size is that of a conductance: temperatures are nearly linear in a / (1 + a)
+    parameter: bool = False  # it is a declared parameter beyond its tolerance, moved and not added
+    bent: bool = False  # in the machine, and not in proportion to its size
+    saturates: bool = False  # the larger it is, the worse is linearity
+    wets: bool = False  # a film and its heat: two amplitudes, of which linearity tells the first badly
+    grows: bool = True  # in windows, of which the data may ask for more
+    several: bool = False  # comes part by part: one of them explains a share
+    leaves: float = 0.005  # of its statistic: heat that it may leave in windows because the model is not the machine
+    faint: bool = False  # scores hardly anything by its derivative when it is many times as large
+    read: bool = False  # acts on what is read, not in the machine
+    curved: bool = False  # on what is read, and not in proportion to its size
+    sizes: tuple[float, ...] = ()  # at which such a one is scored beside its column's
+    exchanges: bool = False  # two channels, exactly
+    corrects: bool = False  # a logged signal, by an exact factor
+    instant: bool = False  # of a reading: without edges that could be fitted
+    lasts: bool = False  # of a reading: goes on in runs that were not looked at
+    everywhere: bool = False  # of no one place: it may switch as often as the weather
+    elsewhere: bool = False  # all of a source's heat at another place, compared with the description
+
+    @property
+    def declared(self) -> bool:
+        """Whether its size is that of a declared parameter, whose place it takes."""
+        return self.parameter or self.conducts
+
+    def bare(self, name: str) -> str:
+        """The name that its columns have, of a place of a hypothesis."""
+        return name.removeprefix(self.prefix)
+
+    def batch(
+        self, rows: Sequence[tuple[str, Sequence[int]]], histories: Sequence[History],
+        largest: float | Sequence[float] | None = None,
+    ) -> Batch:  # fmt: skip
+        """Its hypotheses at places (name, columns); largest: of each place, `self.largest` by default."""
+        bound = self.largest if largest is None else largest
+        of_places = () if bound is None else tuple(np.broadcast_to(np.asarray(bound, dtype=float), len(rows)).tolist())
+        return Batch(
+            self.family, self.kind, self.unit, tuple(self.prefix + p for p, _ in rows),
+            np.array([c for _, c in rows], dtype=int), tuple(histories), self.sign, self.fixed, self.least, of_places,
+        )  # fmt: skip
+
+    def log_change(self, amplitude: float) -> float:
+        """An amplitude of a declared parameter as the logarithm of its factor."""
+        return float(np.log1p(amplitude)) if self.conducts else amplitude
+
+    def amplitude(self, log_change: float) -> float:
+        """The inverse of `log_change`."""
+        return float(np.expm1(log_change)) if self.conducts else log_change
+
+    def uncertain(self, value: float) -> float:
+        """Standard deviation of an amplitude by what the form of the model may have wrong."""
+        return self.own * value
+
+    # exact terms in the machine
+    def units(self, h: Hypothesis, shapes: Callable[[int], tuple[np.ndarray, ...]]) -> tuple[Unit, ...]:
+        """The amplitudes of a hypothesis; shapes: of each, per run of the study. None for readings."""
+        if self.read:
+            return ()
+        columns, weights = h.combination()
+        leads = [int(columns[np.flatnonzero(row)[0]]) if row.any() else int(columns[0]) for row in weights]
+        return tuple(Unit(self, self.bare(h.name), lead, shapes(i)) for i, lead in enumerate(leads))
+
+    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
+        """Slot s of run k with a unit: a forcing that the bank knows, the history of its column times its vector."""
+        column = elements.columns[unit.column]
+        history = column.histories[k]
+        if history is not None:
+            forced(slots, s, elements.vectors[k][column.vector], history)
+
+    # what exact refits know beforehand
+    def prior(self, q: int) -> tuple[np.ndarray, np.ndarray]:
+        """(q,) means and inverse variances of amplitudes."""
+        return np.zeros(q), np.zeros(q)
+
+    def lowest(self, study: Study, nominal: Sequence[Nominal], h: Hypothesis) -> np.ndarray:
+        """(q,) below which no amplitude goes."""
+        return np.full(h.batch.q, -np.inf)
+
+    def limited(self, study: Study, name: str, a: np.ndarray) -> np.ndarray:
+        """(q,) amplitudes that physics allows together."""
+        return a
+
+    def vanished(self, a: np.ndarray) -> bool:
+        """Whether amplitudes (q,) are another cause's."""
+        return False
+
+    def left_open(self, units: Sequence[Unit], a: np.ndarray) -> list[Unit] | None:
+        """What the shape of a cause leaves open at amplitudes (q,), one standard deviation each; None: as its history
+        has it."""
+        return None
+
+    # readings
+    def change(
+        self, study: Study, nominal: Sequence[Nominal], states: Callable[[int], np.ndarray], name: str, size: float
+    ) -> np.ndarray:
+        """(m,) what the fitted runs read otherwise, of what is `curved`; states: of run k, (n_fine + 1, r)."""
+        raise NotImplementedError(f"{self.kind} is in proportion to its size")
+
+    def read_in(
+        self, one: Study, nominal: Sequence[Nominal], name: str, size: float, known: Mapping[str, np.ndarray]
+    ) -> np.ndarray:
+        """(size,) what it adds to the reading of the one run of a study; known: its columns of that run, by name."""
+        column = known.get(self.bare(name))
+        return np.zeros(one.runs[0].size) if column is None else np.asarray(size * column)
+
+    # words
+    def factor(self, name: str) -> tuple[str, float]:
+        """What is corrected, and by what, of a place of what `corrects`."""
+        raise NotImplementedError(f"{self.kind} has no exact factor")
+
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
+        """A cause as reports and edits take it, of one at its place with the size of its first amplitude as told."""
+        return d
+
+
+def forced(slots: Slots, s: int, vector: np.ndarray, history: np.ndarray) -> None:
+    """Slot s with a vector (r,) or (n_fine, r) times a history (n_fine,)."""
+    flow = vector if vector.ndim == 2 else np.broadcast_to(vector, (len(history), len(vector)))
+    n = slots.gate.shape[0]
+    slots.forcing[:, :, s] = (flow * history[:, None]).reshape(n, INNER, -1)
+
+
+def coarse(unit: Unit, k: int) -> np.ndarray:
+    """(n,) the mean of a unit's shape in every coarse step of run k."""
+    return np.asarray(unit.shapes[k].reshape(-1, INNER).mean(axis=1))
+
+
+def place_number(study: Study, name: str) -> int:
+    return [place.name for place in study.probed.places].index(name)
+
+
+def as_found(cause: Cause, study: Study) -> Effect:
+    """A cause as descriptions take it, nothing turned."""
+    return Effect(
+        cause.family, cause.place, cause.amplitude, cause.unit, cause.history, cause.signal, cause.exponent,
+        cause.windows, dict(cause.settings),
+    )  # fmt: skip
+
+
+def nothing_more(cause: Cause) -> list[str]:
+    return []
+
+
+@dataclass(frozen=True)
+class Family:
+    """An entry of the catalogue."""
+
+    number: int
+    name: str
+    title: str
+    physics: str
+    operator: str
+    signature: str
+    smallest: str  # size worth naming, with unit
+    sign: str
+    searched: str  # places and histories
+    group: str  # "machine", "sensor", "signal", "reading": which verdict and which edit
+    batches: Callable[[Context], list[Batch]]
+    file: str = ""  # text of the user's file that it is from: what was made with another text is made again
+    what: str = ""  # the subject of "... at PLACE: SIZE" in a report; its name by default
+    times: str = ""  # what a size without a unit multiplies
+    declared: bool = False  # always, it is a declared number out of its tolerance
+    channel: bool = False  # it is said as "sensor x_nut is at fault"
+    kind_told: bool = False  # its history says what kind it is, before its size
+    said: Callable[[Cause], list[str]] = nothing_more  # what its size holds for, in words
+    edit: Callable[[Cause, Study], Effect] = as_found  # how the description says it
+    told_of_edit: Callable[[Cause], list[str]] = nothing_more  # what the edit leaves to be done by hand
+    editable: Callable[[Cause], bool] | None = None  # whether a description says it; of the machine's all, by default
+
+    def changes(self, cause: Cause) -> bool:
+        """Whether a description says such a cause."""
+        return self.group == "machine" if self.editable is None else self.editable(cause)

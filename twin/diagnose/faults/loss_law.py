@@ -1,0 +1,53 @@
+"""A described source emits otherwise than its law says, in size or in shape."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Batch
+from twin.diagnose.faults.context import Context, alone, most_heat
+from twin.diagnose.faults.fault import Curve, Family, Fault, as_found
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Cause
+from twin.machine.effects.effect import Effect
+from twin.rom.parameter import Parameter
+
+GAIN = Fault(
+    "loss_law", "gain", "1", least=0.15, own=0.1, curve=Curve.LOGARITHM, parameter=True, read=True,
+    largest=float(np.log(5.0)),  # friction of a bearing with preload and lubricant
+)  # fmt: skip
+SHAPE = Fault("loss_law", "source", "W", "sources.", least=1.0)
+FAULTS = (GAIN, SHAPE)
+
+
+def batches(context: Context) -> list[Batch]:
+    """Gains of sources, and other shapes at their places."""
+    one = (alone(context, "always"),)
+    gains = [(path.removesuffix(".gain"), [c]) for path, _, c in context.named("gain") if path.startswith("sources.")]
+    result = [GAIN.batch(gains, one)] if gains else []
+    for name in dict.fromkeys(h for _, h, _ in context.named("source")):
+        rows = [(p, [c]) for p, h, c in context.named("source") if h == name]
+        result.append(SHAPE.batch(rows, (alone(context, name),), most_heat(context)))
+    return result
+
+
+def is_source(parameter: Parameter) -> bool:
+    """Whether a declared parameter is what a source emits."""
+    return parameter.kind == "source"
+
+
+def edit(cause: Cause, study: Study) -> Effect:
+    """A shape of its own is the described source and more."""
+    effect = as_found(cause, study)
+    return replace(effect, settings={**effect.settings, "gain": 1.0}) if cause.signal else effect
+
+
+FAMILY = Family(
+    4, "loss_law", "Loss law or coefficient wrong",
+    "Friction, winding resistance, preload or wear differ from the described law, in size or in shape.",
+    "(a - 1) P_j(t), or b_j (s_alt - s_nom)", "goes with the power of one drive; or bends with its speed",
+    "15 % of a source", "either", "every source: its gain, and other exponents of its speed", "machine",
+    batches, what="a loss other than declared", times="times the declared", declared=True, edit=edit,
+)  # fmt: skip

@@ -1,0 +1,284 @@
+"""Elementary causes that act on what is read, not on the machine: columns (m,) over the measured numbers.
+
+gain      parameter    one prior standard deviation of a declared parameter in ln or its unit
+offset    sensor       1 K;   drift  1 K/day;   lag  1 s;   detached  all of it;   swapped a<>b  all of it
+clock     run          1 s later than stated, to first order; exactly by `late`
+scale     axis<part    1 m/m/K of an encoder scale as warm as a part, from the middle of the stroke
+expansion part         100 % more
+slip      dx           1 m of play, seen at WIDTH; at other widths by `play`
+step      dx           1 m from a measurement on
+load      dx:signal    1 m per unit of a signal
+probe     dx           1 m/s of drift;   frame dx:axis  1 m/m;   heated dx  1 m from first to last row of a set
+
+In runs with `tcp_reference = "first"` all TCP rows lose what a cause does to the first one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from scipy.signal import lfilter
+
+from twin.diagnose.faults.elements import Key
+from twin.diagnose.model.bank import Nominal
+from twin.diagnose.model.study import Planned, Study
+from twin.physics.play import play as follower
+from twin.rom.apply import member_mean
+
+Add = Callable[[Key, Sequence[np.ndarray]], None]  # a column in parts, one per fitted run
+
+WIDTH, NARROW = 4e-6, 0.5e-6  # m
+COMPONENTS = ("dx", "dy", "dz")
+DAY = 86400.0  # s
+SET_GAP = 600.0  # s: rows closer than that belong to one measurement
+
+
+def readings_of(
+    study: Study, nominal: Sequence[Nominal], outputs: Sequence[np.ndarray], J: Sequence[np.ndarray], swaps: bool = True
+) -> tuple[np.ndarray, dict[Key, int]]:
+    """(m, n) columns of all fitted runs, and where each is; outputs, J: nominal ones per fitted run.
+
+    swaps: with a column for every pair of sensors, whose number grows with the square of theirs.
+    """
+    columns: list[np.ndarray] = []
+    index: dict[Key, int] = {}
+
+    def add(key: Key, parts: Sequence[np.ndarray]) -> None:
+        index[key] = len(columns)
+        columns.append(np.concatenate(parts).astype(np.float32))
+
+    plans = [study.runs[k] for k in study.fitted]
+    scale = study.scale
+    for i, p in enumerate(study.probed.parameters):
+        add(("gain", p.path, "always"), [jac[:, i] / scale[i] for jac in J])
+    _sensors(study, plans, outputs, add, swaps)
+    if any(len(plan.measured.tcp) for plan in plans):
+        _tcp(study, plans, nominal, add)
+    for r, plan in enumerate(plans):
+        parts = [np.zeros(p.size) for p in plans]
+        T, _ = plan.split(outputs[r])
+        parts[r] = np.concatenate([-_rate(plan, T).ravel(), -_tcp_rate(study, plan, nominal[r]).ravel()])
+        add(("clock", plan.run.name, "always"), parts)
+    return np.stack(columns, axis=1), index
+
+
+def _rate(plan: Planned, T: np.ndarray) -> np.ndarray:
+    """dT/dt (b, s) K/s of bin means."""
+    return np.gradient(T, plan.measured.bin_time, axis=0) if len(T) > 1 else np.zeros_like(T)
+
+
+def _tcp_rate(study: Study, plan: Planned, nominal: Nominal) -> np.ndarray:
+    rows, z = np.asarray(plan.rows.row), nominal.states
+    step = np.asarray(plan.rows.step)
+    return _shown(plan, np.asarray(np.einsum("kcr,kr->kc", rows, (z[step + 1] - z[step]) * nominal.rate)))
+
+
+def _shown(plan: Planned, w: np.ndarray) -> np.ndarray:
+    """(k, 3) of the TCP as a run tells it: counted from its first row where it says so, as `Study.read` does."""
+    return w - w[0] if plan.measured.from_first else w
+
+
+def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarray], add: Add, swaps: bool) -> None:
+    names = tuple(dict.fromkeys(s for plan in plans for s in plan.measured.sensors))
+    surround = study.probed.base.load_model.surroundings
+
+    def column(of: Sequence[tuple[str, Sequence[np.ndarray]]]) -> list[np.ndarray]:
+        parts = []
+        for r, plan in enumerate(plans):
+            T = np.zeros(plan.shapes[0])
+            for name, values in of:
+                if name in plan.measured.sensors:
+                    T[:, plan.measured.sensors.index(name)] = values[r]
+            parts.append(np.concatenate([T.ravel(), np.zeros(plan.shapes[1][0] * 3)]))
+        return parts
+
+    read: dict[str, list[np.ndarray]] = {}
+    for name in names:
+        read[name] = [
+            plan.split(y)[0][:, plan.measured.sensors.index(name)] if name in plan.measured.sensors
+            else np.zeros(plan.shapes[0][0])
+            for plan, y in zip(plans, outputs, strict=True)
+        ]  # fmt: skip
+    time = [plan.measured.bin_time - plan.run.drive.time[0] for plan in plans]
+    air = []
+    for plan in plans:
+        weight = plan.measured.mean_of[:, 1:]
+        air.append(weight @ plan.run.drive.environment[:, surround] / np.maximum(weight.sum(axis=1), 1e-9))
+    for name in names:
+        add(("offset", name, "always"), column([(name, [np.ones(len(t)) for t in time])]))
+        add(("drift", name, "always"), column([(name, [t / DAY for t in time])]))
+        rates = [np.gradient(T, t) if len(t) > 1 else np.zeros_like(T) for T, t in zip(read[name], time, strict=True)]
+        add(("lag", name, "always"), column([(name, [-v for v in rates])]))
+        add(("detached", name, "always"), column([(name, [a - T for a, T in zip(air, read[name], strict=True)])]))
+    for a, first in enumerate(names if swaps else ()):
+        for second in names[a + 1 :]:
+            change = [y - x for x, y in zip(read[first], read[second], strict=True)]
+            add(("swapped", f"{first}<>{second}", "always"), column([(first, change), (second, [-c for c in change])]))
+
+
+def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add: Add) -> None:
+    (body,) = study.probed.base.bodies
+    probed = study.probed
+    times = [plan.measured.tcp_time - plan.run.drive.time[0] for plan in plans]
+
+    def column(of: Sequence[np.ndarray]) -> list[np.ndarray]:
+        return [
+            np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), _shown(plan, w).ravel()])
+            for plan, w in zip(plans, of, strict=True)
+        ]
+
+    def component(c: int, values: Sequence[np.ndarray]) -> list[np.ndarray]:
+        made = []
+        for v in values:
+            w = np.zeros((len(v), 3))
+            w[:, c] = v
+            made.append(w)
+        return column(made)
+
+    z = [_state(own.states, np.asarray(p.rows.step) + np.asarray(p.rows.share))
+         for p, own in zip(plans, nominal, strict=True)]  # fmt: skip
+    positions = [_positions(plan, t) for plan, t in zip(plans, times, strict=True)]
+    axes = probed.base.load_model.axes
+    for m, member in enumerate(body.members):
+        row = member_mean(body, m)
+        warm = [x @ row for x in z]
+        for i, axis in enumerate(axes):
+            if not any(np.ptp(p[:, i]) > 1e-6 for p in positions if len(p)):
+                continue
+            middle = 0.0
+            along = np.asarray(axis.direction)
+            made = [-(t * (p[:, i] - middle))[:, None] * along for t, p in zip(warm, positions, strict=True)]
+            add(("scale", f"axes.{axis.name}<{member}", "always"), column(made))
+        if {f"tcp.expansion.{member}.{c}" for c in "xyz"} <= {p.path for p in probed.parameters}:
+            continue  # of a lumped machine: each of these numbers is calibrated by itself
+        if body.G_members is not None and np.any(body.G_members[m]):
+            G = body.G_members[m]
+            rows = [np.tensordot(plan.measured.pose, G, 1) for plan in plans]
+            grown = [np.einsum("kcr,kr->kc", g, x) for g, x in zip(rows, z, strict=True)]
+            add(("expansion", member, "always"), column(grown))
+    for c, name in enumerate(COMPONENTS):
+        add(("slip", name, "always"), component(c, [_play(p, own, c) for p, own in zip(plans, nominal, strict=True)]))
+        for r, t in enumerate(times):
+            for start in _sets(t)[1:]:
+                values = [np.zeros(len(x)) if k < r else np.ones(len(x)) for k, x in enumerate(times)]
+                values[r] = (t >= start - 1e-6).astype(float)
+                add(("step", name, f"{r}:{start:.0f}"), component(c, values))
+        add(("probe", name, "always"), component(c, times))
+        add(("heated", name, "always"), component(c, [_within_set(t) for t in times]))
+        for i, axis in enumerate(axes):
+            if any(np.ptp(p[:, i]) > 1e-6 for p in positions if len(p)):
+                add(("frame", f"{name}:{axis.name}", "always"), component(c, [p[:, i] for p in positions]))
+        for signal in probed.base.load_model.signals:
+            if signal.unit not in ("A", "W", "N", "1"):
+                continue
+            values = [_at(plan, signal.name, t) for plan, t in zip(plans, times, strict=True)]
+            if max((float(np.ptp(v)) for v in values if len(v)), default=0.0) > 0.0:
+                add(("load", f"{name}:{signal.name}", "always"), component(c, values))
+
+
+def play(study: Study, nominal: Sequence[Nominal], name: str, width: float) -> np.ndarray:
+    """(m,) what a play of `width` [m] in a component of the TCP makes it read in the fitted runs, per metre of play."""
+    c, parts = COMPONENTS.index(name), []
+    for k in study.fitted:
+        plan = study.runs[k]
+        w = np.zeros((plan.shapes[1][0], 3))
+        w[:, c] = _play(plan, nominal[k], c, max(width, NARROW))
+        parts.append(np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), _shown(plan, w).ravel()]))
+    return np.concatenate(parts)
+
+
+def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.ndarray:
+    """(m,) what the fitted runs read more where a clock is late by `seconds` [s], per second.
+
+    states: (n_fine + 1, r) of the runs, by their number, that this clock has stamped.
+    """
+    (body,) = study.probed.base.bodies
+    by = seconds if abs(seconds) > 1.0 else 1.0
+    parts = []
+    for k in study.fitted:
+        plan = study.runs[k]
+        T, w = np.zeros(plan.shapes[0]), np.zeros(plan.shapes[1])
+        if k in states:
+            z, steps = states[k], by / float(plan.run.drive.time[1] - plan.run.drive.time[0])
+            read = z @ body.C.T[:, plan.measured.column]
+            T = plan.measured.mean_of @ (_state(read, np.arange(len(z)) - steps) - read)
+            at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
+            w = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), _state(z, at - steps) - _state(z, at))
+        parts.append(np.concatenate([T.ravel(), _shown(plan, w).ravel()]) / by)
+    return np.concatenate(parts)
+
+
+def lagged(study: Study, states: Mapping[int, np.ndarray], sensor: str, seconds: float) -> np.ndarray:
+    """(m,) what the fitted runs read more where a sensor follows with a time constant of `seconds` [s], per second.
+
+    states: (n_fine + 1, r) of the runs, by their number. A run begins with the sensor as warm as what it sits on.
+    """
+    (body,) = study.probed.base.bodies
+    parts = []
+    for k in study.fitted:
+        plan = study.runs[k]
+        T, w = np.zeros(plan.shapes[0]), np.zeros(plan.shapes[1])
+        if k in states and sensor in plan.measured.sensors:
+            i = plan.measured.sensors.index(sensor)
+            read = states[k] @ body.C[plan.measured.column[i]]
+            keep = math.exp(-float(plan.run.drive.time[1] - plan.run.drive.time[0]) / seconds)
+            followed, _ = lfilter([1.0 - keep], [1.0, -keep], read, zi=[keep * read[0]])
+            T[:, i] = plan.measured.mean_of @ (followed - read)
+        parts.append(np.concatenate([T.ravel(), w.ravel()]) / seconds)
+    return np.concatenate(parts)
+
+
+def _state(states: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """(k, r) states (n + 1, r) between fine steps; the first one before the start."""
+    at = np.clip(at, 0.0, len(states) - 1.0)
+    step = np.minimum(at.astype(int), len(states) - 2)
+    share = (at - step)[:, None]
+    return np.asarray(states[step] + share * (states[step + 1] - states[step]))
+
+
+def _positions(plan: Planned, time: np.ndarray) -> np.ndarray:
+    """(k, n_axes) m of the axes where the TCP was measured."""
+    drive = plan.run.drive
+    if not len(time):
+        return np.zeros((0, drive.position.shape[1]))
+    if plan.measured.position is not None:
+        return plan.measured.position
+    step = np.clip(np.searchsorted(drive.time - drive.time[0], time) - 1, 0, drive.n_steps - 1)
+    return np.asarray(drive.position[step])
+
+
+def _at(plan: Planned, signal: str, time: np.ndarray) -> np.ndarray:
+    values = plan.run.signals.get(signal)
+    if values is None:
+        return np.zeros(len(time))
+    step = np.clip((time / (plan.run.drive.time[1] - plan.run.drive.time[0])).astype(int), 0, len(values) - 1)
+    return np.asarray(values[step])
+
+
+def _sets(time: np.ndarray) -> np.ndarray:
+    """First times of the measurements: rows that follow each other closely are one."""
+    if not len(time):
+        return np.zeros(0)
+    return np.asarray(time[np.concatenate([[True], np.diff(time) > SET_GAP])])
+
+
+def _within_set(time: np.ndarray) -> np.ndarray:
+    """0 for the first row of a measurement, 1 for its last."""
+    result = np.zeros(len(time))
+    starts = _sets(time)
+    for a, b in zip(starts, [*starts[1:], np.inf], strict=True):
+        own = np.flatnonzero((time >= a) & (time < b))
+        if len(own) > 1:
+            result[own] = np.arange(len(own)) / (len(own) - 1)
+    return result
+
+
+def _play(plan: Planned, nominal: Nominal, c: int, width: float = WIDTH) -> np.ndarray:
+    """Where a play lags the thermal displacement of a component, per width: -1/2 .. 1/2."""
+    if not len(plan.measured.tcp):
+        return np.zeros(0)
+    row = np.asarray(plan.rows.row)[:, c].mean(axis=0)
+    w = nominal.states @ row
+    return ((follower(w, width) - w) / width)[np.asarray(plan.rows.step)]

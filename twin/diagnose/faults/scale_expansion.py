@@ -1,0 +1,54 @@
+"""An encoder scale grows with a part, and the description does not know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Batch
+from twin.diagnose.faults.context import Context, single
+from twin.diagnose.faults.fault import Described, Family, Fault, as_found
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Cause
+from twin.diagnose.result.spot import Spot
+from twin.machine.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class Scale(Fault):
+    """Of an axis, as warm as a part; its place is axes.AXIS<PART."""
+
+    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
+        spot = Spot.read(d.place)
+        return replace(d, place=spot.owner, settings={"part": spot.partner})
+
+
+SCALE = Scale(
+    "scale_expansion", "scale", "1/K", least=3e-7, own=0.12, read=True, lasts=True,
+    largest=5e-5,  # 1/K: twice that of aluminium
+)  # fmt: skip
+FAULTS = (SCALE,)
+
+
+def batches(context: Context) -> list[Batch]:
+    """Every axis with every part."""
+    return single(context, SCALE)
+
+
+def edit(cause: Cause, study: Study) -> Effect:
+    """As warm as a surface of its part."""
+    effect = as_found(cause, study)
+    settings = dict(effect.settings)
+    part = str(settings.pop("part"))
+    settings["surface"] = next((p.name for p in study.probed.places if part in p.members and p.surfaces), part)
+    return replace(effect, settings=settings)
+
+
+FAMILY = Family(
+    11, "scale_expansion", "Encoder scale grows, and the description does not know",
+    "A scale or a screw as scale grows with its part: the error grows with the position.",
+    "-a (T_scale - T_ref) position", "TCP error linear in an axis position, with a part's temperature",
+    "0.3 um/(m K)", "either", "every axis with every part", "machine", batches,
+    what="growth of a scale that the description lacks", edit=edit,
+)  # fmt: skip

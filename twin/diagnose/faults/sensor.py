@@ -1,0 +1,50 @@
+"""A temperature sensor is at fault: offset, drift, lag, contact to the part lost, two of them swapped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Batch
+from twin.diagnose.faults.context import Context, called
+from twin.diagnose.faults.fault import Family, Fault
+from twin.diagnose.faults.readings import lagged
+from twin.diagnose.model.bank import Nominal
+from twin.diagnose.model.study import Study
+
+
+@dataclass(frozen=True)
+class Lag(Fault):
+    """A sensor that follows late."""
+
+    def change(
+        self, study: Study, nominal: Sequence[Nominal], states: Callable[[int], np.ndarray], name: str, size: float
+    ) -> np.ndarray:
+        seen = {k: states(k) for k in study.fitted}
+        return size * lagged(study, seen, self.bare(name), max(size, self.least))
+
+
+FAULTS = (
+    Fault("sensor", "offset", "K", "sensors.", 0, 0.15, 100.0, read=True),  # K: a converter at its rail
+    Fault("sensor", "drift", "K/day", "sensors.", 0, 0.1, 20.0, read=True),
+    Lag("sensor", "lag", "s", "sensors.", 1, 120.0, 7200.0, read=True, curved=True, sizes=(600.0, 1800.0, 5400.0)),
+    # all of the reading is the air's; half as much again for the error of a fit
+    Fault("sensor", "detached", "1", "sensors.", 1, 0.05, 1.5, read=True),
+    Fault("sensor", "swapped", "1", "sensors.", 1, 0.0, fixed=True, read=True, exchanges=True),
+)
+
+
+def batches(context: Context) -> list[Batch]:
+    """Offset, drift, lag, lost contact of every sensor; every pair swapped."""
+    return [batch for fault in FAULTS for batch in called(context, fault, fault.kind)]
+
+
+FAMILY = Family(
+    9, "sensor", "A temperature sensor is at fault",
+    "Offset, drift, lag, contact to the part lost, stuck, or two sensors swapped. The machine model is left alone.",
+    "y + a;  a t;  filter;  (1 - w) y + w T_air", "one channel only: neighbours and TCP agree with the model",
+    "0.15 K, 0.1 K/day, 2 min, 5 %", "either", "every sensor; every pair", "sensor", batches,
+    what="a temperature sensor at fault", channel=True, kind_told=True,
+)  # fmt: skip

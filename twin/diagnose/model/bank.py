@@ -1,0 +1,150 @@
+"""First-order responses of everything that may act anywhere, in one pass through the runs.
+
+About the calibrated trajectory z(t) a cause of small amplitude enters as a forcing f(t) = v(t) s(t): v the place (the
+input vector of a surface, the heat that its film would carry, the flow of a joint), s its history. All are stepped
+together as columns of one linear system with the matrices of the nominal run and the steps of
+`twin.diagnose.model.integration`, so that thousands of hypotheses cost a few matrix products per step. The laws' own
+reaction is left out here, and is in the exact refit of what was chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import twin.run.jax_setup  # noqa: F401  isort: skip
+
+import jax
+import numpy as np
+import scipy.linalg
+
+from twin.diagnose.model.integration import gammas
+from twin.diagnose.model.study import Study
+from twin.rom.step_loads import Tabulated, film_loads
+from twin.rom.tableau import SDIRK2, stages
+
+AT_ONCE = 700  # columns
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The nominal run k as the linear integration needs it; n coarse steps of m fine ones, in fine steps (n m)."""
+
+    states: np.ndarray  # (n m + 1, r)
+    total: np.ndarray  # (n m, n_films) W/(m^2 K), radiation included
+    convection: np.ndarray  # (n m, n_films)
+    outer: np.ndarray  # (n m, n_films) K above the reference temperature
+    inverse: np.ndarray  # (n m, r, r) of S, float32
+    rate: float  # 1/s, of fine steps
+
+    @property
+    def middle(self) -> np.ndarray:
+        """(n m, r) states that the two stages of a step see in the mean."""
+        return 0.5 * (self.states[:-1] + self.states[1:])
+
+
+def nominal_run(study: Study, k: int) -> Nominal:
+    """Trajectory and matrices of run k at nominal parameters."""
+    probed = study.probed
+    states = study.states(k, np.zeros(len(probed.parameters)))
+    system, layout, loads = jax.tree.map(np.asarray, probed.system), probed.layout, study.runs[k].run.loads
+    n, m = loads.environment.shape[:2]
+    n_films = layout.n_films
+    plan, T_ref = system.film_plan, float(system.reference_temperature)
+    P, A0, A = system.P[0], system.A0[0], system.A[0]
+    theta, environment = np.asarray(loads.theta), np.asarray(loads.environment)
+    rate = float(np.asarray(loads.rate)[0])
+    total, convection, outer = (np.zeros((n * m, n_films)) for _ in range(3))
+    inverse = np.zeros((n * m, *A0.shape), dtype=np.float32)
+    gamma = gammas(probed.contacts, loads, np.ones(probed.contacts.n_contacts))
+    for i in range(n):
+        fine = slice(i * m, (i + 1) * m)
+        told = Tabulated(theta[i, :n_films], layout.following_films, np.asarray(loads.film_table)[i])
+        films = film_loads(np, plan, told, system.surfaces(states[i * m]), environment[i], 1.0)
+        total[fine], convection[fine], outer[fine] = films.total, films.convection, films.outer - T_ref
+        coefficients = np.concatenate([films.total.mean(axis=0), theta[i, n_films:]])
+        S = rate / SDIRK2.diagonal * np.eye(len(A0)) + A0 + np.tensordot(coefficients - system.nominal, A, 1)
+        for j in range(i * m, (i + 1) * m):
+            factor = scipy.linalg.cho_factor(S + P @ gamma[j] @ P.T, lower=True)
+            inverse[j] = scipy.linalg.cho_solve(factor, np.eye(len(S)))
+    return Nominal(states, total, convection, outer, inverse, rate)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A forcing: vector of a place or flow (n m, r) times a history (n m,), per run of the study."""
+
+    vector: int  # index of the vector
+    histories: tuple[np.ndarray | None, ...]  # per run of the study; None: not in that run
+
+
+def respond(
+    study: Study, nominal: Sequence[Nominal], vectors: Sequence[Sequence[np.ndarray]], columns: Sequence[Column]
+) -> np.ndarray:
+    """(m, n_columns) responses of all measured quantities of the fitted runs, float32.
+
+    vectors: per run of the study, (r,) constant or (n m, r) each.
+    """
+    total = sum(study.runs[k].size for k in study.fitted)
+    result = np.zeros((total, len(columns)), dtype=np.float32)
+    first = 0
+    for k in study.fitted:
+        planned, own = study.runs[k], nominal[k]
+        acting = [c for c, column in enumerate(columns) if column.histories[k] is not None]
+        for begin in range(0, len(acting), AT_ONCE):
+            chosen = acting[begin : begin + AT_ONCE]
+            made = _integrated(study, k, own, vectors[k], [columns[c] for c in chosen])
+            result[first : first + planned.size, chosen] = made
+        first += planned.size
+    return result
+
+
+def _integrated(
+    study: Study, k: int, nominal: Nominal, vectors: Sequence[np.ndarray], columns: Sequence[Column]
+) -> np.ndarray:
+    planned = study.runs[k]
+    (body,) = study.probed.base.bodies
+    fine, r = len(nominal.states) - 1, body.n
+    C = body.C[planned.measured.column].astype(np.float32)
+    used = sorted({c.vector for c in columns})
+    place = {v: j for j, v in enumerate(used)}
+    which = np.array([place[c.vector] for c in columns])
+    S = np.stack([np.asarray(c.histories[k], dtype=np.float32) for c in columns], axis=1)  # (fine, n)
+    constant = [vectors[v] if vectors[v].ndim == 1 else None for v in used]
+    X = np.zeros((r, len(columns)), dtype=np.float32)
+    T = np.zeros((fine + 1, len(C), len(columns)), dtype=np.float32)
+    step, share = planned.rows.step, planned.rows.share
+    needed = {int(s) for s in step} | {int(s) + 1 for s in step}
+    kept: dict[int, np.ndarray] = {}
+    if 0 in needed:
+        kept[0] = X.copy()
+    V = np.empty((r, len(used)), dtype=np.float32)
+    for j, c in enumerate(constant):
+        if c is not None:
+            V[:, j] = c
+    changing = [(j, vectors[v]) for j, v in enumerate(used) if constant[j] is None]
+    rate = np.float32(nominal.rate / SDIRK2.diagonal)
+
+    def solve(t: int, right: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        X = nominal.inverse[t] @ right
+        return X, X
+
+    for t in range(fine):
+        for j, vector in changing:
+            V[:, j] = vector[t]
+        known = V[:, which] * S[t]
+        X, _ = stages(SDIRK2, partial(solve, t), lambda X: rate * X, X, known)
+        T[t + 1] = C @ X
+        if t + 1 in needed:
+            kept[t + 1] = X
+    means = np.tensordot(planned.measured.mean_of.astype(np.float32), T, 1)
+    rows = np.asarray(planned.rows.row)  # (k, 3, r)
+    w = np.zeros((len(step), 3, len(columns)))
+    for q in range(len(step)):
+        now = kept[int(step[q])] + share[q] * (kept[int(step[q]) + 1] - kept[int(step[q])])
+        w[q] = rows[q] @ now
+    if planned.measured.from_first and len(w):
+        w = w - w[0]
+    n = len(columns)
+    return np.concatenate([means.reshape(-1, n), w.reshape(-1, n)])

@@ -1,0 +1,268 @@
+"""The window model stepped through a run with hypotheses switched on: states and exact derivatives.
+
+As `twin.calibrate.fit.integration`, with three differences. Loads and moving contacts keep their own fine steps (60 s)
+inside a coarse one (300 s) of films and joints: contacts held for 300 s put nuts and the TCP off by more than the
+noise. A fine step is a two-stage SDIRK step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one
+matrix for both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold
+what the description lacks, each times an amplitude a_k that is differentiated like a parameter:
+
+    (E + sum a_k E_k) x' = -(A(theta (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
+                           + (B + sum a_k B_k) P + ... + sum a_k (gate_k rise_k M_k + forcing_k),
+    T_air + sum a_k environment_k
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import twin.run.jax_setup  # noqa: F401  isort: skip
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+from twin.calibrate.fit.effects import Effects, Factors, factors_at
+from twin.calibrate.fit.integration import Rows, displacements, temperatures
+from twin.diagnose.model.ports_first import Basis, Factor, basis, factor, held, turned, within
+from twin.diagnose.model.ports_first import solved as by_factor
+from twin.diagnose.model.slots import Slots
+from twin.rom.contact_matrix import ContactEntries, ContactPlaces, dense, entries_by_contact, product, scaled
+from twin.rom.drive import Drive
+from twin.rom.model import MachineModel
+from twin.rom.step_loads import Tabulated, film_loads, source_powers
+from twin.rom.tableau import SDIRK2
+from twin.run.integrator import integrate, solved
+from twin.run.system import Array, Layout, System
+
+INNER = 5  # fine steps in a coarse one
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class NestedLoads:
+    """A run; n coarse steps of m fine ones."""
+
+    rate: Array  # (n,) 1/s of the fine steps
+    theta: Array  # (n, n_theta) W/(m^2 K): convection of films that read the log alone, then joints
+    film_table: Array  # (n, k, 65) W/(m^2 K) over DIFFERENCES
+    contacts: ContactEntries  # (n, m, ...), each contact on its own
+    environment: Array  # (n, m, n_environments) degC
+    power: Array  # (n, m, n_sources) W
+    power_table: Array  # (n, m, l, 121) W over TEMPERATURES
+    contact_heat: Array  # (n, m, s, r) W, projected
+
+
+def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> NestedLoads:
+    """The loads of a run, from a drive of fine steps whose number is a multiple of m, for a model of one body."""
+    (body,) = model.bodies
+    n = drive.n_steps // m
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return values.reshape(n, m, *values.shape[1:]).mean(axis=1)
+
+    def inner(values: np.ndarray) -> np.ndarray:
+        return values.reshape(n, m, *values.shape[1:])
+
+    apart = entries_by_contact(model.load_model, drive)
+    return NestedLoads(
+        rate=np.full(n, 1.0 / (drive.time[1] - drive.time[0])),
+        theta=mean(drive.theta),
+        film_table=mean(drive.films.value),
+        contacts=ContactEntries(inner(apart.diagonal), inner(apart.neighbour), inner(apart.weight)),
+        environment=inner(drive.environment),
+        power=inner(drive.power),
+        power_table=inner(drive.losses.value),
+        contact_heat=inner(drive.contact_heat @ body.P.T),
+    )
+
+
+def gammas(places: ContactPlaces, loads: NestedLoads, contact: np.ndarray) -> np.ndarray:
+    """Gamma (n m, n_ports, n_ports) W/K of all fine steps of a run, with the contacts scaled by contact (c,)."""
+    steps = int(np.prod(np.shape(loads.contacts.diagonal)[:2]))
+    if not places.n_ports:
+        return np.zeros((steps, 0, 0))
+    flat = jax.tree.map(lambda v: np.asarray(v).reshape(steps, *v.shape[2:]), loads.contacts)
+    return np.asarray(jax.jit(jax.vmap(lambda one: dense(jnp, places, scaled(jnp, places, one, contact))))(flat))
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class _Fixed:
+    """What derivatives of a solve take as it is."""
+
+    factor: Factor  # of S = c + P Gamma P^T
+    terms: jax.Array  # (q, r, r), many: c is their combination
+    contacts: ContactEntries
+    P: jax.Array  # (r, n_ports)
+
+
+def _by_factor(fixed: _Fixed, right: jax.Array, near: jax.Array) -> jax.Array:
+    return by_factor(fixed.factor, right)
+
+
+def _change(places: ContactPlaces, many: bool) -> Callable[[_Fixed, tuple[jax.Array, jax.Array], jax.Array], jax.Array]:
+    """S' x by c, (r, r) or (q,) of the terms, and by the contacts' factors.
+
+    Few derivatives: a matrix dc for each, made once. Many: the products of terms with the solution, which they share.
+    The other way about, either takes several times as long.
+    """
+
+    def change(fixed: _Fixed, d: tuple[jax.Array, jax.Array], x: jax.Array) -> jax.Array:
+        dc, dcontact = d
+        flow = product(jnp, places, scaled(jnp, places, fixed.contacts, dcontact), (fixed.P.T @ x)[:, None])[:, 0]
+        return (dc @ (fixed.terms @ x) if many else dc @ x) + fixed.P @ flow
+
+    return change
+
+
+@dataclass(frozen=True)
+class Operators:
+    """What stays during a trajectory, in the coordinates of `twin.diagnose.model.ports_first`."""
+
+    A: jax.Array  # (p, r, r): terms of films and joints, then of slots
+    terms: jax.Array  # (q, r, r): of E: of the model's capacities, then of slots
+    factors: jax.Array  # (q,) of these
+    E: jax.Array  # (r, r), many: its derivatives left out
+    ports: Basis
+    B: jax.Array  # (r, n_sources)
+    reads: jax.Array  # (l, r): temperatures that sources follow
+    M: jax.Array  # (K, r) of slots
+
+    @classmethod
+    def of(
+        cls, system: System, effects: Effects, slots: Slots, f: Factors, a: jax.Array, ports: Basis, many: bool
+    ) -> Operators:
+        """At factors f and amplitudes a; system: turned."""
+        T = ports.T
+        A = jnp.concatenate([jnp.asarray(system.A[0]), within(T, slots.A)])
+        terms = within(T, jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)]))
+        factors = jnp.concatenate([f.capacity - 1.0, a])
+        E = T.T @ T + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
+        B = jnp.asarray(system.B) + jnp.tensordot(a, T.T @ jnp.asarray(slots.B), 1)
+        reads = jnp.asarray(system.source_rows) + jnp.tensordot(a, jnp.asarray(slots.reads) @ T, 1)
+        return cls(A, terms, factors, E, ports, B, reads, jnp.asarray(slots.M) @ T)
+
+
+def _step(
+    layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
+    fixed: Operators, z: jax.Array, now: tuple[NestedLoads, Slots],
+) -> tuple[jax.Array, jax.Array]:  # fmt: skip
+    """The state after one coarse step, and those after its fine ones (m, r)."""
+    loads, slots = now
+    n, T_ref = layout.n_films, system.reference_temperature
+    losing = np.array(layout.following_losses, dtype=int)
+    environment = jnp.asarray(loads.environment) + f.environment + jnp.einsum("k,mke->me", a, slots.environment)
+    film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
+    # films follow the state and the mean air at the step's start
+    convection = Tabulated(jnp.asarray(loads.theta)[:n], layout.following_films, loads.film_table)
+    films = film_loads(jnp, system.film_plan, convection, system.surfaces(z), environment, 1.0, film_factor)
+    total, rise = films.total.mean(axis=0), films.outer - T_ref
+    joint_factor = f.joint * jnp.maximum(1.0 + a @ jnp.asarray(slots.joint), 0.02)
+    joints = jnp.asarray(loads.theta)[n:] * joint_factor
+    contact = f.contact * jnp.maximum(1.0 + a @ jnp.asarray(slots.contact), 0.02)
+    P, rate = jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / SDIRK2.diagonal
+    gate = a * jnp.asarray(slots.gate)
+    coefficients = jnp.concatenate([jnp.concatenate([total, joints]) - jnp.asarray(system.nominal), gate])
+    valued = lax.stop_gradient(coefficients) if many else coefficients
+    matrix = rate * fixed.E + jnp.asarray(system.A0[0]) + jnp.tensordot(valued, fixed.A, 1)
+    if many:
+        c, terms = jnp.concatenate([coefficients, rate * fixed.factors]), jnp.concatenate([fixed.A, fixed.terms])
+    else:
+        c, terms = matrix, jnp.zeros(())
+    kept = held(lax.stop_gradient(matrix), P.shape[1])
+
+    def capacity(x: jax.Array) -> jax.Array:
+        if not many:
+            return rate * (fixed.E @ x)
+        change = fixed.factors - lax.stop_gradient(fixed.factors)
+        return rate * (fixed.E @ x + change @ (fixed.terms @ lax.stop_gradient(x)))
+
+    tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
+    winding = T_ref + fixed.reads @ z
+
+    change = _change(places, many)
+
+    def fine(x: jax.Array, i: jax.Array) -> tuple[jax.Array, jax.Array]:
+        told = Tabulated(jnp.asarray(loads.power)[i] * f.source, layout.following_losses, tables[i])
+        ports = jnp.tensordot(f.source[np.array(places.sources, dtype=int)], jnp.asarray(loads.contact_heat)[i], 1)
+        power = source_powers(jnp, told, winding)
+        forcing = system.M @ (total * rise[i]) + system.H @ films.lift + fixed.B @ power + ports
+        forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ fixed.M + a @ jnp.asarray(slots.forcing)[i]
+        apart = jax.tree.map(lambda v: jnp.asarray(v)[i], loads.contacts)
+        gamma = dense(jnp, places, scaled(jnp, places, apart, lax.stop_gradient(contact)))
+        known = _Fixed(factor(kept, fixed.ports.across(gamma)), terms, apart, P)
+
+        def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+            y = solved(_by_factor, change, known, (c, contact), right, near)
+            return y, y
+
+        after, *_ = integrate(SDIRK2, 1, solve, capacity, x, jnp.asarray(forcing))
+        return after, after
+
+    m = loads.environment.shape[0]
+    return lax.scan(fine, z, jnp.arange(m))
+
+
+def trajectory(
+    layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, loads: NestedLoads,
+    slots: Slots, start: Array, v: Array,
+) -> jax.Array:  # fmt: skip
+    """States (n m + 1, r) at the fine steps from start (r,); v: parameters u of the machine, then amplitudes a (K,)."""
+    n = effects.source.shape[1]
+    v = jnp.asarray(v)
+    u, a = v[:n], v[n:]
+    f = factors_at(effects, u)
+    ports = basis(system.P[0])
+    T = ports.T
+    z0 = jnp.asarray(start) + a @ jnp.asarray(slots.initial)
+    system = turned(system, T)
+    fixed = Operators.of(system, effects, slots, f, a, ports, many)
+    loads = replace(loads, contact_heat=jnp.asarray(loads.contact_heat) @ T)
+    unused = jnp.zeros(len(loads.rate))
+    steps = replace(
+        slots, A=unused, M=unused, E=unused, B=unused, reads=unused, initial=unused,
+        forcing=jnp.asarray(slots.forcing) @ T,
+    )  # fmt: skip
+    one = partial(_step, layout, places, many, system, effects, f, a, fixed)
+    _, states = lax.scan(one, jnp.linalg.solve(T, z0), (loads, steps))
+    return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0]) @ T.T])
+
+
+def outputs_of(
+    layout: Layout, places: ContactPlaces, many: bool, from_first: bool, system: System, effects: Effects,
+    loads: NestedLoads, slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
+) -> jax.Array:  # fmt: skip
+    """Means of sensors over bins (b s,) [degC], then TCP rows (k 3,) [m]."""
+    states = trajectory(layout, places, many, system, effects, loads, slots, start, v)
+    mean_of, column = bins
+    T = jnp.asarray(mean_of) @ temperatures(system, states)[:, column]
+    w = displacements(effects, rows, states, jnp.asarray(v))
+    return jnp.concatenate([T.ravel(), (w - w[0] if from_first else w).ravel()])
+
+
+outputs = partial(jax.jit, static_argnums=(0, 1, 2, 3))(outputs_of)
+states_of = partial(jax.jit, static_argnums=(0, 1, 2))(trajectory)
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def jacobian(layout: Layout, places: ContactPlaces, from_first: bool, *rest: object) -> jax.Array:
+    """Derivatives (b s + k 3, n + K) of `outputs_of` by v."""
+    return jax.jacfwd(partial(outputs_of, layout, places, True, from_first), argnums=len(rest) - 1)(*rest)
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def by_amplitudes(
+    layout: Layout, places: ContactPlaces, from_first: bool, system: System, effects: Effects, loads: NestedLoads,
+    slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, u: Array, a: Array,
+) -> tuple[jax.Array, jax.Array]:  # fmt: skip
+    """Derivatives (b s + k 3, K) of `outputs_of` by the amplitudes alone, and the outputs."""
+
+    def both(a: jax.Array) -> tuple[jax.Array, jax.Array]:
+        v = jnp.concatenate([jnp.asarray(u), a])
+        y = outputs_of(layout, places, False, from_first, system, effects, loads, slots, rows, bins, start, v)
+        return y, y
+
+    return jax.jacfwd(both, has_aux=True)(jnp.asarray(a))

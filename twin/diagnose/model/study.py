@@ -1,0 +1,154 @@
+"""A probed model with a plan of measurements: outputs of hypotheses as one vector, and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from twin.calibrate.fit.effects import Effects, effects_of
+from twin.calibrate.fit.integration import Rows, displacements
+from twin.calibrate.fit.measured import Measured
+from twin.diagnose.model.integration import INNER, by_amplitudes, jacobian, outputs, states_of
+from twin.diagnose.model.probed_model import ProbedModel, ProbedRun
+from twin.diagnose.model.slots import Slots, first_slots, no_slots
+from twin.errors import TwinError
+
+K = 4  # amplitudes that may be active at once
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A run of the probed model with what is measured in it."""
+
+    run: ProbedRun
+    measured: Measured
+    rows: Rows
+    z0: np.ndarray  # (r,)
+
+    @property
+    def shapes(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Of bin means (b, s) and of TCP rows (k, 3)."""
+        return (self.measured.mean_of.shape[0], len(self.measured.sensors)), (len(self.measured.tcp), 3)
+
+    @property
+    def size(self) -> int:
+        """Numbers that are measured in the run."""
+        (b, s), (k, three) = self.shapes
+        return b * s + k * three
+
+    def split(self, flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(size, ...) -> (b, s, ...) and (k, 3, ...)."""
+        sensors, tcp = self.shapes
+        n = sensors[0] * sensors[1]
+        return flat[:n].reshape(*sensors, *flat.shape[1:]), flat[n:].reshape(*tcp, *flat.shape[1:])
+
+
+@dataclass(frozen=True)
+class Study:
+    """n parameters; runs in the order of the probed model: first the `fitted` ones, which are looked at, then sealed
+    ones.
+    """
+
+    probed: ProbedModel
+    effects: Effects
+    runs: tuple[Planned, ...]
+    fitted: tuple[int, ...]
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(n,) prior standard deviations in units of u."""
+        return np.array([p.sigma for p in self.probed.parameters])
+
+    @property
+    def fitted_runs(self) -> list[tuple[str, float]]:
+        """Name and fine step [s] of each fitted run."""
+        runs = [self.runs[k].run for k in self.fitted]
+        return [(run.name, float(run.drive.time[1] - run.drive.time[0])) for run in runs]
+
+    def slots(self, k: int) -> Slots:
+        """Empty slots for run k, to be filled."""
+        run = self.runs[k].run
+        return no_slots(run.drive.n_steps // INNER, INNER, K, self.probed.base.n, self.probed.base)
+
+    def outputs(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
+        """(size,) of run k at x (n,) in prior standard deviations, with hypotheses of amplitudes a."""
+        planned = self.runs[k]
+        return np.asarray(
+            outputs(self.probed.layout, self.probed.contacts, False, planned.measured.from_first,
+                    *self._arguments(k, slots), self._v(x, a))
+        )  # fmt: skip
+
+    def jacobian(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
+        """(size, n + K) derivatives by x and the amplitudes."""
+        planned = self.runs[k]
+        J = jacobian(self.probed.layout, self.probed.contacts, planned.measured.from_first,
+                     *self._arguments(k, slots), self._v(x, a))  # fmt: skip
+        return np.asarray(J) * np.concatenate([self.scale, np.ones(K)])
+
+    def by_amplitudes(self, k: int, x: np.ndarray, slots: Slots, a: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+        """Outputs (size,) of run k and their derivatives (size, len(a)) by the amplitudes of the first len(a) slots."""
+        planned = self.runs[k]
+        D, y = by_amplitudes(self.probed.layout, self.probed.contacts, planned.measured.from_first,
+                             *self._arguments(k, first_slots(slots, len(a))), self._v(x, ())[:-K],
+                             np.array(a, dtype=float))  # fmt: skip
+        return np.asarray(y), np.asarray(D)
+
+    def states(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
+        """z (n_fine + 1, r) of run k."""
+        system, effects, loads, filled, _, _, z0 = self._arguments(k, slots)
+        return np.asarray(
+            states_of(
+                self.probed.layout, self.probed.contacts, False, system, effects, loads, filled, z0, self._v(x, a)
+            )
+        )
+
+    def read(self, k: int, states: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What sensors (b, s) [degC] and the TCP (k, 3) [m] show of states of run k, as `outputs` reads them."""
+        m, rows = self.runs[k].measured, self.runs[k].rows
+        (body,) = self.probed.base.bodies
+        T = m.mean_of @ (states @ body.C.T)[:, m.column] + self.probed.base.reference_temperature
+        u = jnp.asarray(np.asarray(x) * self.scale)
+        w = np.asarray(displacements(self.effects, rows, jnp.asarray(states), u))
+        return T, w - w[0] if m.from_first else w
+
+    def _v(self, x: np.ndarray, a: Sequence[float]) -> np.ndarray:
+        amplitudes = np.zeros(K)
+        amplitudes[: len(a)] = a
+        return np.concatenate([np.asarray(x) * self.scale, amplitudes])
+
+    def _arguments(self, k: int, slots: Slots | None) -> tuple:
+        planned = self.runs[k]
+        m = planned.measured
+        filled = self.slots(k) if slots is None else slots
+        return (self.probed.system, self.effects, planned.run.loads, filled, planned.rows, (m.mean_of, m.column),
+                planned.z0)  # fmt: skip
+
+
+def make_study(probed: ProbedModel, measured: Sequence[Measured], fitted: Sequence[int]) -> Study:
+    """The study of measurements (one per run of the probed model); `fitted` are the runs that are looked at.
+
+    Raises TwinError where plans and runs do not match.
+    """
+    if len(measured) != len(probed.runs) or list(fitted) != list(range(len(fitted))):
+        raise TwinError(
+            "a plan per run, the fitted ones first", probed.base.name, "give one for every run of the probed model"
+        )
+    effects = effects_of(probed.base, probed.parameters, ())
+    (body,) = probed.base.bodies
+    G = body.G.reshape(-1, 3, body.n)
+    n_poses = len(probed.base.poses)
+    planned = []
+    for run, m in zip(probed.runs, measured, strict=True):
+        members = np.asarray(effects.G).reshape(-1, n_poses, 3, body.n)
+        rows = Rows(m.tcp_step, m.tcp_share, np.tensordot(m.pose, G, 1), np.einsum("kp,epcr->ekcr", m.pose, members))
+        z0 = (run.start - probed.base.reference_temperature) * body.one
+        planned.append(Planned(run, m, rows, z0))
+    return Study(probed, effects, tuple(planned), tuple(fitted))
+
+
+def with_measured(study: Study, measured: Sequence[Measured]) -> Study:
+    """The same plan with other numbers measured."""
+    return replace(study, runs=tuple(replace(p, measured=m) for p, m in zip(study.runs, measured, strict=True)))

@@ -1,0 +1,302 @@
+"""`twin diagnose`: from an artefact and measured runs to a verdict, an extended description and the gain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from twin import __version__
+from twin.build.cache import arrays_hash, cached, machine_hash
+from twin.calibrate.fit.measured import Measured, measured
+from twin.calibrate.fit.problem import run_names
+from twin.diagnose.evidence.coarse import too_coarse
+from twin.diagnose.evidence.discretisation import Difference, differences
+from twin.diagnose.evidence.nulls import form_of
+from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.faults.catalogue import VERSION
+from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.faults.fault import Family
+from twin.diagnose.faults.table import FAMILIES
+from twin.diagnose.model.probed_model import ProbedModel, drive_arrays, make_probed_model
+from twin.diagnose.model.study import Study, make_study
+from twin.diagnose.model.surrogate import Surrogate
+from twin.diagnose.plan.plan import make_plan
+from twin.diagnose.plan.suspicion import known_family, named, pairs_of, suspicions_in, worst_of_machine
+from twin.diagnose.report.scene import scene_of
+from twin.diagnose.result.diagnosis import Cause, Diagnosis, Series, Unknown, Verdict
+from twin.diagnose.result.place import Scene
+from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.look import Search
+from twin.diagnose.search.policy import POLICY, SearchPolicy
+from twin.diagnose.search.sealed import judged
+from twin.diagnose.search.settled_beside import settled
+from twin.diagnose.search.support import support_of
+from twin.diagnose.search.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
+from twin.errors import ArtefactError, LogError
+from twin.logs.run import Run
+from twin.machine.description import Machine
+from twin.machine.load import load_machine
+from twin.machine.parameters import parameters
+from twin.progress import Progress, silent
+from twin.rom.artefact import Artefact
+
+LEAST = 24  # means of a sensor over 5 min, and TCP rows
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a diagnosis is made."""
+
+    temperature_sigma: float = 0.1  # K, of one reading
+    tcp_sigma: float = 1e-6  # m, where tcp.csv has no sigma
+    exclude: tuple[str, ...] = ()  # sensors
+    families: tuple[Family, ...] = FAMILIES
+    form: int = FORM  # synthetic measurements for model discrepancy
+    nulls: int = NULLS  # and for thresholds
+    seed: int = 1
+    policy: SearchPolicy = POLICY
+    plan: str | None = None  # a suspicion to plan the next experiment for; "": what the verdict leaves open
+
+
+@dataclass(frozen=True)
+class Result:
+    diagnosis: Diagnosis
+    search: Search
+    causes: tuple[Cause, ...]  # that belong into the description
+    families: tuple[Family, ...] = FAMILIES
+
+
+def machine_of(artefact: Artefact, path: Path, machine: Path | None = None) -> Machine:
+    """The description inside an artefact, with the meshes of where it was built.
+
+    Raises ArtefactError where the meshes are gone, or others than they were (as `twin verify` does; a calibrated
+    artefact has a description of its own, with which its hash cannot be compared).
+    """
+    origin = Path(machine or artefact.provenance.get("machine", ""))
+    if not origin.exists():
+        raise ArtefactError(f"its machine description is not at {origin}", str(path), "name it with --machine")
+    described = load_machine(origin, artefact.description)
+    calibrated = "calibrated_from" in artefact.provenance
+    if not calibrated and machine_hash(described) != artefact.provenance.get("machine_hash"):
+        raise ArtefactError(
+            f"{origin} is not the machine this artefact was built from (description or meshes differ)",
+            str(path),
+            "build again, or name the right description with --machine",
+        )
+    return described
+
+
+def prepare(
+    artefact: Artefact, machine: Machine, runs: Sequence[Run], sealed: Sequence[Run], settings: Settings,
+    progress: Progress = silent,
+) -> tuple[ProbedModel, Study, Detector, list[Measured]]:  # fmt: skip
+    """Probed model, study and detector, the expensive parts from the cache; sealed runs enter by their loads only.
+
+    Raises LogError for runs that hold nothing to compare, or too little.
+    """
+    known = parameters(machine)
+    every = [*runs, *sealed]
+    probed = make_probed_model(machine, known, every, progress)
+    plans = [measured(probed.base, run, own.drive, own.name, exclude=settings.exclude)
+             for run, own in zip(every, probed.runs, strict=True)]  # fmt: skip
+    closed = [*plans[: len(runs)], *(_closed(m) for m in plans[len(runs) :])]
+    study = make_study(probed, closed, range(len(runs)))
+    if sum(m.n_temperature + len(m.tcp) for m in plans[: len(runs)]) < LEAST:
+        raise LogError(
+            "too few measurements to diagnose", str(runs[0].folder),
+            f"two hours of one sensor of the machine, or {LEAST} TCP rows",
+        )  # fmt: skip
+    instruments = instruments_of(study, settings.temperature_sigma, settings.tcp_sigma)
+    parts = []
+    for planned in study.runs:
+        m, drive, signals = planned.measured, planned.run.drive, planned.run.signals
+        parts += [m.mean_of, m.column, np.nan_to_num(m.count), m.tcp_step, m.tcp_share, m.pose, planned.z0,
+                  np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
+                  *(signals[name] for name in sorted(signals))]  # fmt: skip
+    # the window's coordinates: made anew on other cores they may be others, and z0 is zero at the reference temperature
+    parts += [probed.B, *(body.C for body in probed.base.bodies)]
+    asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)
+    names = tuple((f.name, f.number, f.file) for f in settings.families)
+    tolerance = tuple((p.path, p.nominal, p.sigma) for p in known)
+    counts, form = (settings.form, settings.nulls), form_of(machine)
+
+    def differ(surrogate: Surrogate) -> tuple[Difference, ...]:
+        return differences(machine, study, surrogate, known, every, closed, progress)
+
+    inputs = (
+        machine_hash(machine),
+        asked,
+        tuple(study.fitted),
+        arrays_hash(parts),
+        instruments,
+        names,
+        tolerance,
+        counts,
+    )
+    families, policy = settings.families, settings.policy
+    detector = cached(
+        "detector", make_detector.__module__, inputs,
+        lambda: stored(make_detector(study, families, instruments, policy, form, counts, progress, differ)),
+    )  # fmt: skip
+    return probed, study, detector.of(study, policy), plans
+
+
+def _closed(m: Measured) -> Measured:
+    """The plan of a sealed run without its numbers."""
+    return replace(m, temperature=np.full_like(m.temperature, np.nan), tcp=np.full_like(m.tcp, np.nan))
+
+
+def diagnose(
+    artefact: Artefact,
+    machine: Machine,
+    runs: Sequence[Run],
+    sealed: Sequence[Run] = (),
+    settings: Settings = Settings(),
+    progress: Progress = silent,
+) -> Result:
+    """The diagnosis of measured runs. Sealed runs are opened after everything else is decided.
+
+    Raises LogError and TwinError for runs and descriptions that cannot be used.
+    """
+    names = run_names([*runs, *sealed])
+    sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
+    usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
+    faults += broken_sensors(usable, sensors, names[: len(runs)])
+    if settings.plan:
+        known_family(settings.plan, settings.families)  # now, not after minutes
+    _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
+    asked = named(settings.plan, detector) if settings.plan else []
+    found = search(detector, measured_of(study))
+    verdict, causes = verdict_of(found, settings.families)
+    shown = found
+    groups = {f.name: f.group for f in settings.families}
+    if verdict == "unknown":  # told and judged is the calibration beside faulty channels then, not what was tried
+        shown = _beside_sensors(found, groups)
+    notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
+    if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
+        notes.append(coarse.note)
+    searched = causes  # what was seen before any search has no statistic that channels could share
+    verdict, causes = with_faults(verdict, causes, faults)
+    notes += [
+        f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED and not c.rivals
+    ]
+    opened = judged(shown, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
+    verdict, causes, extension = opened.verdict, opened.causes, opened.extension
+    if opened.note:  # what is shown is then the calibration beside faulty channels, as of any unknown
+        notes.insert(0, opened.note)
+        shown, searched = _beside_sensors(found, groups), ()
+    first = found.steps[0]
+    heat = unknown_of(found) if verdict == "unknown" else None
+    planned = None
+    if settings.plan is not None:
+        pairs = pairs_of(found) if verdict == "ambiguous" and not asked else []
+        chosen = asked or suspicions_in([h for pair in pairs for h in pair], detector)
+        chosen = chosen or worst_of_machine(detector, settings.families)
+        planned = make_plan(detector, machine, usable, chosen, pairs, settings.temperature_sigma, progress)
+    diagnosis = Diagnosis(
+        machine=machine.machine.name,
+        verdict=verdict,
+        summary=_summary(verdict, causes, shown),
+        causes=causes,
+        pulls=pulls_of(shown),
+        detection_limits=limits_of(detector),
+        unknown=heat,
+        gain=opened.gains,
+        ranked=tuple(rival_of(h, float(first.cosine[0, i])) for i, h in enumerate(first.ranked)),
+        cosine=first.cosine,
+        nulls=detector.nulls,
+        thresholds=detector.thresholds,
+        observed=first.observed,
+        whiteness=_whiteness(shown, plans),
+        series=_series(shown, plans, len(runs)),
+        notes=tuple(notes),
+        seed=settings.seed,
+        catalogue=VERSION,
+        provenance={
+            "twin": __version__,
+            "machine_hash": machine_hash(machine),
+            "runs": names[: len(runs)],
+            "sealed": names[len(runs) :],
+            "nulls": settings.nulls,
+            "window_states": study.probed.base.n,
+            "window_error_K": study.probed.reduction[0],
+            "window_error_m": study.probed.reduction[1],
+        },
+        support=support_of(found) if searched and heat is None else None,
+        scene=_scene(machine, study.probed, searched or causes, heat),
+        plan=planned,
+    )
+    return Result(diagnosis, found, extension, settings.families)
+
+
+def _beside_sensors(found: Search, groups: Mapping[str, str]) -> Search:
+    """The search with the causes that are faulty temperature sensors alone, and the calibration beside these."""
+    kept = tuple(a for a in found.accepted if groups.get(a.hypothesis.family) == "sensor")
+    x, covariance = settled(found.detector, measured_of(found.detector.study), kept)
+    return replace(found, accepted=kept, x=x, covariance=covariance)
+
+
+def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unknown: Unknown | None) -> Scene | None:
+    """Where the first cause is, or the heat that nothing explains."""
+    if unknown is not None:
+        return scene_of(machine, probed, unknown.surface)
+    if not causes:
+        return None
+    return scene_of(machine, probed, causes[0].place, str(causes[0].settings.get("surface", "")))
+
+
+def _summary(verdict: Verdict, causes: Sequence[Cause], found: Search) -> tuple[str, ...]:
+    from twin.diagnose.report.text import cause_words
+
+    lines = [cause_words(c) for c in causes]
+    if verdict == "nothing":
+        lines.append("no significant misfit")
+    strong = [p.path for p in pulls_of(found) if abs(p.pull) > 3.0]
+    if strong:
+        lines.append(f"far from their nominal values: {', '.join(strong[:5])}")
+    return tuple(lines)
+
+
+def _whiteness(found: Search, plans: Sequence[Measured]) -> tuple[tuple[str, float, float], ...]:
+    """Lag-1 correlation of every channel's residual, recalibrated and extended, over all fitted runs."""
+    study = found.detector.study
+    before: dict[str, list[float]] = {}
+    after: dict[str, list[float]] = {}
+    for k in study.fitted:
+        models = predicted(found, k)
+        for table, flat in ((before, models.recalibrated), (after, models.extended)):
+            T, _ = study.runs[k].split(flat)
+            error = plans[k].temperature - T
+            for i, name in enumerate(plans[k].sensors):
+                r = error[:, i]
+                pair = np.isfinite(r[1:]) & np.isfinite(r[:-1])
+                if pair.sum() > 3:
+                    a, b = r[1:][pair], r[:-1][pair]
+                    table.setdefault(name, []).append(float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-30)))
+    return tuple((name, float(np.mean(before[name])), float(np.mean(after[name]))) for name in before)
+
+
+def _series(found: Search, plans: Sequence[Measured], fitted: int) -> tuple[Series, ...]:
+    study = found.detector.study
+    result = []
+    for k, (planned, m) in enumerate(zip(study.runs, plans, strict=True)):
+        models = [planned.split(v) for v in vars(predicted(found, k)).values()]
+        run = planned.run
+        start, dt = run.drive.time[0], run.drive.time[1] - run.drive.time[0]
+        step = np.clip(((m.bin_time - start) / dt).astype(int), 0, run.drive.n_steps - 1)
+        result.append(
+            Series(
+                run=m.name, time=m.bin_time - start, sensors=m.sensors,
+                delivered=m.temperature - models[0][0], recalibrated=m.temperature - models[1][0],
+                extended=m.temperature - models[2][0], tcp_time=m.tcp_time - start,
+                tcp_delivered=m.tcp - models[0][1], tcp_recalibrated=m.tcp - models[1][1],
+                tcp_extended=m.tcp - models[2][1], loads={s: v[step] for s, v in run.signals.items()},
+                sealed=k >= fitted, measured=m.temperature, tcp_measured=m.tcp,
+            )
+        )  # fmt: skip
+    return tuple(result)

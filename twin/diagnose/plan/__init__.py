@@ -1,0 +1,1 @@
+"""`--plan`: the next experiment that lowers the limit of a suspicion most."""

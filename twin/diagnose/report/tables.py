@@ -1,0 +1,145 @@
+"""The tables of the page of a diagnosis. All text is escaped here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from twin.diagnose.report.text import beyond, history_words, place_words, times, what
+from twin.diagnose.result.diagnosis import Cause, Diagnosis, Rival
+from twin.diagnose.result.numbers import customary, interval_and_unit, number, quantity
+
+MANY = 60  # rows that a table shows at most
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """A table with a head; columns in `numbers` are set right. Cells are plain text."""
+    kinds = [' class="number"' if k in numbers else "" for k in range(len(head))]
+    rows = list(rows)
+    shown = "\n".join(
+        "<tr>" + "".join(f"<td{kind}>{escape(cell)}</td>" for kind, cell in zip(kinds, row, strict=True)) + "</tr>"
+        for row in rows[:MANY]
+    )
+    more = f"<p>{len(rows) - MANY} more in report.json.</p>" if len(rows) > MANY else ""
+    titles = "".join(f"<th{kind}>{escape(title)}</th>" for kind, title in zip(kinds, head, strict=True))
+    return f'<div class="wide"><table><thead><tr>{titles}</tr></thead><tbody>\n{shown}\n</tbody></table></div>{more}'
+
+
+def folded(summary: str, html: str) -> str:
+    """What a reader opens who wants to know: a line that says what it is, over escaped HTML."""
+    return f"<details><summary>{escape(summary)}</summary>\n{html}\n</details>" if html else ""
+
+
+def _sized(value: float, ci95: tuple[float, float], unit: str) -> tuple[str, str]:
+    middle, low, high, name = interval_and_unit(value, *ci95, unit)
+    if not math.isfinite(value):
+        return "-", "-"
+    return f"{middle} {name}".rstrip(), f"{low} to {high} {name}".rstrip() if math.isfinite(sum(ci95)) else "-"
+
+
+def when(cause: Cause) -> str:
+    """The history in words, with the windows where it is made of them."""
+    parts = [
+        f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" + (f" at {w.level:.2g}" if w.level != 1.0 else "")
+        for w in cause.windows[:6]
+    ]
+    if len(cause.windows) > 6:
+        parts.append(f"and {len(cause.windows) - 6} more")
+    return "; ".join([history_words(cause.history) or "always", *parts])
+
+
+def causes_table(causes: Sequence[Cause]) -> str:
+    rows = []
+    for k, c in enumerate(causes):
+        size, interval = _sized(c.amplitude, c.ci95, c.unit)
+        rows.append(
+            [str(k + 1), what(c.family), place_words(c.place), size, interval, when(c), number(c.statistic),
+             number(c.threshold), c.parameter or "nothing"]
+        )  # fmt: skip
+    head = ["", "what", "where", "size", "95 % interval", "when", "statistic", "needed", "changes"]
+    return table(head, rows, (3, 4, 6, 7))
+
+
+def rivals_table(rivals: Sequence[Rival], thresholds: bool, d: Diagnosis) -> str:
+    """Candidates or rivals; `thresholds` adds the column of their family's threshold."""
+    rows = []
+    for k, r in enumerate(rivals):
+        size, interval = _sized(r.amplitude, r.ci95, r.unit)
+        row = [str(k + 1), what(r.family), place_words(r.place), history_words(r.history) or "always", size, interval]
+        row += [number(r.statistic)] + ([number(d.thresholds.get(r.family, math.nan))] if thresholds else [])
+        rows.append([*row, f"{r.cosine:.2f}" if math.isfinite(r.cosine) else "-"])
+    head = [
+        "",
+        "what",
+        "where",
+        "when",
+        "size",
+        "95 % interval",
+        "statistic",
+        *(["needed"] if thresholds else []),
+        "cosine",
+    ]
+    return table(head, rows, (4, 5, 6, 7, 8) if thresholds else (4, 5, 6, 7))
+
+
+def limits_table(d: Diagnosis) -> str:
+    rows = []
+    for x in d.detection_limits:
+        largest = max((abs(v) for v in (x.size, x.smallest, x.largest) if math.isfinite(v)), default=math.nan)
+        factor, unit = customary(x.unit, largest)
+        unit = unit or times(x.family, x.unit)
+        sizes = [f"{number(factor * v)} {unit}".rstrip() for v in (x.size, x.smallest, x.largest)]
+        rows.append([what(x.family), *sizes, place_words(x.place)])
+    head = ["what", "seen from (median of places)", "at the best place", "at the worst place", "place of the median"]
+    return table(head, rows, (1, 2, 3))
+
+
+def gain_table(d: Diagnosis) -> str:
+    """Per channel and sealed run; the run is told where there are several."""
+    rows, several = [], len({g.run for g in d.gain}) > 1
+    for g in d.gain:
+        low, high = g.ci95
+        _, a, b, unit = interval_and_unit(low, low, high, g.unit)
+        interval, sure = f"{a} to {b} {unit}", "no difference beyond chance"
+        if not math.isfinite(low + high):
+            interval, sure = "-", ""
+        elif low > 0 or high < 0:
+            sure = "better" if low > 0 else "worse"
+        sizes = [quantity(v, g.unit) for v in (g.delivered, g.recalibrated, g.extended)]
+        run = [g.run] if several else []
+        rows.append([*run, g.channel, *sizes, interval, sure, "yes" if g.affected else "no"])
+    head = [
+        *(["sealed run"] if several else []),
+        "channel",
+        "as delivered",
+        "recalibrated",
+        "extended",
+        "gain over recalibrated (95 %)",
+        "",
+        "causes move it",
+    ]
+    return table(head, rows, tuple(k + several for k in (1, 2, 3, 4)))
+
+
+def pulls_table(d: Diagnosis) -> str:
+    """Parameters beyond two standard deviations, and those that were freed of their tolerance."""
+    rows = [
+        [p.path + (" (free of its tolerance)" if p.freed else ""), quantity(p.nominal, p.unit),
+         quantity(p.value, p.unit), f"{p.pull:+.1f}", f"{p.sigma:.2f}"]
+        for p in beyond(d.pulls, 0.0) if p.freed or abs(p.pull) > 2.0
+    ]  # fmt: skip
+    return table(["parameter", "declared", "fitted", "pull", "posterior sigma"], rows, (1, 2, 3, 4))
+
+
+def families_table(d: Diagnosis) -> str:
+    """Per family its statistic in these data, its threshold, and what simulated data without an effect gave."""
+    rows = []
+    for family in dict.fromkeys([*d.observed, *d.thresholds, *d.nulls]):
+        nulls = [float(v) for v in d.nulls.get(family, []) if math.isfinite(v)]
+        threshold = d.thresholds.get(family, math.nan)
+        row = [number(d.observed[family]) if family in d.observed else "-", number(threshold)]
+        row += [number(max(nulls)), f"{sum(v > threshold for v in nulls)} of {len(nulls)}"] if nulls else ["-", "-"]
+        rows.append([what(family), *row])
+    head = ["family", "these data", "needed", "largest without an effect", "of them above what is needed"]
+    return table(head, rows, (1, 2, 3, 4))

@@ -1,0 +1,330 @@
+"""The words of a diagnosis: causes, places and chances, a sentence per verdict, ten lines for a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.faults.table import family_of
+from twin.diagnose.report.recalibration import left_words, moved_words
+from twin.diagnose.result.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival
+from twin.diagnose.result.numbers import interval_and_unit, number, quantity, size_words
+from twin.diagnose.result.place import Support
+from twin.diagnose.result.spot import Spot
+
+LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
+SEEN = ("stuck", "leap", "broken")  # histories of sensors at fault that are seen before anything is fitted
+
+
+def what(family: str) -> str:
+    entry = family_of(family)
+    return (entry and entry.what) or family.replace("_", " ")
+
+
+def place_words(place: str) -> str:
+    """As "film bed" for "films.bed"; surfaces and the rest stay as they are."""
+    return Spot.read(place).words
+
+
+def history_words(history: str) -> str:
+    return "" if history in ("", "always") else history.replace("^2", "²").replace("^3", "³")
+
+
+def times(family: str, unit: str) -> str:
+    """What a size without a unit is a multiple of."""
+    entry = family_of(family)
+    return entry.times if entry and unit in ("", "1") else ""
+
+
+def setting_words(cause: Cause) -> str:
+    """What a size holds for: the surface that heat really enters, the medium, the part that a scale follows."""
+    settings, said = cause.settings, []
+    if surface := settings.get("surface"):
+        said.append(f"which enters at {surface}")
+    if part := settings.get("part"):
+        said.append(f"with the temperature of {part}")
+    if entry := family_of(cause.family):
+        said += entry.said(cause)
+    if (reference := settings.get("reference")) and cause.signal:
+        said.append(f"where {cause.signal} is {number(float(reference))} in SI units")
+    if height := settings.get("height"):
+        said.append(f"about {number(float(height))} m")
+    return ", ".join(said)
+
+
+def cause_words(cause: Cause | Rival) -> str:
+    """As "heat that the description lacks at bed.x_motor: 85 W (95 % interval 80 to 90 W), following x_current²"."""
+    where = place_words(cause.place)
+    entry = family_of(cause.family)
+    if entry and entry.channel and where:
+        head = f"{where} is at fault"
+    else:
+        head = what(cause.family) + (f" {'in' if where.startswith('run ') else 'at'} {where}" if where else "")
+    size = size_words(cause.amplitude, cause.ci95, cause.unit)
+    if size and (whose := times(cause.family, cause.unit)):
+        size = f"{size} {whose}"
+    if isinstance(cause, Cause) and (settings := setting_words(cause)):
+        size = f"{size}, {settings}" if size else settings
+    history = history_words(cause.history)
+    if entry and entry.kind_told:
+        said = [text for text in (history, size) if text]
+    else:  # "x_current²" is a signal to follow; "from 4 h of run_1 on" says all
+        said = [text for text in (size, f"following {history}" if history and " " not in history else history) if text]
+    return head + (f": {', '.join(said)}" if said else "")
+
+
+def limit_words(limit: Limit) -> str:
+    return f"{what(limit.family)}, {quantity(limit.size, limit.unit)} {times(limit.family, limit.unit)}".rstrip()
+
+
+def joined(items: Sequence[str]) -> str:
+    """One sentence of several items, which hold commas of their own: a; b; and c."""
+    if len(items) < 2:
+        return "".join(items)
+    return "; ".join(items[:-1]) + f"; and {items[-1]}"
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def beyond(pulls: Sequence[Pull], sigmas: float) -> list[Pull]:
+    """Parameters pulled further than so many prior standard deviations, the furthest first."""
+    return sorted((p for p in pulls if abs(p.pull) > sigmas), key=lambda p: -abs(p.pull))
+
+
+def pull_words(pull: Pull, factors: tuple[float, float] = (math.nan, math.nan)) -> str:
+    """`factors`: 95 % interval of value over nominal, where it is known."""
+    low, high = sorted(pull.nominal * f for f in factors)
+    return (
+        f"{pull.path} is {size_words(pull.value, (low, high), pull.unit)} instead of "
+        f"{quantity(pull.nominal, pull.unit)} ({pull.pull:+.1f} standard deviations of what was declared)"
+    )
+
+
+def pull_of(d: Diagnosis, cause: Cause) -> Pull | None:
+    """The pull of the declared number that a cause is; None of other causes."""
+    return next((p for p in d.pulls if p.path == cause.parameter or (p.freed and _of(cause.place, p.path))), None)
+
+
+def _of(place: str, path: str) -> bool:
+    return path == place or path.startswith(f"{place}.")
+
+
+def verdict_sentence(d: Diagnosis) -> str:
+    """The verdict in one sentence: what, where, how much, how sure."""
+    causes = joined([cause_words(c) for c in d.causes])
+    if d.verdict == "nothing":
+        limits = d.detection_limits
+        seen = f"; {limit_words(limits[0])}, would have been seen at half of all places" if limits else ""
+        told = [text for text in (moved_words(d), left_words(d)) if text]
+        fits = "" if told else ": within their noise the description explains them"
+        return " ".join([f"Nothing is missing that these data could show{fits}{seen}.", *map(_sentence, told)])
+    if d.verdict == "unknown":
+        return _sentence(_unknown_words(d) + (f"; named besides: {causes}" if causes else ""))
+    if d.verdict == "out_of_tolerance":
+        return _sentence(f"Declared values cannot hold: {_strained_words(d)}")
+    if d.verdict == "ambiguous":
+        return _sentence(_ambiguous_words(d))
+    if not causes:
+        return {
+            "sensor": "A temperature sensor is at fault, not the machine.",
+            "signal": "A logged signal is at fault, not the machine.",
+        }.get(d.verdict, "A cause was found, and none is listed.")
+    if d.verdict == "sensor":
+        return _sentence(f"Not the machine, but its measurement: {causes}")
+    if d.verdict == "signal":
+        return _sentence(f"Not the machine, but what was logged of its loads: {causes}")
+    if len(d.causes) == 1:
+        return _sentence(causes)
+    return _sentence(f"{len(d.causes)} causes act together: {causes}")
+
+
+def _strained_words(d: Diagnosis) -> str:
+    numbers = {
+        c.place: pull_words(replace(p, value=p.nominal * c.amplitude), c.ci95)
+        for c in d.causes if (p := pull_of(d, c))
+    }  # fmt: skip
+    besides = [cause_words(c) for c in d.causes if c.place not in numbers]
+    if not numbers:
+        return joined(besides or [pull_words(p) for p in beyond(d.pulls, 3.0)[:3]]) or "see the pulls"
+    return joined([*numbers.values()]) + (f"; besides: {joined(besides)}" if besides else "")
+
+
+def _unknown_words(d: Diagnosis) -> str:
+    if d.unknown is None:
+        return "the residuals hold an effect that nothing in the catalogue explains"
+    part, surface = d.unknown.part, d.unknown.surface
+    text = f"heat enters part {part}, mostly at {surface}, and nothing in the catalogue explains it"
+    largest, sigma, at, run = 0.0, math.nan, math.nan, ""
+    for name, (time, heat, spread) in d.unknown.history.items():
+        for t, q, s in zip(time, heat, spread, strict=False):
+            if abs(q) > abs(largest):
+                largest, sigma, at, run = q, s, t, name
+    if not run:
+        return text
+    middle, low, high, unit = interval_and_unit(largest, largest - 1.96 * sigma, largest + 1.96 * sigma, "W")
+    return f"{text}; its peak is {middle} {unit} (95 % interval {low} to {high} {unit}), {at / 3600:.1f} h into {run}"
+
+
+def alternatives(d: Diagnosis) -> list[Cause | Rival]:
+    """What an ambiguous verdict leaves open, the likeliest first."""
+    if d.causes:
+        first = _rivalled(d)
+        return [first, *first.rivals]
+    return list(d.ranked[:2])
+
+
+def _rivalled(d: Diagnosis) -> Cause:
+    """The first cause that has rivals: a stuck sensor before it has none."""
+    return next((c for c in d.causes if c.rivals), d.causes[0])
+
+
+def _ambiguous_words(d: Diagnosis) -> str:
+    these = alternatives(d)
+    if not these:
+        return "something is missing, and these data do not tell what"
+    ways = "; or ".join(cause_words(c) for c in these[:3])
+    more = f"; or {len(these) - 3} more" if len(these) > 3 else ""
+    besides = joined([cause_words(c) for c in d.causes if c is not _rivalled(d)])
+    return f"something is missing, and these data do not tell what: either {ways}{more}" + (
+        f"; besides: {besides}" if besides else ""
+    )
+
+
+def remedies(d: Diagnosis) -> list[str]:
+    """What to measure so that rivals come apart, each once."""
+    found = [r.remedy for c in d.causes for r in c.rivals if r.remedy] + [r.remedy for r in d.ranked if r.remedy]
+    return list(dict.fromkeys(found))
+
+
+def chance(nulls: np.ndarray | None, threshold: float) -> str:
+    """How often data of a machine without an effect pass `threshold`; "" without simulated data sets."""
+    values = np.asarray([] if nulls is None else nulls, dtype=float)
+    values = values[np.isfinite(values)]
+    n, above = len(values), int((values > threshold).sum())
+    if not n or not math.isfinite(threshold):
+        return ""
+    most = f"the largest of them gave {number(float(values.max()))}"
+    if above:
+        return (
+            f"Data of a machine without this effect give more than {number(threshold)} once in {round(n / above)} "
+            f"({above} of {n} simulated data sets; {most})."
+        )
+    # none of n: with 95 % confidence the rate is below 3 / n
+    return (
+        f"Data of a machine without this effect give more than {number(threshold)} at most once in "
+        f"{max(1, round(n / 3))} (none of {n} simulated data sets; {most})."
+    )
+
+
+def evidence_sentence(d: Diagnosis, family: str, statistic: float, threshold: float) -> str:
+    """The statistic of one finding against its threshold, in plain words."""
+    text = f"These data give a statistic of {number(statistic)}; {number(threshold)} is needed."
+    return f"{text} {chance(d.nulls.get(family), threshold)}".strip()
+
+
+def cause_evidence(d: Diagnosis, c: Cause) -> str:
+    """What speaks for a cause; a rate of chance only where it was judged by what synthetic measurements gave."""
+    if c.history in SEEN:  # before anything was fitted
+        longest = max((w.end - w.start for w in c.windows), default=math.nan)
+        at = min((w.start for w in c.windows), default=math.nan)
+        what = {
+            "stuck": f"Its reading stood still for {number(longest / 3600.0)} h",
+            "leap": f"Its reading leapt by {number(c.amplitude)} K at {number(at / 3600.0)} h, faster than heat can",
+            "broken": f"Its reading is noise, or at a limit, from {number(at / 3600.0)} h on",
+        }[c.history]
+        return f"{what}; no statistic is needed to see that."
+    if c.threshold == d.thresholds.get(c.family, c.threshold):
+        return evidence_sentence(d, c.family, c.statistic, c.threshold)
+    # a declared number: both are squares, of its distance from the declared one
+    far, needed = (number(math.sqrt(max(v, 0.0))) for v in (c.statistic, c.threshold))
+    if c.history == "always":  # freed of its tolerance
+        return f"It lies {far} standard deviations of its fit from what was declared; {needed} are needed."
+    return f"Calibration moves it {far} times as far as all but 3 % of simulated data sets without an effect do."
+
+
+def support_words(support: Support) -> str:
+    """How many channels carry the first cause, and which."""
+    strongest = [f"{name} {100 * share:.0f} %" for name, share in support.shares[:3] if share >= LEAST_SHARE]
+    n = number(support.participation, 1)
+    return f"{n} channels carry this (participation ratio): {', '.join(strongest)} of the evidence."
+
+
+def sealed_runs(d: Diagnosis) -> list[str]:
+    """The runs on which the gain was measured."""
+    return list(dict.fromkeys(g.run for g in d.gain))
+
+
+def rms_of(gains: Sequence[Gain]) -> tuple[float, float, float]:
+    """Root mean square over channels of one unit: as delivered, recalibrated, extended; NaN of none."""
+    rows = np.array([[g.delivered, g.recalibrated, g.extended] for g in gains], dtype=float).reshape(-1, 3)
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    if not len(rows):
+        return math.nan, math.nan, math.nan
+    a, b, c = np.sqrt((rows**2).mean(axis=0)).tolist()
+    return a, b, c
+
+
+def gain_sentences(d: Diagnosis) -> list[str]:
+    """What the extended model brings on each sealed run: the channels that the causes move, then the others."""
+    return [text for run in sealed_runs(d) for text in _gain_sentences(d, run)]
+
+
+def _gain_sentences(d: Diagnosis, run: str) -> list[str]:
+    result = []
+    head = f"{run}: " if len(sealed_runs(d)) > 1 else ""
+    for affected, which in ((True, "that the causes move"), (False, "that they do not move")):
+        for unit, name in (("K", "temperature"), ("m", "TCP direction")):
+            these = [g for g in d.gain if g.run == run and g.affected == affected and g.unit == unit]
+            a, b, c = (quantity(v, unit) for v in rms_of(these))
+            if not these:
+                continue
+            counted = f"{len(these)} {name}{'s' if len(these) > 1 else ''}"
+            better = sum(g.ci95[0] > 0 for g in these)
+            worse = sum(g.ci95[1] < 0 for g in these)
+            result.append(
+                f"{head}{counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
+                f"noise included); better beyond chance in {better}, worse in {worse}."
+            )
+    return result
+
+
+def summary_lines(diagnosis: Diagnosis) -> list[str]:
+    """At most ten lines for a terminal: verdict, evidence, what would tell rivals apart, gain, limits."""
+    d = diagnosis
+    lines = [f"{d.machine}: {d.verdict.replace('_', ' ')}", verdict_sentence(d)]
+    several = len(d.causes) > 1
+    lines += [(f"{c.place}: " if several else "") + cause_evidence(d, c) for c in d.causes[:2]]
+    if d.support:
+        lines.append(support_words(d.support))
+    if d.unknown and not d.causes:
+        lines.append(evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold))
+    if d.verdict == "signal" and any(c.parameter for c in d.causes):
+        lines.append("No cause is added to the machine: machine.toml corrects the declaration of the signal.")
+    elif d.verdict in ("sensor", "signal"):
+        lines.append("The model of the machine is left as it is.")
+    if d.verdict in ("ambiguous", "named") and remedies(d):
+        lines.append(f"To tell rivals apart: {remedies(d)[0]}")
+    if d.unknown and d.unknown.correlated_signals:
+        name, correlation = d.unknown.correlated_signals[0]
+        lines.append(f"The unexplained heat follows {name} best (correlation {correlation:+.2f}).")
+    lines += [f"Sealed run{' ' if len(sealed_runs(d)) > 1 else ': '}{text}" for text in gain_sentences(d)[:2]]
+    far = beyond(d.pulls, 2.0)
+    if far and d.verdict != "out_of_tolerance":
+        lines.append(f"Worth a look: {joined([pull_words(p) for p in far[:2]])}.")
+    if d.detection_limits and d.verdict == "nothing":
+        shown = joined([limit_words(x) for x in d.detection_limits[:5]])
+        lines.append(f"At half of all places these data would have shown, in 95 of 100 cases: {shown}.")
+    before, after = (np.array([w[k] for w in d.whiteness], dtype=float) for k in (1, 2))
+    if np.isfinite(before).any() and np.isfinite(after).any():
+        lines.append(
+            f"What is left is correlated by {np.nanmedian(after):.2f} from bin to bin (median of channels; "
+            f"{np.nanmedian(before):.2f} before)."
+        )
+    if d.notes:
+        lines.append(f"Note: {d.notes[0]}" + (f" ({len(d.notes) - 1} more in the report)" if len(d.notes) > 1 else ""))
+    return [" ".join(line.split()) for line in lines[:10]]

@@ -1,0 +1,1 @@
+"""From scores to a verdict: detector, selection, exact refinement, stop rules, the sealed runs."""

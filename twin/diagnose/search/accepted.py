@@ -1,0 +1,185 @@
+"""Causes that a search has accepted, and what the model with them says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.consistency import Size
+from twin.diagnose.evidence.fitter import bounds
+from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.spot import Spot
+from twin.diagnose.search.detector import Detector
+
+OWN = ("gain", "conductance", "total")  # how parameters of sources, films, contacts and joints are called there
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A cause with its amplitudes after the last refit."""
+
+    hypothesis: Hypothesis
+    units: tuple[Unit, ...]  # none where it acts on what is read
+    amplitude: np.ndarray  # (q,)
+    covariance: np.ndarray  # (q, q)
+    statistic: float
+    threshold: float
+    rivals: tuple[tuple[Hypothesis, float], ...]  # nearly as likely, with the cosine to this one
+    by_run: tuple[Size, ...] = ()  # the first amplitude in each fitted run alone, after the last refit
+
+
+def parameter_of(study: Study, name: str) -> int | None:
+    """The parameter of this path, or the gain of this source or film, or the conductance of this contact or joint.
+
+    None where `[[parameters]]` leaves it out.
+    """
+    paths = [p.path for p in study.probed.parameters]
+    return next((paths.index(p) for p in (name, *(f"{name}.{own}" for own in OWN)) if p in paths), None)
+
+
+def freed(study: Study, h: Hypothesis) -> list[int]:
+    """The parameter, if any, that a cause takes the place of: it stays at its declared value.
+
+    Side by side the two would share one change.
+    """
+    if not fault_of(h).declared or h.when.windows or h.when.signal:
+        return []
+    j = parameter_of(study, h.name)
+    return [] if j is None else [j]
+
+
+def jacobian(
+    detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]], before: np.ndarray | None = None
+) -> np.ndarray:
+    """(m, n) derivatives by the parameters at x (n,), with causes of these amplitudes.
+
+    The surrogate knows nothing of causes, and a film of nine times its size changes what every other parameter does:
+    those that take a parameter's place are put there. Conductances beyond their bounds, where no surrogate holds, and
+    beside a signal that is corrected, get derivatives made anew, unless there are some from `before`. A number's own
+    column is left empty.
+    """
+    study = detector.study
+    low, high = bounds(study)
+    there, held = x.copy(), list[int]()
+    corrected = [(h, amplitude) for h, amplitude in causes if fault_of(h).corrects]
+    anew = bool(corrected)
+    for h, amplitude in causes:
+        for j in freed(study, h):
+            there[j] = fault_of(h).log_change(amplitude) / study.scale[j]
+            held.append(j)
+            anew |= fault_of(h).conducts and not low[j] <= there[j] <= high[j]
+    if not anew:
+        J = detector.fitter.surrogate.at(there)[1]
+    elif before is not None:
+        J = before
+    else:
+        units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
+        J = np.vstack([
+            study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(x)]
+            for k in study.fitted
+        ])  # fmt: skip
+    J[:, held] = 0.0
+    return J
+
+
+def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
+    """(amplitude, parameter) of causes that are a declared parameter beyond its tolerance."""
+    result, first = [], 0
+    for a in accepted:
+        if fault_of(a.hypothesis).parameter and (j := parameter_of(study, a.hypothesis.name)) is not None:
+            result.append((first, j))
+        first += len(a.amplitude)
+    return result
+
+
+def shifted(study: Study, x: np.ndarray, gains: Sequence[tuple[int, int]], amplitude: np.ndarray) -> np.ndarray:
+    """(n,) the parameters with the shifts of causes that are parameters, in prior standard deviations."""
+    there = x.copy()
+    for i, j in gains:
+        there[j] += amplitude[i] / study.scale[j]
+    return there
+
+
+def with_shifts(study: Study, accepted: Sequence[Accepted], x: np.ndarray) -> np.ndarray:
+    """(n,) likewise, at the amplitudes of the accepted."""
+    if not accepted:
+        return x
+    return shifted(study, x, gains_of(study, accepted), np.concatenate([a.amplitude for a in accepted]))
+
+
+def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
+    """(m, q) white first-order responses of a hypothesis: exact for what is read, but where that is curved."""
+    columns, weights = h.combination()
+    return np.asarray(detector.columns.raw[:, columns].astype(float) @ weights.T)
+
+
+def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """(m,) white change by what acts on what is read, at its amplitude (q,); none of swapped channels.
+
+    x (n,): parameters that a clock's run is stepped with.
+    """
+    if fault_of(h).exchanges:  # `exchanged` has left nothing of it
+        return np.zeros(detector.columns.raw.shape[0])
+    if fault_of(h).curved:
+        return detector.whiten(curved_change(detector, h, float(amplitude[0]), x))
+    return np.asarray(readings_columns(detector, h) @ amplitude)
+
+
+def curved_change(detector: Detector, h: Hypothesis, size: float, x: np.ndarray | None) -> np.ndarray:
+    """(m,) likewise of what is curved, in what is measured; x None: of the nominal machine, which costs no step."""
+    study, nominal = detector.study, detector.nominal
+
+    def states(k: int) -> np.ndarray:
+        return nominal[k].states if x is None else study.states(k, x)
+
+    return fault_of(h).change(study, nominal, states, h.name, size)
+
+
+def curved_slope(detector: Detector, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
+    """(m,) its derivative by the size."""
+    by = detector.policy.aside * max(abs(size), h.batch.smallest)
+    more, less = (curved_change(detector, h, size + d, x) for d in (by, -by))
+    return np.asarray((more - less) / (2.0 * by))
+
+
+def in_place(T: np.ndarray, sensors: Sequence[str], accepted: Sequence[Accepted]) -> np.ndarray:
+    """(b, s) temperatures T of sensors with those back in place that were found swapped."""
+    order = list(range(len(sensors)))
+    for a in accepted:
+        spot = Spot.read(a.hypothesis.name)
+        pair = (spot.name, spot.partner) if fault_of(a.hypothesis).exchanges else ()
+        if pair and set(pair) <= set(sensors):
+            i, j = (list(sensors).index(name) for name in pair)
+            order[i], order[j] = order[j], order[i]
+    return T[:, order]
+
+
+def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.ndarray:
+    """(m,) measurements y with the channels back in place that were found swapped: exact, whatever the parameters."""
+    if not any(fault_of(a.hypothesis).exchanges for a in accepted):
+        return y
+    parts, first = [], 0
+    for k in study.fitted:
+        planned = study.runs[k]
+        own = y[first : first + planned.size].copy()
+        (b, s), _ = planned.shapes
+        own[: b * s] = in_place(own[: b * s].reshape(b, s), planned.measured.sensors, accepted).ravel()
+        parts.append(own)
+        first += planned.size
+    return np.concatenate(parts)
+
+
+def stepped(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
+    """(size,) outputs of run k with the causes that act in the machine; x (n,) already shifted."""
+    study = detector.study
+    units = [u for a in accepted for u in a.units]
+    if not units:
+        return study.outputs(k, x)
+    amplitudes = [v for a in accepted if a.units for v in a.amplitude]
+    return study.outputs(k, x, slots_with(study, detector.elements, units, k), amplitudes)

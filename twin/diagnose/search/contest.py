@@ -1,0 +1,297 @@
+"""Candidates compared with the exact model before one is named.
+
+A score is exact for what adds heat. What conducts bends: a joint that lost nine tenths of its conductance moves
+temperatures nine times as far as its derivative says, and a cause that is wrong but free enough can then score more
+than the right one. So those whose response is not linear are refitted, each alone, and compared by the misfit that
+they really remove. Conductances move in t = a / (1 + a), in which temperatures are nearly linear.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.fitter import Fitted, bounds
+from twin.diagnose.faults.acted import units_of
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.study import K
+from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.edges import Edge, edges_of, moved, with_pulses
+from twin.diagnose.search.policy import POLICY, SearchPolicy
+
+
+def misfit(detector: Detector, fitted: Fitted) -> float:
+    """Sum of squares of what a fit leaves, in units of noise and model discrepancy."""
+    white = detector.whiten(fitted.residual)
+    return float(white @ fitted.projector(white))
+
+
+def worth(h: Hypothesis, policy: SearchPolicy = POLICY) -> float:
+    """A statistic less the price of its freedom: how many like it were tried, amplitudes, further windows."""
+    tried = len(h.batch.places) * len(h.batch.histories)
+    more = max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
+    return h.statistic - 2.0 * float(np.log(tried)) - policy.amplitude * (h.batch.q - 1) - policy.growth * more
+
+
+def proof(detector: Detector, h: Hypothesis) -> float:
+    """A refitted statistic as thresholds count it: they know neither edges that are fitted nor further windows."""
+    if fault_of(h).read:
+        return h.statistic
+    more = max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
+    return (
+        h.statistic
+        - detector.policy.edge * len(edges_of(detector.study, h))
+        - (detector.policy.growth - 2.0 * detector.policy.edge) * more
+    )
+
+
+def judged(
+    detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Candidates, most worthy first: those whose statistics are exact, and the others.
+
+    Those that are bent or have edges are refitted, until one leads all others by a share of BEHIND: by what both score
+    before they are refitted, for windows with fitted edges gain by it what others would gain, too. A candidate may have
+    several starts, of which the first has its score: it is the worthiest that they end at.
+    """
+    worthy = partial(worth, policy=detector.policy)
+    starts = {id(first): (first, *more) for first, *more in candidates}
+    waiting = sorted((c[0] for c in candidates), key=worthy, reverse=True)
+    done: list[Hypothesis] = []
+    left: list[Hypothesis] = []
+    lead, leads_by, count = -np.inf, -np.inf, Counter[str]()
+    for h in waiting:
+        behind = detector.policy.saturates if fault_of(h).saturates else detector.policy.behind
+        led = worthy(h) < (1.0 - behind) * leads_by
+        bent = _bent(detector, h)
+        if (led and not _saturated(detector, h)) or (bent and count[h.batch.kind] >= detector.policy.entrants):
+            left.append(h)
+            continue
+        count[h.batch.kind] += bent
+        now = max((exact(detector, y, fitted, s) for s in starts[id(h)]), key=worthy) if bent else h
+        if worthy(now) > lead:
+            lead = worthy(now)
+            leads_by = min(lead, max(worthy(h), (1.0 - detector.policy.saturates) * lead))
+        done.append(now)
+    straight = [h for h in left if not _bent(detector, h)]
+    return _fair(detector, y, fitted, [*done, *straight]), [h for h in left if _bent(detector, h)]
+
+
+def tried(
+    detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
+) -> list[Sequence[Hypothesis]]:
+    """Candidates, most worthy first, of `judged`. Where a coolant leads, it and others within SATURATES have been
+    refitted for some passes, from the last of their starts: linearity is, for a film that saturates, wrong by
+    tens of per cent, more at the wetted face than at those behind it, so that it would be left aside."""
+    order = sorted(candidates, key=lambda starts: -worth(starts[0], detector.policy))
+    if not order or not fault_of(order[0][0]).wets:
+        return order
+    least = (1.0 - detector.policy.saturates) * worth(order[0][0], detector.policy)
+    passed = [
+        (exact(detector, y, fitted, starts[-1], detector.policy.trial),)
+        if fault_of(starts[0]).wets and worth(starts[0], detector.policy) > least else starts
+        for starts in order
+    ]  # fmt: skip
+    return sorted(passed, key=lambda starts: -worth(starts[0], detector.policy))
+
+
+def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Candidates, most worthy first. One that leads by its score while another near it was refitted is refitted, too:
+    the exact model takes some hundredths from each, and that alone would decide between the two."""
+    worthy = partial(worth, policy=detector.policy)
+    order, exactly = sorted(candidates, key=worthy, reverse=True), set[int]()
+    while True:
+        lead = order[0]
+        near = [h for h in order[1:] if worthy(h) > (1.0 - detector.policy.behind) * worthy(lead)]
+        settled = _bent(detector, lead) or id(lead) in exactly or fault_of(lead).read or lead.batch.fixed
+        if settled or not any(_bent(detector, h) or id(h) in exactly for h in near):
+            break
+        order[0] = exact(detector, y, fitted, lead)
+        exactly.add(id(order[0]))
+        order.sort(key=worthy, reverse=True)
+    return order
+
+
+def _saturated(detector: Detector, h: Hypothesis) -> bool:
+    """A conductance that is nearly gone: it moves temperatures by far more than its score says."""
+    return fault_of(h).conducts and h.amplitude[0] < detector.policy.gone
+
+
+def _bent(detector: Detector, h: Hypothesis) -> bool:
+    fault = fault_of(h)
+    return fault.bent or fault.curved or (not fault.read and bool(edges_of(detector.study, h)))
+
+
+def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes: int = 0) -> Hypothesis:
+    """A hypothesis with amplitudes, edges in time and statistic of the exact model, the parameters fitted with it.
+
+    y (m,): NaN where nothing was measured. What accepted causes do is added to what it does. passes: at most, 0 for as
+    many as its kind needs.
+    """
+    fault = fault_of(h)
+    if fault.curved:
+        return _read_anew(detector, fitted, h)
+    study, q = detector.study, h.batch.q
+    a = np.array(h.amplitude)
+    if fault.conducts:
+        a = np.clip(
+            1.0 / np.maximum(1.0 - a, 0.2) - 1.0, detector.policy.lowest_change, detector.policy.highest_change
+        )  # as if temperatures were linear in t
+    if h.when.bell is not None:
+        h = moved(study, detector.elements, h, ())  # hours found by `growth` get their windows
+    before = misfit(detector, fitted)
+    inner = edges_of(study, h)
+    low, high = bounds(study)
+    floor = lowest(detector, h)
+    a = np.maximum(a, floor)
+    mean, inverse = fault.prior(q)
+    if fault.wets:  # a strong film saturates: a score that takes it as linear says little
+        a[0] = mean[0]
+    x0 = beginning(fitted.x, detector.policy).copy()
+    x0[freed(study, h)] = 0.0
+    now = _Point(a, x0, h)
+    best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
+    held = detector.policy.held if fault.wets else 0
+    for i in range(passes or held + (detector.policy.passes if not inner else detector.policy.window_passes)):
+        edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
+        outputs, derivatives = _outputs(detector, now, edges)
+        J = jacobian(detector, now.x, [(h, float(now.a[0]))])
+        projector = detector.fitter.projector(J, fitted.more)
+        left = detector.whiten(y - fitted.beside - outputs + J @ now.x)
+        removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
+        arrived = i > held and abs(removed - statistic) < max(
+            detector.policy.less, detector.policy.less_share * removed
+        )
+        if removed <= statistic:  # too far: back, then less; parameters may do without a step
+            if arrived:
+                break
+            if np.any(step.x):
+                step = replace(step, x=np.zeros_like(step.x))
+            else:
+                share *= 0.4
+            if share < 0.1:
+                break
+        else:
+            best, statistic, share = now, removed, 1.0
+            if arrived:
+                break
+            D = derivatives
+            D[:, q:] *= [e.per_second for e in edges]
+            D = detector.whiten(D)
+            PD = projector(D)
+            stiff = 1e9 * inverse if i < held else inverse
+            F = D.T @ PD + np.diag([*stiff, *(e.prior(detector.policy) ** -2.0 for e in edges)])
+            pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
+            below = np.concatenate([floor - now.a, np.full(len(edges), -np.inf)])
+            found = solved(F, PD.T @ left + pulled, below)
+            after = fault.limited(
+                study, h.name, _moved(now.a, found[:q], fault.conducts, h.batch.sign, detector.policy)
+            )
+            shifts = np.clip(found[q:], -detector.policy.edge_step, detector.policy.edge_step)
+            nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
+            drift = np.clip(np.clip(nuisance, low, high) - now.x, -detector.policy.near, detector.policy.near)
+            step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, shifts, strict=True)))
+        shifted = (
+            moved(study, detector.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
+        )
+        now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
+    if fault.vanished(best.a):
+        statistic = 0.0
+    # what better parameters remove is not the cause's
+    plain = np.concatenate([study.outputs(k, best.x) for k in study.fitted])
+    _, J = detector.fitter.surrogate.at(best.x)
+    none = detector.whiten(y - fitted.beside - plain + J @ best.x)
+    statistic += min(float(none @ detector.fitter.projector(J, fitted.more)(none)) - before, 0.0)
+    return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
+
+
+def _read_anew(detector: Detector, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+    """A hypothesis about readings that are not in proportion to its size, at the size that removes most misfit."""
+    left = fitted.projector(detector.whiten(fitted.residual))
+    size, tried, x = h.amplitude[0], list[tuple[float, float]](), beginning(fitted.x, detector.policy)
+    for _ in range(detector.policy.read_passes):
+        change, D = (detector.whiten(f(detector, h, size, x)) for f in (curved_change, curved_slope))
+        kept = left - fitted.projector(change)
+        tried.append((float(change @ (left + kept)), size))
+        step = float(D @ kept) / max(float(D @ fitted.projector(D)), 1e-30)
+        size += float(np.clip(step, -0.5 * abs(size), abs(size)))
+        if abs(step) < detector.policy.enough * abs(size):
+            break
+    statistic, best = max(tried)
+    return replace(h, statistic=max(statistic, 0.0), amplitude=(best,))
+
+
+def beginning(x: np.ndarray, policy: SearchPolicy = POLICY) -> np.ndarray:
+    """(n,) parameters from which a cause is refitted: those without it, or the description where it has bent them."""
+    return x if np.abs(x).max(initial=0.0) < policy.bends else np.zeros_like(x)
+
+
+def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:
+    """(n,) the minimum of a^T F a / 2 - known . a; what would be below its `lowest` (n,) is held there."""
+    held = np.zeros(len(known), dtype=bool)
+    while True:
+        free = ~held
+        found = np.where(held, lowest, 0.0)
+        rest = known[free] - F[np.ix_(free, held)] @ found[held]
+        found[free] = np.linalg.pinv(F[np.ix_(free, free)], rcond=1e-9, hermitian=True) @ rest
+        beyond = found < lowest
+        if not beyond.any():
+            return np.asarray(found)
+        held |= beyond
+
+
+def lowest(detector: Detector, h: Hypothesis) -> np.ndarray:
+    """(q,) below which no amplitude goes."""
+    return fault_of(h).lowest(detector.study, detector.nominal, h)
+
+
+@dataclass(frozen=True)
+class _Point:
+    a: np.ndarray  # (q,)
+    x: np.ndarray  # (n,)
+    h: Hypothesis  # with its windows
+
+
+@dataclass(frozen=True)
+class _Step:
+    a: np.ndarray
+    x: np.ndarray
+    edges: tuple[tuple[Edge, float], ...]  # s
+
+
+def _outputs(detector: Detector, p: _Point, edges: Sequence[Edge]) -> tuple[np.ndarray, np.ndarray]:
+    """Outputs (m,) of all fitted runs and their derivatives (m, q + edges) by amplitudes and pulses at edges."""
+    study, n = detector.study, len(p.a) + len(edges)
+    units = units_of(study, p.h)
+    outputs, derivatives = [], []
+    for k in study.fitted:
+        if any(u.shapes[k].any() for u in units):
+            slots = with_pulses(study, detector.elements, p.h, units, p.a, edges, k)
+            f, D = study.by_amplitudes(k, p.x, slots, [*p.a, *np.zeros(len(edges))])
+            derivatives.append(D[:, :n])
+        else:
+            f = study.outputs(k, p.x)
+            derivatives.append(np.zeros((len(f), n)))
+        outputs.append(f)
+    return np.concatenate(outputs), np.vstack(derivatives)
+
+
+def _moved(a: np.ndarray, step: np.ndarray, relative: bool, sign: int, policy: SearchPolicy = POLICY) -> np.ndarray:
+    if relative:
+        t = a / (1.0 + a) + step / (1.0 + a) ** 2
+        bent = np.where(
+            t < policy.highest_change / (1.0 + policy.highest_change),
+            t / np.maximum(1.0 - t, 1e-9),
+            policy.highest_change,
+        )
+        return np.asarray(np.clip(bent, np.maximum(policy.lowest_change, (1.0 + a) / 5.0 - 1.0), policy.highest_change))
+    result = np.clip(a + step, a - 2.0 * np.abs(a), a + 2.0 * np.abs(a))
+    if sign:
+        result[0] = sign * max(sign * result[0], 0.2 * sign * a[0])  # never through zero
+    return np.asarray(result)

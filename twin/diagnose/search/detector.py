@@ -1,0 +1,297 @@
+"""The detector of a study: what calibration can absorb, model discrepancy, null distribution and thresholds.
+
+Made from synthetic measurements without a cause (`nulls`), once per machine, loads, plan of measurements and
+instruments, and cached: the channels' noise and the low-rank covariance of model discrepancy from some of them, the
+null distribution of every family's best statistic from the others. Thresholds follow from a Gumbel tail per family, at
+one common tail probability chosen so that a set of measurements without a cause passes any of them in ALARM of all
+cases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from twin.build.workers import each
+from twin.calibrate.fit.noise import Channels, estimated
+from twin.diagnose.evidence.discretisation import Difference
+from twin.diagnose.evidence.fitter import Fitter
+from twin.diagnose.evidence.formal import known_forms
+from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, null
+from twin.diagnose.evidence.pulls import Pulls, gumbel
+from twin.diagnose.evidence.settled import settled_alone
+from twin.diagnose.evidence.sight import Columns, sight
+from twin.diagnose.evidence.unknown import heat_of
+from twin.diagnose.evidence.whiten import Whitener, offsets
+from twin.diagnose.evidence.windy import wind_columns
+from twin.diagnose.faults.catalogue import Family
+from twin.diagnose.faults.context import Context
+from twin.diagnose.faults.elements import Elements, elements_of, slim
+from twin.diagnose.faults.forms import clocks, described_forms
+from twin.diagnose.faults.lost import Lost, lost_conductances
+from twin.diagnose.faults.readings import readings_of
+from twin.diagnose.model.bank import Nominal, nominal_run, respond
+from twin.diagnose.model.study import Study
+from twin.diagnose.model.surrogate import Surrogate, make_surrogate
+from twin.progress import Progress, silent
+
+if TYPE_CHECKING:  # what searches by a detector decides nothing about it
+    from twin.diagnose.search.policy import SearchPolicy
+
+FORM, NULLS = 60, 200
+MODES = 30
+OFFSET = 0.1  # K, prior of every sensor's constant error
+TCP_ZERO = 0.5e-6  # m, prior of every TCP component's constant error
+LATE = 60.0  # s, by which light parts and sensors respond earlier or later than their models: one step
+ALARM = 0.03
+FLOOR = 36.0  # of thresholds: some families never pass in synthetic measurements, and would at the first surprise
+
+Differences = Sequence[Difference]
+
+
+@dataclass(frozen=True)
+class Detector:
+    """m measured numbers, n columns (elements, then readings)."""
+
+    study: Study
+    fitter: Fitter
+    elements: Elements
+    nominal: tuple[Nominal, ...]
+    index: dict[tuple[str, str, str], int]
+    columns: Columns
+    nulls: dict[str, np.ndarray]  # per family, and "unknown": largest statistic in every null
+    thresholds: dict[str, float]
+    lost: Lost
+    pulls: Pulls
+    policy: SearchPolicy  # that it is searched with: no number of its own depends on it
+
+    @property
+    def whiten(self) -> Whitener:
+        return self.fitter.whiten
+
+
+@dataclass(frozen=True)
+class StoredDetector:
+    """A detector without the study, whose measurements come later: what the cache keeps."""
+
+    surrogate: Surrogate
+    channels: tuple[tuple[Channels, Channels], ...]
+    others: np.ndarray  # (m, q) white
+    elements: Elements
+    nominal: tuple[Nominal, ...]
+    index: dict[tuple[str, str, str], int]
+    columns: Columns
+    nulls: dict[str, np.ndarray]
+    thresholds: dict[str, float]
+    lost: Lost
+    pulls: Pulls
+
+    def of(self, study: Study, policy: SearchPolicy) -> Detector:
+        """The detector of a study that differs from the one it was made for in its measured values alone."""
+        fitter = Fitter(study, self.surrogate, Whitener(study, self.channels), self.others)
+        return Detector(
+            study, fitter, self.elements, self.nominal, self.index, self.columns, self.nulls, self.thresholds,
+            self.lost, self.pulls, policy,
+        )  # fmt: skip
+
+
+def stored(detector: Detector) -> StoredDetector:
+    fitter = detector.fitter
+    return StoredDetector(
+        fitter.surrogate, fitter.whiten.channels, fitter.others, detector.elements, detector.nominal, detector.index,
+        detector.columns, detector.nulls, detector.thresholds, detector.lost, detector.pulls,
+    )  # fmt: skip
+
+
+def _null_residual(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Differences], seed: int) -> np.ndarray:
+    """What a calibration leaves of a null (m,)."""
+    fitter, J, instruments, form, differences = shared
+    fitted = fitter(null(fitter.study, J, seed, instruments, form, differences=differences))
+    white = fitter.whiten(fitted.residual)
+    explained = fitted.projector.N @ fitted.projector.most_likely(white)
+    return fitter.whiten.colour(white - explained)
+
+
+@dataclass(frozen=True)
+class _OfNull:
+    """What is seen in a null: the largest statistic of every family, and what two calibrations say."""
+
+    largest: dict[str, float]
+    fitted: np.ndarray  # (n,)
+    settled: np.ndarray  # (n,)
+
+
+def _of_null(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Differences, Columns], seed: int) -> _OfNull:
+    fitter, J, instruments, form, differences, columns = shared
+    y = null(fitter.study, J, seed, instruments, form, differences=differences)
+    fitted = fitter(y)
+    seen = sight(columns, fitted.projector, fitter.whiten(fitted.residual))
+    return _OfNull(seen.largest(), fitted.x, settled_alone(fitter, y)[0])
+
+
+def instruments_of(study: Study, temperature: float, tcp: float) -> Instruments:
+    """White noise of the instruments: TCP as the runs tell, where they do."""
+    told = [m.tcp_sigma for m in (study.runs[k].measured for k in study.fitted) if m.tcp_sigma is not None]
+    good = np.concatenate([t[np.isfinite(t) & (t > 0.0)] for t in told]) if told else np.zeros(0)
+    return Instruments(temperature, float(np.median(good)) if len(good) else tcp)
+
+
+def make_detector(
+    study: Study,
+    families: Sequence[Family],
+    instruments: Instruments,
+    policy: SearchPolicy,
+    form: Form = Form(),
+    counts: tuple[int, int] = (FORM, NULLS),
+    progress: Progress = silent,
+    differ: Callable[[Surrogate], Differences] = lambda _: (),
+) -> Detector:
+    """The detector of a study; differ: what other discretisations measure otherwise."""
+    surrogate = make_surrogate(study, progress)
+    other = differ(surrogate)
+    J = surrogate.J * surrogate.rate(np.zeros(len(study.probed.parameters)))
+    J_of, y_of = _by_run(study, J), _by_run(study, surrogate.y0)
+    with progress("responses of elementary causes", 2) as advance:
+        nominal = tuple(nominal_run(study, k) for k in range(len(study.runs)))
+        elements = elements_of(study, nominal)
+        advance("elements")
+        readings, of_reading = readings_of(study, nominal[: len(y_of)], y_of, J_of)
+        raw = np.hstack([respond(study, nominal, elements.vectors, elements.columns), readings])
+        advance("responses")
+    first = len(elements.columns)
+    index = {**elements.index, **{key: first + c for key, c in of_reading.items()}}
+    wind = wind_columns(study, form, progress)
+    floors = _floors(study, instruments)
+    whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
+    bare = [*bare_forms(study, raw, index), _discretised(other, len(J))]
+    described = described_forms(study, elements, raw, form)
+    known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
+    fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known]))
+    with progress("measurements without a cause: form", counts[0]) as advance:
+        shared = (fitter, J_of, instruments, form, other)
+        left = np.stack(each(_null_residual, shared, list(range(counts[0])), lambda _: advance("")), axis=1)
+    whiten = Whitener(study, _channels(study, left, floors))
+    U, s, _ = np.linalg.svd(whiten(left), full_matrices=False)
+    variance = s**2 / max(counts[0], 1)
+    kept = min(MODES, int(np.sum(variance > 3.0)))
+    modes = U[:, :kept] * np.sqrt(np.maximum(variance[:kept] - 1.0, 0.0))
+    known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
+    fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known, modes]))
+    context = Context(study, elements, index)
+    batches = [b for f in families for b in f.batches(context) if b.columns.size]
+    columns = Columns.of(
+        _whitened(whiten, raw), batches, heat_of(study, elements.histories.blocks, elements.heat_blocks), fitter.others
+    )
+    with progress("measurements without a cause: thresholds", counts[1]) as advance:
+        seeds = list(range(10_000, 10_000 + counts[1]))
+        seen = each(_of_null, (fitter, J_of, instruments, form, other, columns), seeds, lambda _: advance(""))
+    names = [*(f.name for f in families), "unknown"]
+    nulls = {name: np.array([of_null.largest.get(name, 0.0) for of_null in seen]) for name in names}
+    pulls = Pulls.of(study.probed.parameters, np.array([o.fitted for o in seen]), np.array([o.settled for o in seen]))
+    small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
+    lost = lost_conductances(study, elements, whiten, progress)
+    return Detector(
+        study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost, pulls, policy
+    )
+
+
+def bare_forms(study: Study, raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> list[np.ndarray]:
+    """Columns (m, k) of unit prior variance that no model is needed for: constant errors of channels, and lateness."""
+    return [OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study), _together(raw, index)]
+
+
+def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.ndarray:
+    """(m, 1) what all clocks by LATE do, of a unit prior: a log's clock is off in its own run, and what comes early or
+    late in every run is a light part's or a sensor's time constant. (m, 0) where there is one run alone."""
+    own = clocks(index)
+    if len(own) < 2:
+        return np.zeros((len(raw), 0))
+    return np.asarray(LATE * raw[:, own].astype(float).sum(axis=1, keepdims=True))
+
+
+def _discretised(differences: Differences, m: int) -> np.ndarray:
+    """(m, k) of unit variance: the difference to each other discretisation, and of each parameter's effect."""
+    columns = [np.column_stack([o.d, SPREAD * o.D]) for o in differences]
+    return np.hstack(columns) if columns else np.zeros((m, 0))
+
+
+def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:
+    """(m, ...) of all fitted runs cut into runs."""
+    ends = np.cumsum([study.runs[k].size for k in study.fitted])
+    return np.split(values, ends[:-1])
+
+
+def _whitened(whiten: Whitener, raw: np.ndarray) -> np.ndarray:
+    """Columns (m, n) in white units, some thousand at a time: in double precision they are gigabytes."""
+    result = np.empty_like(raw)
+    for first in range(0, raw.shape[1], 1000):
+        result[:, first : first + 1000] = whiten(raw[:, first : first + 1000].astype(float))
+    return result
+
+
+def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[str, float]:
+    """Per family the statistic that a common tail probability allows, so that `alarm` of all nulls pass any of them.
+
+    By Gumbel tails.
+    """
+    tails = {name: gumbel(values) for name, values in nulls.items() if len(values) and values.max() > 0.0}
+    if not tails:
+        return dict.fromkeys(nulls, FLOOR)
+    table = np.stack([nulls[name] for name in tails], axis=1)
+
+    def limits(p: float) -> np.ndarray:
+        return np.array([at - scale * np.log(-np.log1p(-p)) for at, scale in tails.values()])
+
+    low, high = 1e-6, 0.3
+    for _ in range(40):
+        p = np.sqrt(low * high)
+        share = float(np.mean(np.any(table > limits(p), axis=1)))
+        low, high = (p, high) if share <= alarm else (low, p)
+    found = dict(zip(tails, limits(low), strict=True))
+    return {name: float(max(found.get(name, FLOOR), FLOOR)) for name in nulls}
+
+
+def _floors(study: Study, instruments: Instruments) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Per fitted run the standard deviations of bin means (s,) and of TCP components (3,)."""
+    result = []
+    for k in study.fitted:
+        m = study.runs[k].measured
+        count = np.median(np.where(m.count > 0, m.count, np.nan), axis=0) if len(m.count) else np.ones(len(m.sensors))
+        sensors = instruments.temperature / np.sqrt(np.nan_to_num(count, nan=1.0).clip(1.0))
+        result.append((sensors, np.full(3, instruments.tcp)))
+    return result
+
+
+def _tcp_zero(study: Study) -> np.ndarray:
+    """(m, 3) 1 m on one TCP component in all fitted runs."""
+    blocks = []
+    for k in study.fitted:
+        planned = study.runs[k]
+        (b, s), (rows, _) = planned.shapes
+        blocks.append(np.vstack([np.zeros((b * s, 3)), np.tile(np.eye(3), (rows, 1))]))
+    return np.vstack(blocks)
+
+
+def _channels(
+    study: Study, residuals: np.ndarray, floors: list[tuple[np.ndarray, np.ndarray]]
+) -> tuple[tuple[Channels, Channels], ...]:
+    """Noise of every channel from residuals (m, sets): memory of what the modes of form will not hold, capped."""
+    result, first = [], 0
+    for k, (sensors, tcp) in zip(study.fitted, floors, strict=True):
+        planned = study.runs[k]
+        T, w = planned.split(residuals[first : first + planned.size])
+        first += planned.size
+        result.append((_pooled(T, sensors), _pooled(w, tcp)))
+    return tuple(result)
+
+
+def _pooled(values: np.ndarray, floor: np.ndarray) -> Channels:
+    """From (rows, channels, sets): sets one after the other, kept apart by a missing row."""
+    if not values.size:
+        return Channels(floor, np.zeros(len(floor)))
+    _, channels, sets = values.shape
+    apart = np.concatenate([values, np.full((1, channels, sets), np.nan)])
+    return estimated(apart.transpose(2, 0, 1).reshape(-1, channels), floor, cap=0.9)

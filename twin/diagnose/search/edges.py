@@ -1,0 +1,190 @@
+"""When a cause begins and ends, to the minute, and the course of the sun: blocks of an hour are for the search alone.
+
+A cause of two hundred standard deviations whose window is off by a quarter of an hour leaves more misfit than most
+other causes make. The derivative by an edge is the response to a pulse there; by the centre or length of a bell, to the
+difference of two bells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from twin.diagnose.evidence import bells
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.faults.acted import slots_with
+from twin.diagnose.faults.elements import Elements
+from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.slots import Slots
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Window
+from twin.diagnose.search.policy import SearchPolicy
+
+PULSE = 600.0  # s
+SHORTEST = 600.0  # s, of a window
+BRIEF = 7200.0  # s, the shortest bell
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One end of a window, or what a bell is made of."""
+
+    what: Literal["begin", "end", "centre", "length"]
+    window: int = 0
+
+    @property
+    def per_second(self) -> float:
+        """The response to a shift by 1 s, in units of that to its pulse."""
+        return (-1.0 if self.what == "begin" else 1.0) / PULSE
+
+    def prior(self, policy: SearchPolicy) -> float:
+        """Standard deviation [s] about what the search found."""
+        return 2.0 * policy.edge_prior if self.what == "length" else policy.edge_prior
+
+
+def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
+    """The edges of a hypothesis that may move, those of a bell; none of instants of a reading.
+
+    What was there before a run and stays, or lasts beyond its end, has no edge there.
+    """
+    if fault_of(h).instant:
+        return []
+    if h.when.bell is not None:
+        return [*(Edge("centre", i) for i in range(len(h.when.bell.centres))), Edge("length")]
+    spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
+    windows = h.when.windows
+    whole = [w.end >= spans[w.run] - 1.0 for w in windows]
+    result = []
+    for i, w in enumerate(windows):
+        lasts = whole[i] and (w.start == 0.0 or i + 1 == len(windows) or windows[i + 1].start == 0.0)
+        begun = w.start == 0.0 and (whole[i] or (i > 0 and whole[i - 1]))
+        if not begun:  # what begins with a run may begin some minutes later
+            result.append(Edge("begin", i))
+        if not lasts:
+            result.append(Edge("end", i))
+    return result
+
+
+def moved(study: Study, elements: Elements, h: Hypothesis, shifts: Sequence[tuple[Edge, float]]) -> Hypothesis:
+    """The hypothesis with edges shifted [s]."""
+    if (bell := h.when.bell) is not None:
+        by = dict(shifts)
+        centres = tuple(c + by.get(Edge("centre", i), 0.0) for i, c in enumerate(bell.centres))
+        bell = bells.Bell(centres, max(bell.length + by.get(Edge("length"), 0.0), BRIEF))
+        weights, windows = bells.by_blocks(study.fitted_runs, elements.histories.blocks, bell)
+        named = bells.name(bell, study.fitted_runs)
+        return replace(h, when=replace(h.when, name=named, weights=weights, windows=windows, bell=bell))
+    ends = list(h.when.windows)
+    spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
+    for edge, shift in shifts:
+        w = ends[edge.window]
+        if edge.what == "end":
+            ends[edge.window] = replace(w, end=float(np.clip(w.end + shift, w.start + SHORTEST, spans[w.run])))
+        else:
+            ends[edge.window] = replace(w, start=float(np.clip(w.start + shift, 0.0, w.end - SHORTEST)))
+    return replace(h, when=replace(h.when, name=_named(ends, spans), windows=tuple(ends)))
+
+
+def _named(windows: Sequence[Window], spans: dict[str, float]) -> str:
+    first, runs = windows[0], [w.run for w in windows]
+    lasting = all(w.end >= spans[w.run] - 1.0 for w in windows) and len(set(runs)) == len(runs)
+    if lasting and len(windows) > 1 and all(w.start == 0.0 for w in windows[1:]):
+        return f"from {first.start / 3600:.1f} h of {first.run} on"
+    return "from " + " and ".join(f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" for w in windows)
+
+
+def with_pulses(
+    study: Study, elements: Elements, h: Hypothesis, units: Sequence[Unit], a: np.ndarray, edges: Sequence[Edge], k: int
+) -> Slots:
+    """Slots of run k: the amplitudes, then per edge a pulse there that is 1 K, 1 W, ... times the amplitudes a."""
+    slots = slots_with(study, elements, units, k)
+    for e, edge in enumerate(edges, start=len(units)):
+        pulse = _pulse(study, h, edge, k)
+        if pulse is None:
+            continue
+        pulses = []
+        for u, v in zip(units, a, strict=True):  # a bell has an amplitude for each run, which acts in that run alone
+            own = pulse if u.shapes[k].any() else np.zeros(len(pulse))
+            pulses.append(replace(u, shapes=tuple(v * own if i == k else s for i, s in enumerate(u.shapes))))
+        made = slots_with(study, elements, pulses, k)
+        for q in range(len(units)):
+            slots.A[e] += made.A[q]
+            slots.M[e] += made.M[q]
+            slots.gate[:, e] += made.gate[:, q]
+            slots.rise[:, :, e] += made.rise[:, :, q]
+            slots.forcing[:, :, e] += made.forcing[:, :, q]
+            slots.film[:, e] += made.film[:, q]
+            slots.joint[:, e] += made.joint[:, q]
+            slots.contact[:, e] += made.contact[:, q]
+            slots.environment[:, :, e] += made.environment[:, :, q]
+    return slots
+
+
+def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarray, policy: SearchPolicy) -> list[Unit]:
+    """Units whose responses at amplitude one are what the shape of a cause leaves open, one standard deviation each.
+
+    The exponent of a logged signal, the length of a bell, the first edges of windows, what its fault says.
+    """
+    if (own := fault_of(h).left_open(units, a)) is not None:
+        return own
+    if (bell := h.when.bell) is not None:
+        changes = []
+        for k in range(len(study.runs)):
+            t = np.asarray(study.runs[k].run.drive.time)
+            middle, centre = (t[:-1] + t[1:]) / 2, bell.centres[study.fitted.index(k)] if k in study.fitted else 0.0
+            changes.append(
+                bells.level(middle, centre, bell.length + policy.longer) - bells.level(middle, centre, bell.length)
+            )
+        return [
+            replace(u, shapes=tuple(v * c * s.any() for c, s in zip(changes, u.shapes, strict=True)))
+            for u, v in zip(units, a, strict=True)
+        ]
+    if h.when.windows:
+        return [
+            replace(u, shapes=tuple(v * _wide(study, h, edge, k, policy) for k in range(len(study.runs))))
+            for edge in edges_of(study, h) for u, v in zip(units, a, strict=True)
+        ]  # fmt: skip
+    if not h.when.signal or h.when.exponent == 0.0:
+        return []
+    by = policy.exponent / h.when.exponent  # d(s^e) / de = s^e ln s = (s^e ln s^e) / e
+    return [
+        replace(u, shapes=tuple(v * by * s * np.log(np.maximum(s, 1e-12)) for s in u.shapes))
+        for u, v in zip(units, a, strict=True)
+    ]
+
+
+def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray | None:
+    """(n_fine,) the change of a shape in run k while an edge moves by PULSE; None in other runs."""
+    run = study.runs[k].run
+    t = np.asarray(run.drive.time)
+    if (bell := h.when.bell) is not None:
+        i, middle, by = study.fitted.index(k), (t[:-1] + t[1:]) / 2, PULSE / 2
+        if edge.what == "centre":
+            if edge.window != i:
+                return None
+            later, sooner = (bells.level(middle, bell.centres[i] + d, bell.length) for d in (by, -by))
+            return later - sooner
+        longer, shorter = (bells.level(middle, bell.centres[i], bell.length + d) for d in (by, -by))
+        return longer - shorter
+    w = h.when.windows[edge.window]
+    if w.run != run.name:
+        return None
+    at = w.end if edge.what == "end" else w.start
+    shape = np.clip(np.minimum(t[1:], at + PULSE / 2) - np.maximum(t[:-1], at - PULSE / 2), 0.0, None)
+    return np.asarray(shape / (t[1] - t[0]))
+
+
+def _wide(study: Study, h: Hypothesis, edge: Edge, k: int, policy: SearchPolicy) -> np.ndarray:
+    """(n_fine,) likewise by one prior standard deviation, zero in other runs."""
+    pulse = _pulse(study, h, edge, k)
+    n = study.runs[k].run.drive.n_steps
+    return np.zeros(n) if pulse is None else pulse * edge.prior(policy) / PULSE
+
+
+def _span(study: Study, k: int) -> float:
+    time = study.runs[k].run.drive.time
+    return float(time[-1] - time[0])

@@ -1,0 +1,239 @@
+"""Forward selection: name the best cause, refit everything exactly, look again, until nothing passes its threshold.
+
+Every refit may show that a cause was a stopgap for another: what no longer explains half its threshold, or has become
+too small to name or negative, is dropped and not looked at again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.consistency import differs
+from twin.diagnose.evidence.fitter import Fitted
+from twin.diagnose.evidence.sight import Sight
+from twin.diagnose.faults.acted import units_of
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.study import K, Study
+from twin.diagnose.result.spot import Of, Spot
+from twin.diagnose.search.accepted import Accepted, exchanged
+from twin.diagnose.search.contest import beginning, judged, proof, tried
+from twin.diagnose.search.declared import declared_candidates, declared_exactly, misplaced_candidates
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.growth import chilled, grown
+from twin.diagnose.search.hotter import hotter
+from twin.diagnose.search.look import Search, Step, cosines, look, scored
+from twin.diagnose.search.policy import SearchPolicy
+from twin.diagnose.search.refit import refit
+from twin.diagnose.search.settled_beside import settled
+from twin.diagnose.search.strained import closed, loose_ones, strained
+
+
+def search(detector: Detector, y: np.ndarray) -> Search:
+    """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
+    fitted, policy = detector.fitter(y), detector.policy
+    described = detector
+    if (detector := hotter(described, fitted.x)) is not described:
+        fitted = detector.fitter(y)
+    x0, covariance = settled(detector, y, ())
+    declared = declared_candidates(detector, y, fitted)
+    known = scored(detector, fitted)
+    glance = look(detector, fitted, declared, known)
+    loose = loose_ones(detector, y, fitted.x, x0)
+    relaxed = strained(detector, y, fitted, loose, glance)
+    alarm = any(h.statistic > detector.thresholds[h.family] for h in glance[1])
+    if alarm or loose:  # without, no cause is named
+        exact = {
+            h.name: h for h in [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
+        }
+        declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
+        glance = look(detector, fitted, declared, known)
+    if relaxed and (ended := closed(detector, y, fitted, declared, glance, relaxed, x0, loose)):
+        return ended
+    accepted, steps = list[Accepted](), list[Step]()
+    refused, fruitless, imitated = set[tuple[str, str]](), 0, False
+    while True:
+        seen, ranked, step = look(detector, fitted) if accepted or refused else glance
+        if restless := _restless(detector, accepted, step.parts):
+            imitated = True
+            fitted, accepted = _without(detector, y, fitted, accepted, restless)
+            seen, ranked, step = look(detector, fitted)
+        steps.append(step)
+        parts = step.parts
+        used = sum((len(a.units) for a in accepted), 0)
+        misfits = policy.misfit * max((a.statistic for a in accepted if a.units), default=0.0)
+        limits = {
+            name: max((policy.later if accepted else 1.0) * value, misfits)
+            for name, value in detector.thresholds.items()
+        }
+        alarm = any(h.statistic > limits[h.family] and (h.family, h.name) not in refused for h in ranked)
+        passing = [
+            h for h in ranked
+            if alarm and h.statistic > policy.named * limits[h.family] and used + h.batch.q <= K
+            and (h.family, h.name) not in refused and not _again(h, accepted)
+            and not _reads(detector.study, h, accepted)
+        ]  # fmt: skip
+        if not passing or len(accepted) >= policy.causes or fruitless >= policy.tries or imitated:
+            break
+        ahead = [_starts(seen, h, policy) for h in passing[: policy.ahead]]
+        rest = exchanged(detector.study, y, accepted)
+        proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead))
+        standing = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
+        if not any(proof(detector, h) > limits[h.family] for h in standing):
+            refused.update((h.family, h.name) for h in proved)
+            fruitless += 1
+            continue
+        # heat of any history pays for its freedom: a name that explains less than that has imitated it
+        free = max(parts.values(), default=0.0)
+        if free > detector.thresholds["unknown"]:
+            standing = [
+                h for h in standing
+                if (h.statistic > policy.covers * free or fault_of(h).several)
+                and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
+            ]  # fmt: skip
+            if not standing:
+                break
+        chosen = standing[0]
+        rivals = _rivals(detector, fitted, chosen, [*standing, *others, *ranked])
+        start = np.array(chosen.amplitude)
+        units = units_of(detector.study, chosen)
+        accepted.append(
+            Accepted(
+                chosen, units, start, np.eye(len(start)), chosen.statistic, detector.thresholds[chosen.family], rivals
+            )
+        )
+        fitted, accepted = refit(detector, y, beginning(fitted.x, policy), accepted)
+        while weak := [a for a in accepted if not _stands(detector, a)]:
+            refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
+            fitted, accepted = _without(detector, y, fitted, accepted, weak)
+        if in_turn := _in_turn(detector.study, accepted):
+            imitated = True
+            fitted, accepted = _without(detector, y, fitted, accepted, in_turn)
+    if not imitated and (leaking := _leaking(detector, accepted, steps[-1].parts)):
+        fitted, accepted = _without(detector, y, fitted, accepted, leaking)
+        seen, _, step = look(detector, fitted)
+        steps.append(step)
+    if uneven := [a for a in accepted if _of_machine(a) and differs(a.by_run, fault_of(a.hypothesis).own)]:
+        fitted, accepted = _without(detector, y, fitted, accepted, uneven)
+        seen, _, step = look(detector, fitted)
+        steps.append(step)
+    if accepted:  # which may have been all that made it seem hotter
+        x, covariance = settled(hotter(described, fitted.x), y, accepted)
+    else:
+        x = x0
+    return Search(detector, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance, loose)
+
+
+def _without(
+    detector: Detector, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], dropped: Sequence[Accepted]
+) -> tuple[Fitted, list[Accepted]]:
+    """The fit with the accepted causes that are not dropped."""
+    left = [a for a in accepted if a not in dropped]
+    return refit(detector, y, fitted.x, left) if left else (detector.fitter(y), left)
+
+
+def _starts(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis]:
+    """A hypothesis in the windows that it likes best, and a coolant in the one that cold likes best, too."""
+    k = next(i for i, own in enumerate(seen.ready) if own.batch is h.batch)
+    block = seen.blocks[k][h.place]
+    cold = chilled(h, seen.g, block, policy)
+    return [grown(h, seen.g, block, policy), *([] if cold is None else [cold])]
+
+
+def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
+    return any(h.family == a.hypothesis.family and h.name == a.hypothesis.name and h.when.name == a.hypothesis.when.name
+               for a in accepted)  # fmt: skip
+
+
+def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
+    """Whether it is the loss of a source that reads a corrected signal: what the exact factor leaves there is misfit of
+    a source that emits many times as much, and no cause beside it."""
+    corrected = [(fault_of(a.hypothesis), a.hypothesis.name) for a in accepted if fault_of(a.hypothesis).corrects]
+    wrong = {fault.bare(fault.factor(name)[0]) for fault, name in corrected}
+    sources = study.probed.base.load_model.sources
+    return any(h.name == f"sources.{s.name}" and wrong & set(s.use.signals.values()) for s in sources)
+
+
+def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:
+    """Causes that switch at one part, of several families or twice at one place: together they imitate a history
+    that none has."""
+    passing = [(a, _parts(study, a.hypothesis.name)) for a in accepted if a.hypothesis.when.windows and a.units]
+    return [
+        a for a, own in passing
+        if any(own & other and b is not a and _differ(a.hypothesis, b.hypothesis) for b, other in passing)
+    ]  # fmt: skip
+
+
+def _differ(a: Hypothesis, b: Hypothesis) -> bool:
+    return a.family != b.family or a.name == b.name
+
+
+def _restless(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
+    """Causes that switch more than FEW times and leave heat anywhere: a history that no name tells."""
+    left = max(parts.values(), default=0.0)
+    return [
+        a for a in accepted
+        if len(a.hypothesis.when.windows) > detector.policy.few and a.hypothesis.when.bell is None and a.units
+        and left > max(detector.thresholds["unknown"], _misfit(a))
+    ]  # fmt: skip
+
+
+def _leaking(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
+    """Causes in windows that leave heat when nothing more can be named. Windows whose edges are fitted are so free
+    that one of them tells most of nearly any history: what else it leaves tells that it was another one."""
+    left = max(parts.values(), default=0.0)
+    return [
+        a for a in accepted
+        if a.hypothesis.when.windows and a.hypothesis.when.bell is None and a.units and fault_of(a.hypothesis).grows
+        and left > max(detector.policy.left * detector.thresholds["unknown"], _misfit(a))
+    ]  # fmt: skip
+
+
+def _of_machine(a: Accepted) -> bool:
+    """Whether a cause is a property of the machine: what acts on readings may be set up anew for every run."""
+    return bool(a.units) or fault_of(a.hypothesis).parameter
+
+
+def _misfit(a: Accepted) -> float:
+    """Heat that a cause in windows may leave because the model is not the machine."""
+    return fault_of(a.hypothesis).leaves * a.statistic
+
+
+def _parts(study: Study, name: str) -> set[str]:
+    """The parts that a surface or a film belongs to."""
+    spot = Spot.read(name)
+    if spot.of is Of.FILM:
+        return {Spot.read(p.name).part for p in study.probed.places if p.film == spot.name}
+    return {spot.part}
+
+
+def _stands(detector: Detector, a: Accepted) -> bool:
+    """Whether a cause still explains something beside the others, with a size that physics allows."""
+    batch = a.hypothesis.batch
+    if batch.fixed:
+        return True
+    first = float(a.amplitude[0])
+    return (
+        float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude)
+        > detector.policy.stands * a.threshold
+        and abs(first) >= detector.policy.stands * batch.smallest
+        and batch.possible(a.hypothesis.place, first)
+    )
+
+
+def _rivals(
+    detector: Detector, fitted: Fitted, chosen: Hypothesis, ranked: Sequence[Hypothesis]
+) -> tuple[tuple[Hypothesis, float], ...]:
+    """Other explanations nearly as likely, with their cosines."""
+    others, seen = [], {(chosen.family, chosen.name, chosen.batch.kind)}
+    near = max(detector.policy.rival, detector.policy.misfit * chosen.statistic)
+    for h in sorted(ranked, key=lambda h: -h.statistic):
+        key = (h.family, h.name, h.batch.kind)
+        if key not in seen and h.statistic > max(chosen.statistic - near, 0.5 * detector.thresholds[h.family]):
+            seen.add(key)
+            others.append(h)
+    others = others[:8]
+    cosine = cosines(detector, fitted, [chosen, *others])
+    return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(others))

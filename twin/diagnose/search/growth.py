@@ -1,0 +1,126 @@
+"""Further windows for a cause that switches, where the data ask for them, one after the other; other hours of a
+bell in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import RIDGE, History, Hypothesis
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.search.policy import POLICY, SearchPolicy
+from twin.machine.effects.effect import Window
+
+
+def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis:
+    """A hypothesis that acts in one window, with further windows of the same size where the data ask for them.
+
+    block (L, L): D^T Pi D among the columns of its place. Greedy: the window that brings most, then again.
+    """
+    if h.when.bell is not None:
+        return _elsewhere(h, g, block, policy)
+    if len(h.when.windows) == 0 or h.batch.fixed or not fault_of(h).grows:
+        return h
+    own = g[h.batch.columns[h.place]]
+    others = [w for w in h.batch.histories if w.windows]
+    W = np.stack([w.weights for w in others])  # (h, q, L)
+    current = h
+    for _ in range(policy.most_windows - 1):
+        now = current.when.weights
+        free = np.flatnonzero((np.abs(W) * np.abs(now)).sum(axis=(1, 2)) == 0.0)
+        if not len(free):
+            break
+        union = W[free] + now
+        num = np.einsum("hql,l->hq", union, own)
+        F = np.einsum("hql,lm,hrm->hqr", union, block, union, optimize=True)
+        scale = np.trace(F, axis1=1, axis2=2)[:, None, None] * RIDGE + 1e-12
+        inverse = np.linalg.inv(F + scale * np.eye(h.batch.q))
+        a = np.einsum("hqr,hr->hq", inverse, num)
+        statistic = np.einsum("hq,hq->h", num, a)
+        statistic = np.where(np.abs(a[:, 0]) < h.batch.smallest, 0.0, statistic)
+        if h.batch.sign:
+            statistic = np.where(h.batch.sign * a[:, 0] < 0.0, 0.0, statistic)
+        k = int(np.argmax(statistic))
+        if statistic[k] < current.statistic + max(policy.growth, policy.growth_share * current.statistic):
+            break
+        more = others[int(free[k])]
+        windows = tuple(sorted((*current.when.windows, *more.windows), key=lambda w: (w.run, w.start)))
+        name = " and ".join(f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" for w in windows)
+        when = History(f"from {name}", union[k], windows=windows)
+        information = float(1.0 / max(inverse[k, 0, 0], 1e-30))
+        current = Hypothesis(h.batch, h.place, when, float(statistic[k]), tuple(map(float, a[k])), information)
+    return current
+
+
+def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis | None:
+    """A coolant in the windows that plain cold likes best; None where it has those, or heat explains more than cold.
+
+    A score takes a film as linear, in which cold and film cancel over hours that have neither: a window that
+    is far too long can then lead. What a coolant takes away is cold, whatever its film.
+    """
+    if not fault_of(h).wets or len(h.when.windows) == 0:
+        return None
+    cold, hot = (_plain(h, g, block, sign, policy) for sign in (-1, 1))
+    if cold is None or (hot is not None and hot.statistic > cold.statistic):
+        return None
+    windows = _joined(cold.when.windows)
+    if windows == h.when.windows:
+        return None
+    (heat,) = cold.when.weights  # the columns of its film come first, in the same order
+    weights = np.stack([np.roll(heat, -(len(heat) // 2)), heat])
+    return replace(
+        h, when=replace(cold.when, weights=weights, windows=windows), amplitude=(h.amplitude[0], cold.amplitude[0])
+    )
+
+
+def _plain(h: Hypothesis, g: np.ndarray, block: np.ndarray, sign: int, policy: SearchPolicy) -> Hypothesis | None:
+    """A coolant's heat of one sign without its film, in the windows that it likes best; None if it explains nothing."""
+    histories = tuple(replace(w, weights=w.weights[1:]) for w in h.batch.histories)
+    own = g[h.batch.columns[h.place]]
+    W = np.concatenate([w.weights for w in histories])  # (h, L)
+    num, F = W @ own, np.einsum("hl,lm,hm->h", W, block, W, optimize=True)
+    statistic = np.where(sign * num > 0.0, num**2 / (F + F.max(initial=0.0) * RIDGE + 1e-12), 0.0)
+    k = int(np.argmax(statistic))
+    if statistic[k] <= 0.0:
+        return None
+    batch = replace(h.batch, histories=histories, sign=sign, smallest=0.0)
+    amplitude = float(num[k] / F[k])
+    return grown(
+        Hypothesis(batch, h.place, histories[k], float(statistic[k]), (amplitude,), float(F[k])), g, block, policy
+    )
+
+
+def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:
+    """Windows in their order, those that touch as one."""
+    result: list[Window] = []
+    for w in windows:
+        if result and result[-1].run == w.run and w.start <= result[-1].end:
+            result[-1] = replace(result[-1], end=max(result[-1].end, w.end))
+        else:
+            result.append(w)
+    return tuple(result)
+
+
+def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy) -> Hypothesis:
+    """A bell with its best hour in every run: runs may start at other hours of the day. Greedy, run by run."""
+    own, current = g[h.batch.columns[h.place]], h
+    for i in range(2 * h.batch.q):
+        run, bell = i % h.batch.q, current.when.bell
+        assert bell is not None
+        for other in h.batch.histories:
+            if other.bell is None or other.bell.length != bell.length:
+                continue
+            weights = current.when.weights.copy()
+            weights[run] = other.weights[run]
+            F = weights @ block @ weights.T
+            a = np.linalg.solve(F + (np.trace(F) * RIDGE + 1e-12) * np.eye(len(F)), weights @ own)
+            statistic = float(a @ weights @ own)
+            if statistic > current.statistic + policy.growth and a[0] >= h.batch.smallest:
+                centres = tuple(other.bell.centres[run] if r == run else c for r, c in enumerate(bell.centres))
+                when = replace(current.when, weights=weights, bell=replace(bell, centres=centres))
+                current = replace(current, when=when, statistic=statistic, amplitude=tuple(map(float, a)))
+                bell = when.bell
+                assert bell is not None
+    return current

@@ -1,0 +1,189 @@
+"""Every number that decides something in a search, once: what it is, its unit, and where it comes from.
+
+`python -m benchmarks sensitivity` halves and doubles each on stored trials, and tells which verdicts change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from enum import Enum
+from typing import Any
+
+
+class Origin(Enum):
+    """Where a number comes from."""
+
+    DERIVED = "follows from what it says"
+    JUDGED = "a judgement before any result"
+    FIVE_AXIS = "chosen on campaigns of effects hidden in five_axis (docs/campaign.md)"
+    LUMPED = "chosen on one case of a lumped machine, held against drawn networks"
+    SOLVER = "how an iteration goes on and ends"
+
+
+DERIVED, JUDGED, FIVE_AXIS, LUMPED, SOLVER = Origin
+
+
+def _rule(value: float, origin: Origin, meaning: str, unit: str = "") -> Any:
+    return field(default=value, metadata={"unit": unit, "origin": origin, "meaning": meaning})
+
+
+@dataclass(frozen=True)
+class SearchPolicy:
+    """What a search decides by; without a unit: shares, factors, counts."""
+
+    causes: int = _rule(3, JUDGED, "at most that are named together")
+    tries: int = _rule(3, FIVE_AXIS, "rounds of candidates that the exact model refuses")
+    ahead: int = _rule(12, JUDGED, "of those that pass, how many get further windows before the best is chosen")
+    named: float = _rule(0.7, FIVE_AXIS, "share of its own threshold that a name needs where another one passes")
+    stands: float = _rule(
+        0.5, FIVE_AXIS, "share of its threshold that a cause must explain beside the others, and of the least size"
+    )
+    switches: int = _rule(
+        4,
+        FIVE_AXIS,
+        "windows in which a cause switches at one place: what does so more often has a history that no name tells",
+    )
+    few: int = _rule(2, FIVE_AXIS, "windows that a cause may have and still leave heat where it is")
+    left: float = _rule(0.5, FIVE_AXIS, "of the threshold of heat of any history: what windows may leave of it")
+    misfit: float = _rule(
+        0.003, DERIVED, "of what a cause explains: a response that is wrong by a twentieth leaves 0.05^2 of it"
+    )
+    later: float = _rule(
+        2.5,
+        FIVE_AXIS,
+        "times its threshold that a cause beside another one needs: the first one's misfits look like causes",
+    )
+    covers: float = _rule(0.9, FIVE_AXIS, "of the evidence for heat of any history that a name must explain")
+    rival: float = _rule(10.0, JUDGED, "within which another explanation is a rival", "likelihood-ratio units")
+    entrants: int = _rule(5, FIVE_AXIS, "candidates of a kind that are refitted")
+    behind: float = _rule(0.15, FIVE_AXIS, "of the leader: who scores less cannot overtake it by being refitted")
+    saturates: float = _rule(
+        0.4, FIVE_AXIS, "likewise of capacities and of coolants' films: the larger they are, the worse is linearity"
+    )
+    edge: float = _rule(4.0, FIVE_AXIS, "that an edge gains where nothing is hidden", "likelihood-ratio units")
+    amplitude: float = _rule(
+        8.0, FIVE_AXIS, "that a second amplitude costs: of a coolant beside plain heat", "likelihood-ratio units"
+    )
+    gone: float = _rule(
+        -0.7, JUDGED, "of a conductance, linearly: it is nearly gone, and always refitted", "relative change"
+    )
+    bends: float = _rule(2.5, FIVE_AXIS, "that only something hidden moves a parameter by", "prior standard deviations")
+    growth: float = _rule(12.0, JUDGED, "that another window must bring", "likelihood-ratio units")
+    growth_share: float = _rule(
+        0.05,
+        FIVE_AXIS,
+        "and the least share of what the others explain: a strong cause has misfits that windows imitate",
+    )
+    most_windows: int = _rule(8, JUDGED, "of one cause")
+    closely: int = _rule(
+        3,
+        FIVE_AXIS,
+        "factors that are looked at again where their parameters are; likewise of a signal, fitted exactly",
+    )
+    signals: int = _rule(2, FIVE_AXIS, "of which any factor is fitted exactly")
+    pulled: float = _rule(
+        2.5,
+        FIVE_AXIS,
+        "by which data without its tolerance must tell a number from the declared one",
+        "standard deviations",
+    )
+    beyond: float = _rule(
+        3.0,
+        FIVE_AXIS,
+        "that a number out of its tolerance keeps beside any other explanation",
+        "prior standard deviations",
+    )
+    outside: float = _rule(1.0, DERIVED, "the declared tolerance itself", "prior standard deviations")
+    nearly: float = _rule(
+        0.75, LUMPED, "from which the surrogate of the settled calibration says little of a size", "of a bound"
+    )
+    sure: float = _rule(
+        1.96, DERIVED, "of its own that a number without its tolerance is off: its 95 % interval", "standard deviations"
+    )
+    alike: float = _rule(
+        0.9,
+        FIVE_AXIS,
+        "of what a signal's factor and a declared number do, from which the one may be the other",
+        "cosine",
+    )
+    same: float = _rule(0.998, FIVE_AXIS, "likewise of what is read nowhere else", "cosine")
+    distant: float = _rule(
+        1.0,
+        FIVE_AXIS,
+        "of a source, beyond which derivatives of the described machine say little",
+        "logarithm of a factor",
+    )
+    form: float = _rule(0.1, FIVE_AXIS, "of a source, that model discrepancy takes", "logarithm of a factor")
+    faint: float = _rule(
+        0.2, FIVE_AXIS, "of what explains most: a declared number that scores less leaves that, whatever it is freed to"
+    )
+    roughly: float = _rule(
+        2.0,
+        FIVE_AXIS,
+        "times the linear estimate of what the data determine: a number that may come out so sure is freed",
+    )
+    far: int = _rule(2, FIVE_AXIS, "numbers that are freed, each alone: the farthest may be another one's doing")
+    others: int = _rule(12, JUDGED, "other explanations that are looked at")
+    hotter: float = _rule(
+        1.4, FIVE_AXIS, "times the described rise of a channel: parameters within their tolerances stay below"
+    )
+    apart: float = _rule(
+        10.0, JUDGED, "that LR (1 - cos^2) must exceed for two causes to be distinguished", "likelihood-ratio units"
+    )
+    close: float = _rule(
+        6.0,
+        JUDGED,
+        "within which a rival of another family, or another part, makes a verdict ambiguous",
+        "likelihood-ratio units",
+    )
+    power: float = _rule(1.645, DERIVED, "one-sided 95 %, of a detection limit", "standard deviations")
+    remainder: float = _rule(
+        0.35, JUDGED, "of the evidence for unknown heat before all names: the share that may be left beside them"
+    )
+    block: float = _rule(7200.0, JUDGED, "of the bootstrap", "s")
+    noticed: float = _rule(0.5, JUDGED, "of a channel's noise, by which causes must move it to count as affected")
+    thermocouple: float = _rule(0.1, JUDGED, "noise of a sensor that no fitted run has", "K")
+    passes: int = _rule(3, SOLVER, "of an exact refit without edges")
+    window_passes: int = _rule(8, SOLVER, "of one with edges")
+    read_passes: int = _rule(6, SOLVER, "of what is read and not in proportion to its size")
+    held: int = _rule(
+        2, SOLVER, "in which a coolant's heat and edges are found for its usual film, before all are free"
+    )
+    trial: int = _rule(4, SOLVER, "by which coolants are compared before the best of them are refitted")
+    enough: float = _rule(0.02, SOLVER, "that a pass moves it by when it has arrived", "of a size")
+    less: float = _rule(1.0, SOLVER, "a pass that changes less is the last", "likelihood-ratio units")
+    less_share: float = _rule(1e-3, SOLVER, "of a statistic, likewise")
+    near: float = _rule(1.0, SOLVER, "longest step of parameters in an exact refit", "prior standard deviations")
+    lowest_change: float = _rule(
+        -0.97, SOLVER, "from -0.98 on the integration holds a conductance, and no derivative is left", "relative change"
+    )
+    highest_change: float = _rule(20.0, SOLVER, "beyond the range of every conductance", "relative change")
+    aside: float = _rule(0.1, SOLVER, "by which what is read and curved is moved for its derivative", "of a size")
+    first_order_passes: int = _rule(4, SOLVER, "of a fit beside a change that is known")
+    exact_passes: int = _rule(3, SOLVER, "likewise of the model with a corrected signal")
+    wide: float = _rule(1e3, SOLVER, "that an accepted amplitude may take: as good as free", "standard deviations")
+    refits: int = _rule(10, SOLVER, "passes of all causes together")
+    longest: float = _rule(0.7, SOLVER, "longest step", "logarithm of a factor")
+    still: float = _rule(0.1, SOLVER, "of amplitudes: a pass that changes less is the last", "standard deviations")
+    refit_less: float = _rule(0.5, SOLVER, "a pass that changes less is the last", "likelihood-ratio units")
+    anew: int = _rule(5, SOLVER, "passes in which derivatives beyond all bounds are made anew")
+    rises: int = _rule(2, SOLVER, "passes in a row that make it worse, after which it runs away")
+    rise_temperature: float = _rule(1.0, JUDGED, "rms of a described rise that a ratio is taken to, at least", "K")
+    rise_displacement: float = _rule(5e-6, JUDGED, "likewise of the TCP", "m")
+    edge_prior: float = _rule(
+        1800.0, DERIVED, "standard deviation of an edge about the hour that the search found: half an hour's block", "s"
+    )
+    edge_step: float = _rule(1800.0, SOLVER, "longest step of an edge", "s")
+    exponent: float = _rule(0.12, JUDGED, "standard deviation of a signal's exponent about the one of the catalogue")
+    longer: float = _rule(1800.0, JUDGED, "standard deviation of the length of a bell that was fitted", "s")
+
+
+POLICY = SearchPolicy()
+
+
+def rules() -> tuple[tuple[str, float, str, Origin, str], ...]:
+    """(name, value, unit, origin, meaning) of every number."""
+    return tuple(
+        (f.name, getattr(POLICY, f.name), f.metadata["unit"], f.metadata["origin"], f.metadata["meaning"])
+        for f in fields(SearchPolicy)
+    )

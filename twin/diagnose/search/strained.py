@@ -1,0 +1,249 @@
+"""One declared number out of its tolerance: a source, film, joint or contact that calibration moves too far.
+
+It is the verdict where freeing it leaves nothing, or so little that a discrepancy of its own explains that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+
+from twin.diagnose.evidence.batch import Hypothesis, score
+from twin.diagnose.evidence.fitter import Fitted, bounds
+from twin.diagnose.evidence.pulls import Loose
+from twin.diagnose.evidence.settled import settled_alone
+from twin.diagnose.evidence.sight import Sight
+from twin.diagnose.faults.acted import units_of
+from twin.diagnose.faults.loss_law import is_source
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns
+from twin.diagnose.search.contest import beginning, misfit
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.look import Search, Step, look
+from twin.diagnose.search.refit import refit
+from twin.diagnose.search.settled_beside import settled
+
+
+def closed(
+    detector: Detector, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis],
+    glance: tuple[Sight, list[Hypothesis], Step], relaxed: tuple[Fitted, Accepted], x0: np.ndarray,
+    loose: tuple[Loose, ...],
+) -> Search | None:  # fmt: skip
+    """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
+    something else that was seen before (glance) explains more. Signals that explain as much are its rivals."""
+    fitted, one = relaxed
+    _, ranked, first = glance
+    seen, left, last = look(detector, fitted)
+    misfits = (1.0 - detector.policy.covers) * one.statistic  # that it may leave
+    room = max(detector.thresholds["unknown"], misfits)
+    if not _weak(detector, left, misfits) or max(last.parts.values(), default=0.0) > room:
+        return None
+    removed = misfit(detector, before) - misfit(detector, fitted)
+    more = [h for h in ranked if h.statistic - detector.policy.rival * any(h is d for d in declared) > removed]
+    if any(h.statistic > detector.thresholds[h.family] for h in more) and not _stays(
+        detector, before, one, more[: detector.policy.others]
+    ):
+        return None
+    # both begin at the declared number: what either explains is the same but for what is left
+    fits = {h.name for h in declared if h.statistic > removed - detector.policy.rival}
+    rivals = tuple(
+        (Hypothesis(batch, i, batch.histories[0], one.statistic, (1.0,), 0.0), 1.0)
+        for batch in detector.columns.batches if fault_of(batch).corrects
+        for i, name in enumerate(batch.places)
+        if _does_the_same(detector, detector.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
+    )  # fmt: skip
+    (j,) = freed(detector.study, one.hypothesis)
+    amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
+    one = replace(
+        one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals,
+        amplitude=np.array([amplitude]), covariance=np.array([[variance]]),
+    )  # fmt: skip
+    x, covariance = settled(detector, y, (one,))
+    return Search(detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance, loose)
+
+
+def loose_ones(detector: Detector, y: np.ndarray, fitted: np.ndarray, settled: np.ndarray) -> tuple[Loose, ...]:
+    """The FAR declared numbers farthest out of their tolerance, by parameters (n,) of two calibrations.
+
+    Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared.
+    """
+    strain = detector.pulls.strain(fitted, settled)
+    found = []
+    for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
+        x, covariance = settled_alone(detector.fitter, y, (j,))
+        sigma = float(np.sqrt(covariance[j, j]))
+        if np.sign(fitted[j]) * x[j] > max(detector.policy.outside, detector.policy.sure * sigma):
+            rivals = _signals(detector, j, float(x[j]), sigma, float(strain[j]) ** 2)
+            found.append(Loose(j, float(x[j]), sigma, float(strain[j]), rivals))
+        if len(found) == detector.policy.far:
+            break
+    return tuple(found)
+
+
+def _signals(
+    detector: Detector, j: int, x: float, sigma: float, statistic: float
+) -> tuple[tuple[Hypothesis, float], ...]:
+    """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says; with
+    the source's own statistic, as they do the same."""
+    study = detector.study
+    if not is_source(study.probed.parameters[j]):
+        return ()
+    n, scale = len(study.probed.parameters), float(study.scale[j])
+    own = detector.whiten(detector.fitter.surrogate.at(np.zeros(n))[1][:, j]) / scale
+    size, found = float(own @ own), []
+    for batch in detector.columns.batches:
+        for i, _ in enumerate(batch.places if fault_of(batch).corrects else ()):
+            signal = detector.columns.raw[:, batch.columns[i, 0]].astype(float)
+            along = float(signal @ own)
+            cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
+            heat = 1.0 + along / size
+            if (
+                abs(cosine) >= detector.policy.same
+                and heat > 0.0
+                and abs(np.log(heat) - scale * x) < detector.policy.sure * scale * sigma
+            ):
+                found.append((Hypothesis(batch, i, batch.histories[0], statistic, (1.0,), 0.0), float(cosine)))
+    return tuple(found)
+
+
+def _size(one: Accepted, loose: Loose, detector: Detector) -> tuple[float, float]:
+    """The amplitude of a number out of its tolerance as the settled calibration has it without one, and its variance.
+
+    The fit that finds causes leaves to model discrepancy what looks like it, and frees the number to make up for that.
+    But it knows sizes beyond the parameter's bounds, where the settled one ends, and steps the exact model there.
+    """
+    study = detector.study
+    scale = float(study.scale[loose.index])
+    low, high = (detector.policy.nearly * float(ends[loose.index]) for ends in bounds(study))
+    if not low < loose.x < high:
+        return float(one.amplitude[0]), float(one.covariance[0, 0])
+    change, sigma = scale * loose.x, scale * loose.sigma
+    if not fault_of(one.hypothesis).conducts:
+        return change, sigma**2
+    return float(np.expm1(change)), float(np.exp(2.0 * change) * sigma**2)
+
+
+def _does_the_same(detector: Detector, signal: np.ndarray, one: Accepted, fits: bool) -> bool:
+    """Whether a factor of a signal does what a declared number does: it is read there, and nearly nowhere else.
+
+    signal (m,): its white response. Where it does not fit as it stands (fits), it may do so far from the description:
+    derivatives made there say little. It must then do just what a source does, and be of the fitted size.
+    """
+    (j,) = freed(detector.study, one.hypothesis)
+    n = len(detector.study.probed.parameters)
+    own = detector.whiten(detector.fitter.surrogate.at(np.zeros(n))[1][:, j]) / detector.study.scale[j]
+    along, size = float(signal @ own), float(own @ own)
+    if abs(along) < (detector.policy.alike if fits else detector.policy.same) * np.sqrt(size * float(signal @ signal)):
+        return False
+    if fits:
+        return True
+    heat = 1.0 + along / size  # times what the source emits
+    factor = float(one.amplitude[0])
+    sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), detector.policy.form * factor))
+    far = fault_of(one.hypothesis).parameter and abs(factor) > detector.policy.distant
+    return far and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
+
+
+def _stays(detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[Hypothesis]) -> bool:
+    """Whether a declared number is as far out of its tolerance beside any of the others, to first order."""
+    (j,) = freed(detector.study, one.hypothesis)
+    white = detector.whiten(fitted.residual)
+    return all(
+        abs(
+            detector.fitter.projector(
+                fitted.J, detector.policy.wide * _unit(readings_columns(detector, h))
+            ).most_likely(white)[j]
+        )
+        > detector.policy.beyond
+        for h in others
+    )
+
+
+def _unit(columns: np.ndarray) -> np.ndarray:
+    """Columns (m, q) of length one."""
+    return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30))
+
+
+def _weak(detector: Detector, ranked: Sequence[Hypothesis], misfits: float) -> bool:
+    """Whether nothing is strong enough to be named beside another cause."""
+    return all(h.statistic < max(detector.policy.later * detector.thresholds[h.family], misfits) for h in ranked)
+
+
+def strained(
+    detector: Detector, y: np.ndarray, fitted: Fitted, loose: Sequence[Loose],
+    glance: tuple[Sight, list[Hypothesis], Step],
+) -> tuple[Fitted, Accepted] | None:  # fmt: skip
+    """Of the declared numbers out of their tolerance the one that leaves least, freed of it.
+
+    None if there is none, or what was seen at a glance explains so much more that it would be left.
+    """
+    strain = {own.index: own.strain for own in loose}
+    found = []
+    for batch in detector.columns.batches:
+        fault = fault_of(batch)
+        for i, name in enumerate(batch.places if fault.declared else ()):
+            if (j := parameter_of(detector.study, name)) is None or j not in strain:
+                continue
+            always = next(h for h in batch.histories if not h.windows)
+            size = fault.amplitude(float(fitted.x[j] * detector.study.scale[j]))
+            likelihood = float((detector.policy.pulled * strain[j]) ** 2)
+            found.append(Hypothesis(batch, i, always, likelihood, (size,), float(detector.study.scale[j] ** -2.0)))
+    seen, ranked, _ = glance
+    most = ranked[0].statistic if ranked else 0.0
+    freed_ones, before = [], misfit(detector, fitted)
+    for h in sorted(found, key=lambda h: -h.statistic):
+        # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
+        # leave as much as its own discrepancy makes
+        likely = fault_of(h).faint or _scored(detector, fitted, seen, h) > detector.policy.faint * most
+        if (
+            not likely
+            and detector.policy.roughly * (1.0 - detector.policy.covers) * _told_alone(detector, fitted, h) < most
+        ):
+            continue
+        made = _freed(detector, y, fitted, h)
+        if made and (
+            likely or ((1.0 - detector.policy.covers) * made[1].statistic > most and misfit(detector, made[0]) < before)
+        ):
+            freed_ones.append(made)
+    return min(freed_ones, key=lambda made: misfit(detector, made[0]), default=None)
+
+
+def _scored(detector: Detector, fitted: Fitted, seen: Sight, h: Hypothesis) -> float:
+    """What a declared number scores by its derivative, and a contact by its response when it is nearly gone."""
+    own = next(own for own in seen.ready if own.batch is h.batch)
+    best = float(score(own, seen.g).statistic[h.place].max())
+    if (D := detector.lost.response(h)) is not None:
+        P = fitted.projector(D)
+        best = max(best, float(P @ detector.whiten(fitted.residual)) ** 2 / max(float(D @ P), 1e-30))
+    return best
+
+
+def _told_alone(detector: Detector, fitted: Fitted, h: Hypothesis) -> float:
+    """Likelihood-ratio units by which data without its tolerance tell a fitted number from the declared one."""
+    (j,) = freed(detector.study, h)
+    unit = np.zeros(fitted.projector.N.shape[1])
+    unit[j] = 1.0
+    variance = float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j])
+    return float(fitted.x[j]) ** 2 * (1.0 / variance - 1.0)
+
+
+def _freed(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
+    """The fit with a declared number at any value.
+
+    None where it has run to where it changes nothing or beyond what physics has, or where the data alone leave it
+    within its tolerance.
+    """
+    one = Accepted(
+        h, units_of(detector.study, h), np.array(h.amplitude), np.eye(1), h.statistic, detector.policy.pulled**2, ()
+    )
+    fitted, (one,) = refit(detector, y, beginning(fitted.x, detector.policy), [one])
+    change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
+    if not sigma > 0.0 or not h.batch.possible(h.place, change):
+        return None
+    if fault_of(h).conducts:  # as a logarithm: derivatives at many times a film say little of the film itself
+        change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
+    statistic = (change / sigma) ** 2
+    return (fitted, replace(one, statistic=statistic)) if statistic >= one.threshold else None

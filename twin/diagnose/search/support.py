@@ -1,0 +1,64 @@
+"""Which channels a cause rests on: their shares of its statistic, and over how many of them it spreads.
+
+With white residual r and response d = D a of a cause, LR = d^T Pi r is a sum over rows, hence over channels. Their
+participation ratio (sum s)^2 / sum s^2 is the number of channels that carry it: one where a single sensor decides, n
+where n do alike (Bell, Dean, Discuss. Faraday Soc. 50, 1970). It decides nothing: it says how narrow a name stands.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.place import Support
+from twin.diagnose.search.accepted import Accepted, jacobian, read_change, readings_columns
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.look import Search
+
+COMPONENTS = ("dx", "dy", "dz")
+
+
+def support_of(found: Search) -> Support | None:
+    """Of the first cause of a search; None without one, or where its response is of no channel."""
+    if not found.accepted:
+        return None
+    detector, first, others = found.detector, found.accepted[0], found.accepted[1:]
+    sizes = [(a.hypothesis, float(a.amplitude[0])) for a in found.accepted]
+    J = jacobian(detector, np.clip(found.x, -3.0, 3.0), sizes)
+    beside = [readings_columns(detector, a.hypothesis) for a in others]
+    projector = detector.fitter.projector(J, np.hstack(beside) if beside else None)
+    explained = _change(detector, first, found.x)
+    return _shared(found.detector.study, explained * projector(detector.whiten(found.residual)))
+
+
+def _change(detector: Detector, a: Accepted, x: np.ndarray) -> np.ndarray:
+    """(m,) white response to a cause."""
+    if a.units:
+        return np.asarray(readings_columns(detector, a.hypothesis) @ a.amplitude)
+    return read_change(detector, a.hypothesis, a.amplitude, x)
+
+
+def _shared(study: Study, rows: np.ndarray) -> Support | None:
+    """From the terms (m,) of a statistic. Terms of both signs cancel in a sum: channels that speak against a cause
+    carry nothing of it."""
+    total: dict[str, float] = {}
+    first = 0
+    for k in study.fitted:
+        planned = study.runs[k]
+        T, w = planned.split(rows[first : first + planned.size])
+        first += planned.size
+        for names, values in ((planned.measured.sensors, T), (COMPONENTS, w)):
+            for name, value in zip(names, values.sum(axis=0), strict=True):
+                total[name] = total.get(name, 0.0) + float(value)
+    return shared(total)
+
+
+def shared(total: dict[str, float]) -> Support | None:
+    """From what each channel contributes."""
+    positive = {name: max(value, 0.0) for name, value in total.items()}
+    whole = sum(positive.values())
+    if not whole > 0.0:
+        return None
+    shares = {name: value / whole for name, value in positive.items()}
+    ratio = 1.0 / sum(s**2 for s in shares.values())
+    return Support(tuple(sorted(shares.items(), key=lambda s: -s[1])), ratio)

@@ -1,0 +1,273 @@
+"""From a search to a verdict, its causes in the words of a description, and what is left unknown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.fitter import bounds
+from twin.diagnose.evidence.sight import sight
+from twin.diagnose.evidence.unknown import history
+from twin.diagnose.faults.fault import Described, Family
+from twin.diagnose.faults.table import family_of_parameter, fault_of
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
+from twin.diagnose.result.spot import Spot
+from twin.diagnose.search.accepted import Accepted, freed
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.look import Search
+from twin.diagnose.search.policy import POLICY, SearchPolicy
+
+CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
+
+
+def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
+    """A cause as reports and edits take it: factors as factors, differences as differences.
+
+    The interval counts that the model's own form is wrong (`Fault.own`).
+    """
+    h, fault = a.hypothesis, fault_of(a.hypothesis)
+    value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
+    sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), fault.uncertain(value)))
+    told = fault.curve.told
+    size = told(value), told(value - 1.96 * sigma), told(value + 1.96 * sigma)
+    said = fault.described(study, Described(h.name, size, h.when.windows), a.amplitude, a.covariance)
+    value, low, high = said.size
+    settings = said.settings | ({"reference": h.when.reference} if h.when.signal else {})
+    return Cause(
+        family=h.family, place=said.place, parameter="", amplitude=value, ci95=(low, high), unit=h.batch.unit,
+        statistic=float(a.statistic), threshold=float(a.threshold), history=h.when.name, signal=h.when.signal,
+        exponent=h.when.exponent, windows=said.windows, settings=settings,
+        rivals=tuple(_rival(a.hypothesis, other, cosine, policy.apart) for other, cosine in a.rivals),
+    )  # fmt: skip
+
+
+def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
+    """A hypothesis in a row of a table. Its interval is that of an amplitude that enters linearly, of which the
+    statistic is (amplitude / sigma)^2; an exact factor has none."""
+    value, place, fault = h.amplitude[0], h.name, fault_of(h)
+    if fault.corrects:
+        place, factor = fault.factor(place)
+        return Rival(h.family, place, h.when.name, factor, h.batch.unit, h.statistic, cosine, remedy)
+    half = 1.96 * abs(value) / math.sqrt(h.statistic) if h.statistic > 0.0 and not h.batch.fixed else math.nan
+    told = fault.curve.told
+    ci95 = (told(value - half), told(value + half))
+    return Rival(h.family, place, h.when.name, told(value), h.batch.unit, h.statistic, cosine, remedy, ci95)
+
+
+def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float, apart: float) -> Rival:
+    separable = min(chosen.statistic, other.statistic) * (1.0 - cosine**2) > apart
+    return rival_of(other, cosine, "" if separable else remedy(chosen, other))
+
+
+def remedy(a: Hypothesis, b: Hypothesis) -> str:
+    """What would tell two causes apart that these data do not."""
+    wrong = next((h for h in (a, b) if fault_of(h).corrects), None)
+    if wrong is not None:
+        return _reading(wrong)
+    if a.name != b.name and a.when.name == b.when.name:
+        return f"a temperature sensor between {a.name} and {b.name}, nearer to one of them"
+    signals = [h.when.signal for h in (a, b) if h.when.signal]
+    if a.name == b.name and a.when.signal and a.when.signal == b.when.signal:
+        return f"a run with {a.when.signal} held for 2 h each at a third, two thirds and all of its range"
+    if signals:
+        return f"a run in which {' and '.join(dict.fromkeys(signals))} work alone, and one in which they rest"
+    if a.name == b.name:
+        both = f"{a.family} and {b.family}"
+        return f"a run in which the air is 5 K colder, and one that cools from standstill: {both} differ there"
+    return f"temperature sensors at {a.name} and at {b.name}"
+
+
+def _reading(h: Hypothesis) -> str:
+    """What tells whether a signal is declared rightly."""
+    signal, _ = fault_of(h).factor(h.name)
+    return f"one reading of {signal} beside an instrument, or what the drive's manual says it logs"
+
+
+def _part(name: str) -> str:
+    """What a place belongs to: the first part of its name, or all of a name of the description."""
+    return Spot.read(name).owner
+
+
+def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tuple[Cause, ...]]:
+    """The verdict, and the causes it rests on."""
+    entries = {f.name: f for f in families}
+    groups = {f.name: f.group for f in families}
+    thresholds, policy = found.detector.thresholds, found.detector.policy
+    left = max(found.steps[-1].parts.values(), default=0.0)
+    # a declared number out of its tolerance had been fitted before, as far as its tolerance went
+    relaxed = [a.statistic for a in found.accepted if freed(found.detector.study, a.hypothesis)]
+    before = max([*found.steps[0].parts.values(), *relaxed], default=0.0)
+    causes = tuple(cause_of(a, found.detector.study, found.detector.policy) for a in found.accepted)
+    if (
+        left > thresholds["unknown"]
+        and (not causes or left > policy.remainder * before)
+        and not _more_alike(found, left)
+    ):
+        # a declaration is not corrected while something else is at work; a sensor is not part of the machine
+        return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
+    if not causes:
+        strained = strained_of(found)
+        if not strained:
+            return "nothing", ()
+        return "ambiguous" if strained[0].rivals else "out_of_tolerance", strained
+    lead, chosen = causes[0], found.accepted[0]
+    for other, cosine in chosen.rivals:
+        more = policy.amplitude * (other.batch.q - chosen.hypothesis.batch.q)
+        near = other.statistic - more > chosen.hypothesis.statistic - policy.close
+        apart = min(chosen.hypothesis.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
+        same = other.family == lead.family and _part(other.name) == _part(chosen.hypothesis.name)
+        if same and chosen.hypothesis.when.signal and other.when.name != chosen.hypothesis.when.name:
+            same = False
+        if near and not apart and not same and other.statistic > thresholds[other.family]:
+            return "ambiguous", causes
+    # a sensor at fault does not keep what is beside it out of the description
+    others = [c for c in causes if groups.get(c.family) != "sensor"]
+    if not others:
+        return "sensor", causes
+    lead = others[0]
+    if groups.get(lead.family) == "signal":
+        return "signal", causes
+    declared = lead.family in entries and entries[lead.family].declared and not lead.windows and not lead.signal
+    whole = Spot.read(lead.place).declared
+    return ("out_of_tolerance" if declared and whole else "named"), causes
+
+
+def _more_alike(found: Search, left: float) -> bool:
+    """Whether a search ended with as many causes as it takes, all of a family that comes part by part, and one more of
+    them explains what is left: a body that was warm has more parts than that, and nothing about it is unknown."""
+    alike = {(a.hypothesis.family, Spot.read(a.hypothesis.name).within) for a in found.accepted}
+    best, policy = next(iter(found.steps[-1].ranked), None), found.detector.policy
+    return (
+        len(found.accepted) >= policy.causes and best is not None and fault_of(best).several
+        and alike == {(best.family, Spot.read(best.name).within)} and best.statistic > policy.covers * left
+    )  # fmt: skip
+
+
+def strained_of(found: Search) -> tuple[Cause, ...]:
+    """Declared parameters that calibration alone moved out of their tolerance, at their values without one."""
+    result = []
+    for own in found.loose:
+        p = found.detector.study.probed.parameters[own.index]
+        gain, low, high = (float(np.exp(p.sigma * (own.x + z * own.sigma))) for z in (0.0, -1.96, 1.96))
+        place = ".".join(p.path.split(".")[:2])
+        result.append(Cause(
+            family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
+            statistic=own.strain**2, threshold=1.0, history=CALIBRATED,
+            rivals=tuple(rival_of(h, cosine, _reading(h)) for h, cosine in own.rivals),
+        ))  # fmt: skip
+    return tuple(sorted(result, key=lambda c: -c.statistic))
+
+
+def unknown_of(found: Search) -> Unknown | None:
+    """The unknown heat, where its evidence passes."""
+    detector = found.detector
+    parts = found.steps[-1].parts
+    if not parts or max(parts.values()) <= detector.thresholds["unknown"]:
+        return None
+    part = max(parts, key=lambda p: parts[p])
+    surface, heat, sigma = history(found.heat, found.g, part)
+    study = detector.study
+    histories = {}
+    blocks = detector.elements.histories.blocks
+    for k in study.fitted:
+        run = study.runs[k].run
+        dt = float(run.drive.time[1] - run.drive.time[0])
+        own = [b for b, (i, _, _) in enumerate(blocks) if i == k]
+        when = tuple((blocks[b][1] + blocks[b][2]) / 2 * dt for b in own)
+        histories[run.name] = (when, tuple(map(float, heat[own])), tuple(map(float, sigma[own])))
+    correlated = []
+    for signal in study.runs[0].run.signals:
+        means = []
+        for i, start, end in blocks:
+            values = study.runs[i].run.signals.get(signal)
+            means.append(float(np.abs(values[start:end]).mean()) if values is not None else 0.0)
+        if np.ptp(means) > 0 and np.ptp(heat) > 0:
+            correlated.append((signal, float(np.corrcoef(means, heat)[0, 1])))
+    correlated.sort(key=lambda s: -abs(s[1]))
+    return Unknown(part, surface, parts[part], detector.thresholds["unknown"], histories, tuple(correlated[:5]))
+
+
+def _moves(change: np.ndarray, study: Study) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) K and (n,) m: rms over its run of the sensor, and the TCP component, that a column (m, n) changes most."""
+    T, w, first = np.zeros(change.shape[1]), np.zeros(change.shape[1]), 0
+    for k in study.fitted:
+        planned = study.runs[k]
+        of_run = planned.split(change[first : first + planned.size])
+        first += planned.size
+        for most, values in zip((T, w), of_run, strict=True):
+            if values.size:
+                np.maximum(most, np.sqrt(np.mean(np.square(values), axis=0)).max(axis=0), out=most)
+    return T, w
+
+
+def pulls_of(found: Search) -> tuple[Pull, ...]:
+    """How far the last fit moved every declared parameter, and the causes those whose place they take."""
+    study = found.detector.study
+    low, high = bounds(study)
+    sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    x = np.clip(found.x, low, high)
+    moves = _moves(found.detector.fitter.surrogate.at(np.zeros(len(x)))[1] * x, study)
+    pulls = [
+        Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit,
+             temperature_change=float(T), displacement_change=float(w))
+        for p, c, s, T, w in zip(study.probed.parameters, x, sigma, *moves, strict=True)
+    ]  # fmt: skip
+    for a in found.accepted:
+        change, spread = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
+        if fault_of(a.hypothesis).conducts:
+            change, spread = float(np.log1p(change)), spread / (1.0 + change)
+        for j in freed(study, a.hypothesis):  # held at its declared value in x
+            p, pull = study.probed.parameters[j], change / float(study.scale[j])
+            pulls[j] = Pull(p.path, p.nominal, p.value(pull), spread / float(study.scale[j]), pull, p.unit, freed=True)
+    return tuple(pulls)
+
+
+def with_faults(
+    verdict: Verdict, causes: tuple[Cause, ...], faults: Sequence[Cause]
+) -> tuple[Verdict, tuple[Cause, ...]]:
+    """The verdict with what was found without a search: sensors that stand still, leap or break."""
+    return "sensor" if faults and verdict == "nothing" else verdict, (*faults, *causes)
+
+
+def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
+    """(family, unit, place, whether it switches) -> the size that would have been named in 95 of 100 cases.
+
+    The median over histories, as amplitudes are: relative changes, logarithms of factors.
+    """
+    result: dict[tuple[str, str, str, bool], float] = {}
+    _, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
+    for own in sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J))).ready:
+        batch = own.batch
+        if batch.fixed:
+            continue
+        sizes = (np.sqrt(detector.thresholds[batch.family]) + detector.policy.power) / np.sqrt(
+            np.maximum(own.information, 1e-30)
+        )
+        sizes = np.maximum(sizes, batch.smallest)
+        for windowed in (False, True):
+            chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
+            for p, name in enumerate(batch.places if chosen else ()):
+                key = (batch.family, batch.unit, name, windowed)
+                result[key] = min(float(np.median(sizes[p, chosen])), result.get(key, np.inf))
+    return result
+
+
+def limits_of(detector: Detector) -> tuple[Limit, ...]:
+    """Per family and unit `limits_at` its places, for what always acts where there is such; factors as factors."""
+    curves = {(batch.family, batch.unit): fault_of(batch).curve for batch in detector.columns.batches}
+    at = limits_at(detector)
+    found: dict[tuple[str, str], list[tuple[float, str]]] = {}
+    for (family, unit, place, windowed), size in at.items():
+        if not windowed or (family, unit, place, False) not in at:
+            found.setdefault((family, unit), []).append((size, place))
+    limits = []
+    for (family, unit), sizes in found.items():
+        ordered = sorted(sizes)
+        median, place = ordered[len(ordered) // 2]
+        size, smallest, largest = (curves[family, unit].told(s) for s in (median, ordered[0][0], ordered[-1][0]))
+        limits.append(Limit(family, place, size, smallest, largest, unit))
+    return tuple(limits)
