@@ -8,6 +8,7 @@ import click
 
 from twin.cli.bundle import bundled
 from twin.cli.quantity import Quantity
+from twin.cli.several import Several
 
 if TYPE_CHECKING:
     from twin.face.diagnose import DiagnoseOptions
@@ -25,7 +26,7 @@ def _options() -> type[Any]:
 @click.argument("artefact", type=click.Path(), required=False)
 @click.argument("runs", type=click.Path(), nargs=-1)
 @click.option(
-    "--sealed", multiple=True, type=click.Path(), help="run that is opened last, to measure the gain; repeatable"
+    "--sealed", multiple=True, cls=Several, type=click.Path(), help="runs that are opened last, to measure the gain"
 )
 @click.option("-o", "--output", type=click.Path(), help="folder of the report")
 @click.option("--noise", default="0.1 K", show_default=True, type=Quantity("K"),

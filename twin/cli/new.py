@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from twin.cli.several import Several
+
 
 def _pairs(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
     """NAME=VALUE of every option; the name may hold any sign but the last '='."""
@@ -14,10 +16,11 @@ def _pairs(context: click.Context, option: click.Parameter, given: tuple[str, ..
     return {name: value for name, _, value in (s.rpartition("=") for s in given)}
 
 
-@click.command(epilog="Example: twin new out/lathe --from-log day_1.csv --from-log day_2.csv --sealed day_3.csv")
+@click.command(epilog="Example: twin new out/lathe --from-log day_1.csv day_2.csv --sealed day_3.csv")
 @click.argument("folder", type=click.Path())
-@click.option("--from-log", "logs", multiple=True, required=True, type=click.Path(), help="CSV, XLSX or run folder; repeat")
-@click.option("--sealed", multiple=True, type=click.Path(), help="log that is scored and never fitted to; repeat")
+@click.option("--from-log", "logs", multiple=True, cls=Several, required=True, type=click.Path(),
+              help="CSV or XLSX files, or run folders")  # fmt: skip
+@click.option("--sealed", multiple=True, cls=Several, type=click.Path(), help="logs that are scored and never fitted to")
 @click.option("--unit", "units", multiple=True, callback=_pairs, metavar="COLUMN=UNIT",
               help="unit that neither header nor guess tells; COLUMN= leaves it out; repeat")  # fmt: skip
 @click.option("--axis", "axes", multiple=True, callback=_pairs, metavar="dx=COLUMN",

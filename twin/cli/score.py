@@ -8,6 +8,7 @@ import click
 
 from twin.cli.bundle import bundled
 from twin.cli.quantity import Quantity
+from twin.cli.several import Several
 
 if TYPE_CHECKING:
     from twin.face.score import ScoreOptions
@@ -27,9 +28,9 @@ def _names(ctx: click.Context, param: click.Parameter, value: str | None) -> tup
 @click.argument("artefact", type=click.Path())
 @click.argument("runs", nargs=-1, required=True, type=click.Path())
 @click.option(
-    "--sealed", multiple=True, type=click.Path(), help="run kept back from every fit, scored by itself; repeat"
+    "--sealed", multiple=True, cls=Several, type=click.Path(), help="runs kept back from every fit, scored by themselves"
 )
-@click.option("--train", multiple=True, type=click.Path(), help="run that baselines learn from, not scored; repeat")
+@click.option("--train", multiple=True, cls=Several, type=click.Path(), help="runs that baselines learn from, not scored")
 @click.option("--inputs", callback=_names,
               help="columns that learned baselines read, 't1,t5,spindle_speed'  [default: temperatures]")  # fmt: skip
 @click.option("--restart", is_flag=True, help="segments are tests of their own, each from its own initial state")

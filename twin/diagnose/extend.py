@@ -122,6 +122,9 @@ def _write_description(
     """
     diagnosis = result.diagnosis
     parameters: dict[tuple[str, str], str] = {}
+    if result.description:
+        (new / DESCRIPTION).write_text(with_files(result.description, machine, new), encoding="utf-8")
+        return parameters, [f"description with the members that it lacked: {target / DESCRIPTION}"]
     if not result.causes:
         told = [n for n in diagnosis.notes if n.startswith("withdrawn")] or ["no extension is written"]
         return parameters, told

@@ -32,7 +32,9 @@ from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of,
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.look import Search
+from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
+from twin.diagnose.search.poor import too_poor
 from twin.diagnose.search.sealed import judged
 from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.support import support_of
@@ -69,6 +71,7 @@ class Result:
     search: Search
     causes: tuple[Cause, ...]  # that belong into the description
     families: tuple[Family, ...] = FAMILIES
+    description: str = ""  # with members that it lacked, where there are any
 
 
 def machine_of(artefact: Artefact, path: Path, machine: Path | None = None) -> Machine:
@@ -180,6 +183,10 @@ def diagnose(
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
+    poor = too_poor(shown, plans, usable, settings.temperature_sigma, settings.policy.poor)
+    if poor is not None:
+        notes.insert(0, poor.note)
+        verdict, causes, shown = "too_poor", (), _beside_sensors(found, {})
     searched = causes  # what was seen before any search has no statistic that channels could share
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [
@@ -190,6 +197,13 @@ def diagnose(
     if opened.note:  # what is shown is then the calibration beside faulty channels, as of any unknown
         notes.insert(0, opened.note)
         shown, searched = _beside_sensors(found, groups), ()
+    gains, described = opened.gains, ""
+    if verdict == "unknown":
+        missing = missing_members(artefact, shown, plans, usable, sealed, settings.seed, progress)
+        if missing is not None:
+            verdict, causes, described = "named", (*causes, *missing.causes), missing.description
+            gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
+            notes.insert(0, missing.note)
     first = found.steps[0]
     heat = unknown_of(found) if verdict == "unknown" else None
     planned = None
@@ -206,7 +220,7 @@ def diagnose(
         pulls=pulls_of(shown),
         detection_limits=limits_of(detector),
         unknown=heat,
-        gain=opened.gains,
+        gain=gains,
         ranked=tuple(rival_of(h, float(first.cosine[0, i])) for i, h in enumerate(first.ranked)),
         cosine=first.cosine,
         nulls=detector.nulls,
@@ -231,7 +245,7 @@ def diagnose(
         scene=_scene(machine, study.probed, searched or causes, heat),
         plan=planned,
     )
-    return Result(diagnosis, found, extension, settings.families)
+    return Result(diagnosis, found, extension, settings.families, described)
 
 
 def _beside_sensors(found: Search, groups: Mapping[str, str]) -> Search:

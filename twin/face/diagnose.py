@@ -77,7 +77,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """ "named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal" or "nothing"."""
+        """ "named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing" or "too_poor"."""
         return self.findings.verdict
 
     @property

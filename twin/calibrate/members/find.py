@@ -12,7 +12,7 @@ from twin.calibrate.fit.problem import Problem, problem
 from twin.calibrate.members.describe import Member
 from twin.calibrate.members.driver import drivers_of
 from twin.calibrate.members.evidence import EVERY, Sums
-from twin.calibrate.members.responses import candidates, responses
+from twin.calibrate.members.responses import Candidate, candidates, responses
 from twin.calibrate.members.select import Selected, select
 from twin.errors import LogError
 from twin.logs.run import Run
@@ -47,17 +47,36 @@ def beside_model(artefact: Artefact, runs: Sequence[Run], progress: Progress = s
     Displacements say little about temperatures, and a calibration drags capacities and losses after whatever is missing.
     Raises LogError for runs without displacements or without anything to follow.
     """
+    made, rows = _rows_beside(artefact, runs)
+    members, selected, axes = _found(runs, rows, progress)
+    return Found(members, selected, axes, _values(made, selected.explained.x))
+
+
+def rows_beside(
+    artefact: Artefact, runs: Sequence[Run], members: Sequence[Candidate]
+) -> tuple[list[Rows], list[np.ndarray]]:
+    """Per run what the model as delivered leaves of every TCP row, and what members do there (k, c) [K]."""
+    _, rows = _rows_beside(artefact, runs)
+    return rows, [responses(run, members, r.time) for run, r in zip(runs, rows, strict=True)]
+
+
+def left_by(found: Found, artefact: Artefact, runs: Sequence[Run]) -> np.ndarray:
+    """(runs, m) m: rms that the model with its members leaves of each run, per measured axis."""
+    rows, F = rows_beside(artefact, runs, [m.candidate for m in found.members])
+    a = np.nan_to_num(np.array([m.expansion for m in found.members]))
+    errors = [r.y - r.J @ found.selected.explained.x - f @ a for r, f in zip(rows, F, strict=True)]
+    return np.array([np.sqrt(np.nanmean(e[:, list(found.axes)] ** 2, axis=0)) for e in errors if len(e)])
+
+
+def _rows_beside(artefact: Artefact, runs: Sequence[Run]) -> tuple[Problem, list[Rows]]:
     own = [p for p in artefact.parameters if p.kind == "expansion"]
     made = problem(artefact, runs, own, Options())
     x = np.zeros(len(made.scale))
-    computed, derivatives = made.outputs(x), made.jacobian(x)
     n = len(own)  # corrections of initial states come after them: none, for what was stated is taken
-    rows = [
+    return made, [
         Rows(r.measured.tcp_time, r.measured.tcp - w, J[:, :, :n])
-        for r, (_, w), (_, J) in zip(made.runs, computed, derivatives, strict=True)
+        for r, (_, w), (_, J) in zip(made.runs, made.outputs(x), made.jacobian(x), strict=True)
     ]
-    members, selected, axes = _found(runs, rows, progress)
-    return Found(members, selected, axes, _values(made, selected.explained.x))
 
 
 def without_model(runs: Sequence[Run], progress: Progress = silent) -> Found:

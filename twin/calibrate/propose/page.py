@@ -77,7 +77,7 @@ def figure_rows(rows: Sequence[Figure]) -> tuple[list[str], list[list[str]]]:
 
 def driver_rows(found: Found) -> tuple[list[str], list[list[str]]]:
     header = ["column", "moves " + ", ".join(AXES[a] for a in found.axes) + " [um rms]", "asked for by the data (ln evidence)"]
-    header.append("left over on stretches left out, with those above [um rms]")
+    header.append("residual of stretches left out, with those above [um rms]")
     cells = []
     for j in found.selected.joined:
         moves, left = (", ".join(f"{1e6 * v:.2g}" for v in values) for values in (j.moves, j.held_out))

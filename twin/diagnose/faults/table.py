@@ -16,6 +16,7 @@ from twin.diagnose.faults import (
     loss_law,
     measurement,
     misplaced_source,
+    missing_member,
     not_thermal,
     scale_expansion,
     sensor,
@@ -47,6 +48,7 @@ _FILES = (
     measurement,
     misplaced_source,
     not_thermal,
+    missing_member,
 )
 FAMILIES: tuple[Family, ...] = tuple(file.FAMILY for file in _FILES)
 FAULTS: dict[tuple[str, str], Fault] = {(f.family, f.kind): f for file in _FILES for f in file.FAULTS}

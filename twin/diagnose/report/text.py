@@ -123,6 +123,8 @@ def verdict_sentence(d: Diagnosis) -> str:
         told = [text for text in (moved_words(d), left_words(d)) if text]
         fits = "" if told else ": within their noise the description explains them"
         return " ".join([f"Nothing is missing that these data could show{fits}{seen}.", *map(_sentence, told)])
+    if d.verdict == "too_poor":
+        return _sentence(next((n for n in d.notes if n.startswith("the model is too poor")), "the model is too poor"))
     if d.verdict == "unknown":
         return _sentence(_unknown_words(d) + (f"; named besides: {causes}" if causes else ""))
     if d.verdict == "out_of_tolerance":

@@ -14,9 +14,9 @@ from twin.diagnose.result.place import Scene, Support
 from twin.diagnose.result.plan import Plan
 from twin.machine.effects.effect import Window
 
-Verdict = Literal["named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing"]
+Verdict = Literal["named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing", "too_poor"]
 VERDICTS: tuple[Verdict, ...] = (
-    "named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing",
+    "named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing", "too_poor",
 )  # fmt: skip
 
 

@@ -15,6 +15,9 @@ from twin.diagnose.search.accepted import in_place, stepped, with_shifts
 from twin.diagnose.search.look import Search
 
 
+AXES = ("dx", "dy", "dz")
+
+
 @dataclass(frozen=True)
 class Predicted:
     """Of one run, (size,) each."""
@@ -66,12 +69,12 @@ def gains(
     for i, name in enumerate(sealed.sensors):
         errors = [read[:, i] - T[:, i] for read, (T, _) in zip(readings, models, strict=True)]
         affected = bool(_moved(errors) > policy.noticed * floors[0][i])
-        result.append(_gain(sealed.name, name, "K", errors, sealed.bin_time, affected, rng, policy.block))
+        result.append(gain_of(sealed.name, name, "K", errors, sealed.bin_time, affected, rng, policy.block))
     for c in range(3 if len(sealed.tcp) else 0):
         errors = [sealed.tcp[:, c] - w[:, c] for _, w in models]
-        axis = ("dx", "dy", "dz")[c]
+        axis = AXES[c]
         affected = bool(_moved(errors) > policy.noticed * floors[1][c])
-        result.append(_gain(sealed.name, axis, "m", errors, sealed.tcp_time, affected, rng, policy.block))
+        result.append(gain_of(sealed.name, axis, "m", errors, sealed.tcp_time, affected, rng, policy.block))
     return tuple(result)
 
 
@@ -82,7 +85,7 @@ def _moved(errors: Sequence[np.ndarray]) -> float:
     return float(np.sqrt(np.mean(change[good] ** 2))) if good.any() else 0.0
 
 
-def _gain(
+def gain_of(
     run: str,
     name: str,
     unit: str,
@@ -92,6 +95,7 @@ def _gain(
     rng: np.random.Generator,
     length: float,
 ) -> Gain:
+    """Of what three models leave of a channel (n,) at times (n,); length [s] of the blocks of the bootstrap."""
     good = np.all(np.isfinite(errors), axis=0)
     if not good.any():
         return Gain(run, name, unit, np.nan, np.nan, np.nan, (np.nan, np.nan), False)

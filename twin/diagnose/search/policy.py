@@ -31,6 +31,15 @@ def _rule(value: float, origin: Origin, meaning: str, unit: str = "") -> Any:
 class SearchPolicy:
     """What a search decides by; without a unit: shares, factors, counts."""
 
+    poor: float = _rule(
+        5.0, JUDGED, "of the rms left at half of the sensors, above which no cause is named", "sigma of a reading"
+    )
+    halves: float = _rule(
+        0.5, JUDGED, "of what the recalibrated model leaves of displacements: missing members, of many numbers, leave less"
+    )
+    predicts: float = _rule(
+        0.7, JUDGED, "of what the model alone leaves of stretches left out: missing members leave less of them"
+    )
     causes: int = _rule(3, JUDGED, "at most that are named together")
     tries: int = _rule(3, FIVE_AXIS, "rounds of candidates that the exact model refuses")
     ahead: int = _rule(12, JUDGED, "of those that pass, how many get further windows before the best is chosen")

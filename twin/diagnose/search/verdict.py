@@ -230,7 +230,7 @@ def with_faults(
     verdict: Verdict, causes: tuple[Cause, ...], faults: Sequence[Cause]
 ) -> tuple[Verdict, tuple[Cause, ...]]:
     """The verdict with what was found without a search: sensors that stand still, leap or break."""
-    return "sensor" if faults and verdict == "nothing" else verdict, (*faults, *causes)
+    return "sensor" if faults and verdict in ("nothing", "too_poor") else verdict, (*faults, *causes)
 
 
 def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:

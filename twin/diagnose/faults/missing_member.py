@@ -1,0 +1,27 @@
+"""A body that the description lacks: it follows a logged temperature or heat and moves the tool.
+
+Looked for by `twin.diagnose.search.missing`, where nothing else explains what moves the tool; no batch of the search.
+"""
+
+from __future__ import annotations
+
+from twin.diagnose.evidence.batch import Batch
+from twin.diagnose.faults.context import Context
+from twin.diagnose.faults.fault import Family, Fault
+
+FAULTS: tuple[Fault, ...] = ()
+
+
+def batches(context: Context) -> list[Batch]:
+    """None: it needs no model of heat, and is found by the evidence of displacements alone."""
+    return []
+
+
+FAMILY = Family(
+    20, "missing_member", "Missing member, or another air",
+    "A probe holder, cover, column or foundation follows an air, a measured temperature or a heat, and moves the tool.",
+    "w + sum_k a_k (tau_k-lag of a logged column)", "displacements that no heat in the machine explains",
+    "3 in ln evidence", "either", "every logged temperature, speed and power, with lags of 1 min to 5.3 h", "machine",
+    batches, what="a body that the description lacks, which follows what is logged", kind_told=True,
+    editable=lambda cause: False,  # its node is written with those of all drivers
+)  # fmt: skip
