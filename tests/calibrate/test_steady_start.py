@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.calibrate.lumped_case import artefact, finer, truth
 
+from tests.calibrate.lumped_case import artefact, finer, truth
 from twin.build.simulate import simulate
 from twin.calibrate.fit.problem import problem
 from twin.errors import LogError
@@ -28,7 +28,7 @@ def test_full_model_and_runtime_start_alike(rested):
     model = finer().thermal
     drive = evaluate(model.load_model, rested.loads.time, signal_values(rested, model.load_model.signals), 60.0)
     none = np.zeros((0, len(model.pose_axes)))
-    full = simulate(finer(), drive, np.zeros(0), none, 20.0, rested=True)
+    full = simulate(finer(), drive, np.zeros(0), none, None)
     result = replay(artefact(), rested, 60.0)
     assert np.ptp(full.temperatures[0]) > 0.1  # coolant and air differ: no uniform start would do
     np.testing.assert_allclose(result.temperature[0], full.temperatures[0], atol=2e-3)
@@ -48,7 +48,7 @@ def test_calibration_starts_there_too(rested):
     art = artefact()
     made = problem(art, [rested], art.parameters)
     assert not made.starts  # the rest forgets where it began
-    temperature, tcp = made.outputs(np.zeros(len(made.scale)))[0]
+    temperature, _ = made.outputs(np.zeros(len(made.scale)))[0]
     m = made.runs[0].measured
     result = replay(art, rested, 60.0)
     of = [result.sensors.index(s) for s in m.sensors]

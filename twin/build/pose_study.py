@@ -20,8 +20,8 @@ from twin.logs.run import Run
 from twin.logs.signals import signal_values
 from twin.progress import Progress, silent
 from twin.rom.drive import evaluate, measured_air
-from twin.rom.rest import rest_before
 from twin.rom.poses import Kind, pose_weights
+from twin.rom.rest import rest_before
 
 KINDS: tuple[Kind, ...] = ("linear", "lagrange")
 

@@ -21,6 +21,7 @@ from twin.machine.description import Machine
 from twin.machine.load import load_machine
 from twin.progress import Progress, silent
 from twin.rom.drive import Drive, evaluate, measured_air
+from twin.rom.load_model import LoadModel
 from twin.rom.rest import rest_before
 
 
@@ -51,21 +52,20 @@ def simulate(
     drive: Drive,
     tcp_time: np.ndarray,
     tcp_positions: np.ndarray,
-    start: float,
+    start: float | None,
     substeps: int = 1,
     noise: Noise = Noise(),
     progress: Progress = silent,
-    rested: bool = False,
 ) -> Simulation:
     """Step the full model through `drive` and solve the thermo-elastic problem at the TCP rows.
 
     tcp_time (m,) s since the drive's start, tcp_positions (m, n_axes) m: a row is evaluated at the end of the step it
-    falls in. start: uniform initial temperature [degC]; rested: in equilibrium with the surroundings instead.
+    falls in. start: uniform initial temperature [degC], None: in equilibrium with the surroundings.
     """
     model = full.thermal
     stepper = CoupledStepper(model)
-    x = stepper.uniform(start)
-    if rested:
+    x = stepper.uniform(_air(model.load_model, drive) if start is None else start)
+    if start is None:
         for _, x, _ in stepper.run(rest_before(drive), x):  # noqa: B007, B020
             pass
     row_step = np.clip(np.searchsorted(drive.time, tcp_time, side="left") - 1, -1, drive.n_steps - 1)
@@ -113,7 +113,8 @@ def simulate_run(
 
     machine, run: or where they lie; a machine to be meshed otherwise comes from `remesh`. TCP rows lie at the times
     and positions of the run's tcp.csv, else every `tcp_every` [s] at the logged axis positions. The machine starts at
-    the run's initial temperature or in its steady state, else at that of the air around it. Where no temperature moves the tool, none.
+    the run's initial temperature or in its steady state, else at that of the air around it. Where no temperature moves
+    the tool, there are no rows.
     """
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     full = full_model(machine, progress)
@@ -130,9 +131,11 @@ def simulate_run(
         tcp_time, positions = _tcp_rows(full, run, drive, max(1, round(tcp_every / dt)))
     inside = tcp_time <= drive.time[-1]
     start = run.initial_temperature
-    if start is None:
-        start = float(measured_air(load, drive)[0, load.surroundings])
-    result = simulate(full, drive, tcp_time[inside], positions[inside], start, substeps, noise, progress, run.steady_start)
+    if start is None and not run.steady_start:
+        start = _air(load, drive)
+    result = simulate(
+        full, drive, tcp_time[inside], positions[inside], start, substeps, noise, progress, run.steady_start
+    )
     kept = run.loads.time <= drive.time[-1]
     loads = Table(run.loads.time[kept], {k: v[kept] for k, v in run.loads.columns.items()}, run.loads.units)
     temperatures = Table(
@@ -154,10 +157,15 @@ def simulate_run(
             *(("tcp",) if len(result.tcp_time) else ()),
             *(("loads",) if "loads" in run.synthetic else ()),
         ),
-        initial_temperature=None if run.steady_start else start,
+        initial_temperature=start,
         steady_start=run.steady_start,
     )
     return simulated, float(result.balance_error.max(initial=0.0))
+
+
+def _air(load: LoadModel, drive: Drive) -> float:
+    """degC around the machine in the first step."""
+    return float(measured_air(load, drive)[0, load.surroundings])
 
 
 def _tcp_rows(full: FullModel, run: Run, drive: Drive, every: int) -> tuple[np.ndarray, np.ndarray]:

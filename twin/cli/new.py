@@ -20,7 +20,9 @@ def _pairs(context: click.Context, option: click.Parameter, given: tuple[str, ..
 @click.argument("folder", type=click.Path())
 @click.option("--from-log", "logs", multiple=True, cls=Several, required=True, type=click.Path(),
               help="CSV or XLSX files, or run folders")  # fmt: skip
-@click.option("--sealed", multiple=True, cls=Several, type=click.Path(), help="logs that are scored and never fitted to")
+@click.option(
+    "--sealed", multiple=True, cls=Several, type=click.Path(), help="logs that are scored and never fitted to"
+)
 @click.option("--unit", "units", multiple=True, callback=_pairs, metavar="COLUMN=UNIT",
               help="unit that neither header nor guess tells; COLUMN= leaves it out; repeat")  # fmt: skip
 @click.option("--axis", "axes", multiple=True, callback=_pairs, metavar="dx=COLUMN",
@@ -31,8 +33,8 @@ def command(
     """Propose a machine in FOLDER that predicts the displacements of logs: a lumped network, its runs and a page.
 
     Columns are taken for what their headers say, else guessed by name and values, and shown. Each node follows a logged
-    temperature, or the heat of a logged speed or power, with one time constant; how far each moves the tool is fitted to
-    all logs. The page compares it with ridge regression on runs that neither has seen.
+    temperature, or the heat of a logged speed or power, with one time constant; how far each moves the tool is fitted
+    to all logs. The page compares it with ridge regression on runs that neither has seen.
     """
     from twin.errors import TwinError
     from twin.face.new import NewOptions, from_log

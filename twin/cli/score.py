@@ -28,9 +28,15 @@ def _names(ctx: click.Context, param: click.Parameter, value: str | None) -> tup
 @click.argument("artefact", type=click.Path())
 @click.argument("runs", nargs=-1, required=True, type=click.Path())
 @click.option(
-    "--sealed", multiple=True, cls=Several, type=click.Path(), help="runs kept back from every fit, scored by themselves"
+    "--sealed",
+    multiple=True,
+    cls=Several,
+    type=click.Path(),
+    help="runs kept back from every fit, scored by themselves",
 )
-@click.option("--train", multiple=True, cls=Several, type=click.Path(), help="runs that baselines learn from, not scored")
+@click.option(
+    "--train", multiple=True, cls=Several, type=click.Path(), help="runs that baselines learn from, not scored"
+)
 @click.option("--inputs", callback=_names,
               help="columns that learned baselines read, 't1,t5,spindle_speed'  [default: temperatures]")  # fmt: skip
 @click.option("--restart", is_flag=True, help="segments are tests of their own, each from its own initial state")

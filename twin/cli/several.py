@@ -1,7 +1,7 @@
 """An option that takes several values: `--sealed A B` means both, as `--sealed A --sealed B` does.
 
-Click gives B to the arguments of the command instead, where a sealed run would be fitted to without a word. What follows
-such an option up to the next one is its own, so the arguments of the command come before it.
+Click gives B to the arguments of the command instead, where a sealed run would be fitted to without a word. What
+follows such an option up to the next one is its own, so the arguments of the command come before it.
 """
 
 from __future__ import annotations

@@ -45,7 +45,9 @@ class New:
         if self.figures:
             parts.append(text_table(*figure_rows(self.figures)))
         machine = self.folder / "machine.toml"
-        parts.append(f"wrote {machine} and {self.folder / 'index.html'}; next: twin build {self.folder} -o {self.folder.name}.h5")
+        parts.append(
+            f"wrote {machine} and {self.folder / 'index.html'}; next: twin build {self.folder} -o {self.folder.name}.h5"
+        )
         return "\n\n".join(parts)
 
 
@@ -58,8 +60,8 @@ def from_log(
 ) -> New:
     """Propose a machine that predicts what a log measured, as a lumped network of what follows what (docs/members.md).
 
-    logs, sealed: CSV or XLSX files, or run folders; sealed ones are scored and never fitted to. output: a new folder with
-    machine.toml, runs/ and index.html.
+    logs, sealed: CSV or XLSX files, or run folders; sealed ones are scored and never fitted to. output: a new folder
+    with machine.toml, runs/ and index.html.
 
     Raises LogError for logs that cannot be understood, or hold no displacements or nothing to follow.
     """
@@ -75,7 +77,9 @@ def from_log(
     found = without_model(runs, progress)
     made = predictions(found, runs, kept)
     rows = figures(made)
-    result = New(target, tuple(columns.values()), (*told, *(line for line in also if _concerns(line, used))), found, made, rows)
+    result = New(
+        target, tuple(columns.values()), (*told, *(line for line in also if _concerns(line, used))), found, made, rows
+    )
     _write(result, runs, kept)
     return result
 

@@ -51,8 +51,8 @@ def signal_values(run: Run, signals: Sequence[SignalLike]) -> dict[str, np.ndarr
 def column_of(run: Run, signal: SignalLike) -> np.ndarray | None:
     """What a run logged of a signal (n,) at `run.loads.time`, as it stands there; None where it did not.
 
-    A temperature that is not in loads.csv is read from temperatures.csv, linearly between its rows; NaN before the first
-    and after the last of them.
+    A temperature that is not in loads.csv is read from temperatures.csv, linearly between its rows; NaN before the
+    first and after the last of them.
     """
     logged = run.loads.columns.get(signal.column)
     if logged is not None or not _measured_too(run, signal):

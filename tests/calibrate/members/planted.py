@@ -100,7 +100,7 @@ def artefact(folder: Path, text: str = TEXT) -> Artefact:
 
 def hidden(text: str = TEXT) -> str:
     """The real machine: other parameters within tolerance, and the column that stands at the wall."""
-    text = text.replace('"150 W"', '"165 W"').replace("natural = \"10 W", "natural = \"11 W", 1)
+    text = text.replace('"150 W"', '"165 W"').replace('natural = "10 W', 'natural = "11 W', 1)
     return text.rstrip() + "\n" + MOVES + HIDDEN
 
 
@@ -128,5 +128,8 @@ def measured(real: Machine, seed: int) -> Run:
     made, _ = simulate_run(real, base, noise=Noise(0.05, 0.3e-6, seed))
     first = made.tcp.displacement[0]
     return replace(
-        made, tcp=replace(made.tcp, displacement=made.tcp.displacement - first), tcp_reference="first", folder=base.folder
+        made,
+        tcp=replace(made.tcp, displacement=made.tcp.displacement - first),
+        tcp_reference="first",
+        folder=base.folder,
     )

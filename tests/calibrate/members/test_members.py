@@ -10,10 +10,10 @@ import pytest
 from tests.calibrate.members import planted
 from twin.calibrate.members import evidence
 from twin.calibrate.members.describe import Member, with_members
+from twin.calibrate.members.driver import Driver, drivers_of
 from twin.calibrate.members.evidence import Sums, explain, held_out, total, with_noise
 from twin.calibrate.members.find import beside_model
 from twin.calibrate.members.responses import Candidate, candidates, responses
-from twin.calibrate.members.driver import Driver, drivers_of
 from twin.errors import DescriptionError
 from twin.machine.edit import edited
 from twin.machine.extend import removed
@@ -109,10 +109,15 @@ def test_noise_is_found():
 
 def test_held_out_rows_are_not_seen():
     rng = np.random.default_rng(3)
-    parts = [Sums.of(rng.standard_normal((50, 2)), np.zeros((50, 2, 0)), rng.standard_normal((50, 5))) for _ in range(3)]
+    parts = [
+        Sums.of(rng.standard_normal((50, 2)), np.zeros((50, 2, 0)), rng.standard_normal((50, 5))) for _ in range(3)
+    ]
     noise = np.ones(2)
     one = explain(total(parts[1:]), range(5), 1.0, noise).left(parts[0])
     every = held_out(parts, range(5), 1.0, noise)
-    rest = [explain(total([p for j, p in enumerate(parts) if j != i]), range(5), 1.0, noise).left(parts[i]) for i in range(3)]
+    rest = [
+        explain(total([p for j, p in enumerate(parts) if j != i]), range(5), 1.0, noise).left(parts[i])
+        for i in range(3)
+    ]
     np.testing.assert_allclose(every, np.sqrt(np.mean(np.square(rest), axis=0)))
     assert (one > 0.0).all()

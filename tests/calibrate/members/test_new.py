@@ -110,7 +110,9 @@ def test_what_cannot_be_understood_is_one_error(text, arguments, said, tmp_path)
     path = tmp_path / "log.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(Exception) as caught:
-        CliRunner().invoke(cli, ["new", str(tmp_path / "o"), "--from-log", str(path), *arguments], catch_exceptions=False)
+        CliRunner().invoke(
+            cli, ["new", str(tmp_path / "o"), "--from-log", str(path), *arguments], catch_exceptions=False
+        )
     assert said in str(caught.value)
     assert not (tmp_path / "o").exists()
 

@@ -64,16 +64,23 @@ def with_members(text: str, members: Sequence[Member], scale: float, runs: Seque
         base = _free(names_of["nodes"], f"follows_{_bare(driver.column)}{shape}")
         names = [f"{base}_{short(m.candidate.lag)}" for m in own]
         tables += _bodies(base, driver, names, [m.candidate.lag for m in own], signal, runs, data)
-        rows |= {name: [f"{1e6 * v:.6g} um/K" for v in np.nan_to_num(m.expansion)] for name, m in zip(names, own, strict=True)}
+        rows |= {
+            name: [f"{1e6 * v:.6g} um/K" for v in np.nan_to_num(m.expansion)]
+            for name, m in zip(names, own, strict=True)
+        }
     measured = np.isfinite(np.array([m.expansion for m in members])).any(axis=0)
     known = {"fixed": False, "tolerance": f"{1e6 * scale:.4g} um/K"}
     tables.append(("parameters", {"path": "*.follows_*", "fixed": True}))
-    tables += [("parameters", {"path": f"tcp.expansion.follows_*.{'xyz'[a]}", **known}) for a in np.flatnonzero(measured)]
+    tables += [
+        ("parameters", {"path": f"tcp.expansion.follows_*.{'xyz'[a]}", **known}) for a in np.flatnonzero(measured)
+    ]
     if data.get("tcp", {}).get("expansion"):
         text = changed(text, {f"tcp.expansion.{name}": row for name, row in rows.items()}, mark)
     else:
         tables.append(("tcp.expansion", rows))
-    return appended(text, tables, f"missing members: bodies that follow {', '.join(dict.fromkeys(g.column for g in groups))}", mark)
+    return appended(
+        text, tables, f"missing members: bodies that follow {', '.join(dict.fromkeys(g.column for g in groups))}", mark
+    )
 
 
 def _bodies(
@@ -103,7 +110,11 @@ def _heat(driver: Driver, signal: str) -> dict[str, object]:
     if driver.unit == "W":
         return {"parameters": {"share": power / driver.largest}, "signals": {"power": signal}}
     factor, unit = _UNITS[driver.unit]
-    parameters = {"power": f"{power:g} W", "reference": f"{factor * driver.largest:.9g} {unit}", "exponent": driver.exponent}
+    parameters = {
+        "power": f"{power:g} W",
+        "reference": f"{factor * driver.largest:.9g} {unit}",
+        "exponent": driver.exponent,
+    }
     return {"parameters": parameters, "signals": {"speed": signal}}
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from twin.logs.run import Run
 
 RISE = 10.0  # K at the largest logged load: the unit of a heat, without influence on what is computed
-# Shapes of a loss by the load that is logged: friction at constant force, a bearing's lubricant (paper 002 eqs (4)-(6)),
+# Shapes of a loss by the load that is logged: friction at constant force, a bearing's lubricant (paper 002, 4-6),
 # viscous or eddy losses; 0.5 lies between a constant loss and one with the speed. Powers heat by a share of themselves.
 # A current is none: without a resistance no law makes heat of it, and its square goes with the torque's anyway.
 EXPONENTS = {"1/s": (0.5, 1.0, 5.0 / 3.0, 2.0), "m/s": (0.5, 1.0, 2.0), "W": (1.0,)}
@@ -42,11 +42,11 @@ class Driver:
 
     @property
     def words(self) -> str:
-        """"t4", "heat by spindle_speed^1.67"."""
+        """ "t4", "heat by spindle_speed^1.67"."""
         return self.column if self.is_temperature else f"heat by {self.column}^{self.exponent:.3g}"
 
     def values(self, run: Run) -> tuple[np.ndarray, np.ndarray]:
-        """Times [s] and what a member of no lag would show there [K]: rises over the first reading, or those by heat."""
+        """Times [s] and what a member of no lag would show there [K]: rises over the first reading, or by heat."""
         table = run.loads
         if self.column not in table.columns:
             assert run.temperatures is not None

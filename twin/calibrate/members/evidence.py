@@ -110,7 +110,9 @@ def with_noise(rows: Sums, chosen: Sequence[int], scale: float, noise: np.ndarra
     noise = np.maximum(noise, LEAST_NOISE)
     for _ in range(NOISE_ROUNDS):
         found = explain(rows, chosen, scale, noise)
-        free = np.array([max(rows.rows[a] - _determined(rows, chosen, scale, noise, a), 0.1 * rows.rows[a]) for a in range(m)])
+        free = np.array(
+            [max(rows.rows[a] - _determined(rows, chosen, scale, noise, a), 0.1 * rows.rows[a]) for a in range(m)]
+        )
         noise = np.maximum(np.sqrt(found.left(rows) ** 2 * rows.rows / np.maximum(free, 1e-30)), LEAST_NOISE)
     return explain(rows, chosen, scale, noise)
 

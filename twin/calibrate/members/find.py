@@ -42,9 +42,9 @@ class Found:
 
 
 def beside_model(artefact: Artefact, runs: Sequence[Run], progress: Progress = silent) -> Found:
-    """Members beside a model as it was delivered: temperatures stay, its expansions are fitted together with the members.
+    """Members beside a model as it was delivered: temperatures stay, expansions are fitted beside the members.
 
-    Displacements say little about temperatures, and a calibration drags capacities and losses after whatever is missing.
+    Displacements say little about temperatures, and a calibration drags capacities and losses after what is missing.
     Raises LogError for runs without displacements or without anything to follow.
     """
     made, rows = _rows_beside(artefact, runs)
@@ -84,7 +84,9 @@ def without_model(runs: Sequence[Run], progress: Progress = silent) -> Found:
     rows = []
     for run in runs:
         if run.tcp is None or not len(run.tcp.time):
-            raise LogError("no displacements", str(run.folder), "a network from a log needs tcp.csv: time and dx, dy or dz")
+            raise LogError(
+                "no displacements", str(run.folder), "a network from a log needs tcp.csv: time and dx, dy or dz"
+            )
         good = np.isfinite(run.tcp.displacement).any(axis=1)
         y = run.tcp.displacement[good] - run.tcp.displacement[good][0]
         rows.append(Rows(run.tcp.time[good], y, np.zeros((int(good.sum()), 3, 0))))
@@ -97,7 +99,9 @@ def _found(
 ) -> tuple[tuple[Member, ...], Selected, tuple[int, ...]]:
     tried = candidates(drivers_of(runs))
     if not tried:
-        raise LogError("nothing to follow", str(runs[0].folder), "log temperatures, speeds or powers beside the displacements")
+        raise LogError(
+            "nothing to follow", str(runs[0].folder), "log temperatures, speeds or powers beside the displacements"
+        )
     groups: dict[str, list[int]] = {}
     for k, candidate in enumerate(tried):
         groups.setdefault(candidate.driver.column, []).append(k)
@@ -112,10 +116,14 @@ def _found(
         F = responses(run, tried, r.time)
         part = np.minimum((parts * (r.time - r.time[0]) / max(np.ptp(r.time), 1e-9)).astype(int), parts - 1)
         stretches += [
-            Sums.of(r.y[part == k][:, axes], r.J[part == k][:, axes], F[part == k]) for k in range(parts) if (part == k).any()
+            Sums.of(r.y[part == k][:, axes], r.J[part == k][:, axes], F[part == k])
+            for k in range(parts)
+            if (part == k).any()
         ]
     if len(stretches) < 2:
-        raise LogError("too few displacements", str(runs[0].folder), f"give rows over some hours, {EVERY / 60:g} min apart")
+        raise LogError(
+            "too few displacements", str(runs[0].folder), f"give rows over some hours, {EVERY / 60:g} min apart"
+        )
     selected = select(stretches, groups, progress)
     members = []
     for at, k in enumerate(selected.explained.chosen):
@@ -134,5 +142,3 @@ def thinned(time: np.ndarray) -> np.ndarray:
 
 def _values(made: Problem, x: np.ndarray) -> dict[str, float]:
     return {p.path: p.value(float(c)) for p, c in zip(made.parameters, x, strict=True)}
-
-

@@ -26,7 +26,7 @@ class Candidate:
 
     @property
     def words(self) -> str:
-        """"follows t4 with 40 min"."""
+        """ "follows t4 with 40 min"."""
         return f"follows {self.driver.words} with {duration(self.lag)}"
 
 

@@ -2,7 +2,7 @@
 
 All members of all drivers are taken, with one small prior whose scale and noise the evidence chooses. Rejected, by runs
 that nothing was fitted to (docs/members.md): choosing single members by the error of left-out stretches, which overfits
-(of a hundred candidates a few agree with three stretches by chance, and the better the search, the worse they predicted),
+(of a hundred candidates a few agree with three stretches by chance: the better the search, the worse they predicted),
 and dropping drivers that the evidence does not ask for. A driver that tells nothing is shrunk to nothing.
 """
 
@@ -51,7 +51,7 @@ class Selected:
 
 
 def select(stretches: Sequence[Sums], groups: Mapping[str, Sequence[int]], progress: Progress = silent) -> Selected:
-    """stretches: what is left out together, two at least; groups: by the name of a driver the candidates of its lags."""
+    """stretches: what is left out together, two at least; groups: by driver the candidates of its lags."""
     rows, every = total(stretches), [c for group in groups.values() for c in group]
     best: Explained | None = None
     with progress("missing members", len(SCALES) + len(groups)) as advance:

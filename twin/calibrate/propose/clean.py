@@ -51,7 +51,9 @@ def _until(run: Run, end: float) -> Run:
         sigma = None if tcp.sigma is None else tcp.sigma[now]
         tcp = Tcp(tcp.time[now], tcp.axes, tcp.position[now], tcp.displacement[now], sigma, tcp.naive,
                   {k: v[now] for k, v in tcp.angle.items()})  # fmt: skip
-    return replace(run, loads=table(run.loads), temperatures=table(run.temperatures) if run.temperatures else None, tcp=tcp)
+    return replace(
+        run, loads=table(run.loads), temperatures=table(run.temperatures) if run.temperatures else None, tcp=tcp
+    )
 
 
 def _without(run: Run, names: Sequence[str] | dict[str, str]) -> Run:

@@ -57,11 +57,15 @@ def read_log(path: Path, told: Mapping[str, str] = {}, axes: Mapping[str, str] =
     absolute = _is_iso(lines, delimiter)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "log.csv"
-        file.write_text("\n".join([bare.replace("time [s]", "time") if absolute else bare, *lines[1:]]), encoding="utf-8")
+        file.write_text(
+            "\n".join([bare.replace("time [s]", "time") if absolute else bare, *lines[1:]]), encoding="utf-8"
+        )
         table = _read(file, path)
     columns = [_time(names[0], written[0], told, table, path)]
     values = {name: table.columns[f"c{k}"] for k, name in enumerate(names) if k}
-    columns += [_column(name, unit, told, axes, values[name]) for name, unit in zip(names[1:], written[1:], strict=True)]
+    columns += [
+        _column(name, unit, told, axes, values[name]) for name, unit in zip(names[1:], written[1:], strict=True)
+    ]
     columns = _spread(columns, axes)
     return _run(path, columns, table, values), tuple(columns)
 
@@ -72,7 +76,9 @@ def _read(file: Path, path: Path) -> CsvTable:
     try:
         return read_csv(file, UTC)
     except LogError as e:
-        raise LogError.collect([type(p)(p.what, p.where.replace(str(file), str(path)), p.remedy) for p in e.problems]) from e
+        raise LogError.collect(
+            [type(p)(p.what, p.where.replace(str(file), str(path)), p.remedy) for p in e.problems]
+        ) from e
 
 
 def _lines(path: Path) -> tuple[list[str], str]:
@@ -98,7 +104,7 @@ def _sheet(path: Path) -> list[str]:
     try:
         sheet = load_workbook(path, read_only=True, data_only=True).worksheets[0]
         rows = [["" if cell is None else str(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
-    except Exception as e:  # noqa: BLE001  openpyxl raises whatever zip and XML raise
+    except Exception as e:
         raise LogError(f"no workbook: {e}", str(path), "save the sheet as CSV") from e
     return [",".join(cell.replace(",", ".") for cell in row) for row in rows if any(row)]
 
@@ -132,7 +138,9 @@ def _time(name: str, written: str, told: Mapping[str, str], table: CsvTable, pat
     for unit in ("s", "min", "h", "ms", "d"):
         factor = parse_unit(unit).factor
         if LENGTH[0] <= span * factor <= LENGTH[1] and STEP[0] <= step * factor <= STEP[1]:
-            return Column(name, unit, "time", f"guessed: {span * factor / 3600.0:.3g} h, a row every {step * factor:.3g} s")
+            return Column(
+                name, unit, "time", f"guessed: {span * factor / 3600.0:.3g} h, a row every {step * factor:.3g} s"
+            )
     raise LogError(f"the unit of '{name}' is not told", str(path), f"give --unit '{name}=s', for example")
 
 
@@ -170,8 +178,11 @@ def _guessed(name: str, values: np.ndarray, axis: str | None) -> tuple[str, str]
     low, high = float(np.nanquantile(values, 0.02)), float(np.nanquantile(values, 0.98))
     if PLAUSIBLE[0] <= low and high <= PLAUSIBLE[1]:
         named = _TEMPERATURE.search(name)
-        if named or high - low < 60.0 and low > 5.0:
-            return "degC", "guessed by its name" if named else f"guessed: {low:.4g} .. {high:.4g} looks like a temperature"
+        if named or (high - low < 60.0 and low > 5.0):
+            return (
+                "degC",
+                "guessed by its name" if named else f"guessed: {low:.4g} .. {high:.4g} looks like a temperature",
+            )
     return "", f"nothing known: {low:.4g} .. {high:.4g}"
 
 
@@ -191,7 +202,9 @@ def _spread(columns: Sequence[Column], axes: Mapping[str, str]) -> list[Column]:
         axis = lettered.get(k) or (left[0] if left else "")
         lettered[k] = axis
         c = result[k]
-        result[k] = Column(c.name, c.unit, axis or "left out", c.how if axis else "a fourth displacement: choose by --axis")
+        result[k] = Column(
+            c.name, c.unit, axis or "left out", c.how if axis else "a fourth displacement: choose by --axis"
+        )
     return result
 
 

@@ -1,8 +1,8 @@
 """How well a proposed network predicts runs that it was not fitted to, beside ridge regression and beside nothing.
 
-Of the training runs each is predicted by a fit to the others, by the network and by the regression alike; sealed runs are
-predicted by the fit to all. The regression has the same temperatures as rises over their first readings, its strength by
-cross-validation over the runs (`twin.calibrate.score.regression`).
+Of the training runs each is predicted by a fit to the others, by the network and by the regression alike; sealed runs
+are predicted by the fit to all. The regression has the same temperatures as rises over their first readings, its
+strength by cross-validation over the runs (`twin.calibrate.score.regression`).
 """
 
 from __future__ import annotations
@@ -78,7 +78,9 @@ def predictions(found: Found, runs: Sequence[Run], sealed: Sequence[Run]) -> tup
     for run in sealed:
         missing = [d.column for d in dict.fromkeys(c.driver for c in tried) if not _has(run, d.column)]
         if missing:
-            raise LogError(f"no column {', '.join(missing)}", str(run.folder), "the network follows it: give a log that has it")
+            raise LogError(
+                f"no column {', '.join(missing)}", str(run.folder), "the network follows it: give a log that has it"
+            )
         rows = _rows(run, tried, found.axes)
         made += _predicted(run, "sealed", found.axes, rows, e.a, _ridge(fitted, rises, _rises(run, names, rows[2])))
     return tuple(made)
@@ -100,7 +102,9 @@ def figures(made: Sequence[Predicted]) -> tuple[Figure, ...]:
 
 def follows(runs: Sequence[Run], tried: Sequence[Candidate]) -> tuple[Follows, ...]:
     """For every temperature the one body of one lag, of all that do not follow itself, whose rise resembles it most."""
-    times = [run.loads.time[:: max(1, round(600.0 / max(float(np.median(np.diff(run.loads.time))), 1e-9)))] for run in runs]
+    times = [
+        run.loads.time[:: max(1, round(600.0 / max(float(np.median(np.diff(run.loads.time))), 1e-9)))] for run in runs
+    ]
     F = np.vstack([responses(run, tried, t) for run, t in zip(runs, times, strict=True)])
     result = []
     for name in [d.column for d in drivers_of(runs) if d.is_temperature]:
@@ -164,5 +168,6 @@ def _predicted(
 ) -> list[Predicted]:
     y, F, time = rows
     return [
-        Predicted(run.folder.name, part, AXES[axis], time, y[:, k], F @ a[k], ridge[:, k]) for k, axis in enumerate(axes)
+        Predicted(run.folder.name, part, AXES[axis], time, y[:, k], F @ a[k], ridge[:, k])
+        for k, axis in enumerate(axes)
     ]

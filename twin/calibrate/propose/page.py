@@ -53,14 +53,16 @@ def sentence(found: Found, rows: Sequence[Figure]) -> str:
     """What one has to know."""
     e = found.selected.explained
     n = len({m.candidate.driver.column for m in found.members})
-    text = f"{len(found.members)} nodes that follow {n} logged columns; expansions within {1e6 * e.scale:.2g} um/K (one sigma), "
+    text = f"{len(found.members)} nodes that follow {n} logged columns; expansions within {1e6 * e.scale:.2g} um/K "
     noise = ", ".join(f"{AXES[a]} {1e6 * s:.2g} um" for a, s in zip(found.axes, e.noise, strict=True))
-    return text + f"what is left counts as noise of {noise}. " + " ".join(_verdict(f) for f in rows)
+    return text + f"(one sigma), what is left counts as noise of {noise}. " + " ".join(_verdict(f) for f in rows)
 
 
 def _verdict(f: Figure) -> str:
     d = f.difference
-    sure = "" if d.low is None or d.high is None else f" (difference {1e6 * d.low:+.1f} to {1e6 * d.high:+.1f} um, 95 %)"
+    sure = (
+        "" if d.low is None or d.high is None else f" (difference {1e6 * d.low:+.1f} to {1e6 * d.high:+.1f} um, 95 %)"
+    )
     return f"{f.axis} of runs {f.part}: {1e6 * f.network:.1f} um rms, ridge regression {1e6 * f.ridge:.1f}{sure}."
 
 
@@ -76,7 +78,11 @@ def figure_rows(rows: Sequence[Figure]) -> tuple[list[str], list[list[str]]]:
 
 
 def driver_rows(found: Found) -> tuple[list[str], list[list[str]]]:
-    header = ["column", "moves " + ", ".join(AXES[a] for a in found.axes) + " [um rms]", "asked for by the data (ln evidence)"]
+    header = [
+        "column",
+        "moves " + ", ".join(AXES[a] for a in found.axes) + " [um rms]",
+        "asked for by the data (ln evidence)",
+    ]
     header.append("residual of stretches left out, with those above [um rms]")
     cells = []
     for j in found.selected.joined:
@@ -120,7 +126,8 @@ def _picture(made: Sequence[Predicted]) -> str:
         figure.savefig(data, format="png", dpi=110)
     coded = base64.b64encode(data.getvalue()).decode("ascii")
     caption = "Every run as predicted by a fit that did not see it."
-    return f'<figure><img alt="measured and predicted" src="data:image/png;base64,{coded}"><figcaption>{caption}</figcaption></figure>'
+    image = f'<img alt="measured and predicted" src="data:image/png;base64,{coded}">'
+    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

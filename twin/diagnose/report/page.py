@@ -66,7 +66,7 @@ _FOLLOWS = {
     "out_of_tolerance": "The structure of the model holds; the declared values do not, or an effect hides in them.",
     "sensor": "The model of the machine is left as it is; correct the channel, or leave it out, before you calibrate.",
     "signal": "The laws of the machine are left as they are; correct what is logged or how it is declared.",
-    "too_poor": "No cause is named: with such a model many would fit. Add what is said to help first, and diagnose again.",
+    "too_poor": "No cause is named: with such a model many would fit. Add what would help first, and diagnose again.",
     "nothing": "The model of the machine is left as it is. An effect below the following sizes could still be there.",
 }
 

@@ -14,7 +14,6 @@ from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.accepted import in_place, stepped, with_shifts
 from twin.diagnose.search.look import Search
 
-
 AXES = ("dx", "dy", "dz")
 
 

@@ -45,7 +45,7 @@ def missing_members(
     artefact: Artefact, found: Search, plans: Sequence[Measured], runs: Sequence[Run], sealed: Sequence[Run], seed: int,
     progress: Progress = silent,
 ) -> Missing | None:  # fmt: skip
-    """None where there are no displacements, or no member earns its place. plans: what was measured, sealed runs last."""
+    """None where there are no displacements, or no member earns its place. plans: measurements, of sealed runs last."""
     if sum(len(m.tcp) for m in plans[: len(runs)]) < FEWEST:
         return None
     try:

@@ -35,7 +35,9 @@ class SearchPolicy:
         5.0, JUDGED, "of the rms left at half of the sensors, above which no cause is named", "sigma of a reading"
     )
     halves: float = _rule(
-        0.5, JUDGED, "of what the recalibrated model leaves of displacements: missing members, of many numbers, leave less"
+        0.5,
+        JUDGED,
+        "of what the recalibrated model leaves of displacements: missing members, of many numbers, leave less",
     )
     predicts: float = _rule(
         0.7, JUDGED, "of what the model alone leaves of stretches left out: missing members leave less of them"

@@ -76,7 +76,11 @@ def _piece(
     for k, (error, m) in enumerate(zip(errors, plans, strict=False)):
         hours = ((m.bin_time - m.bin_time[0]) // 3600.0).astype(int) if len(m.bin_time) else np.zeros(0, dtype=int)
         for h in np.unique(hours):
-            square = float(np.nanmean(error[hours == h, column] ** 2)) if np.isfinite(error[hours == h, column]).any() else 0.0
+            square = (
+                float(np.nanmean(error[hours == h, column] ** 2))
+                if np.isfinite(error[hours == h, column]).any()
+                else 0.0
+            )
             if square > worst:
                 worst, at, hour = square, k, float(h)
     tried = [c for c in candidates(drivers_of(runs)) if c.driver.column != sensor]
