@@ -35,7 +35,7 @@ _BLOCK = re.compile(rf"\r?\n# --- ({'|'.join(BY.values())}) ---\r?\n.*?# --- end
 
 
 def appended(text: str, tables: Sequence[tuple[str, Mapping[str, object]]], comment: str, mark: str = "found") -> str:
-    """The text with new tables at its end: ("sources.found_1", {"law": "constant_heat", ...}), or ("parameters", a rule).
+    """The text with new tables at its end: ("sources.found_1", {"law": "constant_heat", ...}), ("parameters", {...}).
 
     comment: one line above them. mark: a key of `BY`; what one program adds in several calls lies in one block. Values
     are strings, numbers, booleans, sequences or mappings of them.

@@ -236,6 +236,7 @@ class Family:
     times: str = ""  # what a size without a unit multiplies
     declared: bool = False  # always, it is a declared number out of its tolerance
     channel: bool = False  # it is said as "sensor x_nut is at fault"
+    weighed: bool = False  # its statistic is twice the gain of ln evidence, free numbers integrated out
     kind_told: bool = False  # its history says what kind it is, before its size
     said: Callable[[Cause], list[str]] = nothing_more  # what its size holds for, in words
     edit: Callable[[Cause, Study], Effect] = as_found  # how the description says it

@@ -240,6 +240,10 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
             "broken": f"Its reading is noise, or at a limit, from {number(at / 3600.0)} h on",
         }[c.history]
         return f"{what}; no statistic is needed to see that."
+    entry = family_of(c.family)
+    if entry and entry.weighed:
+        gain, strong = number(c.statistic / 2.0), number(c.threshold / 2.0)
+        return f"With it, and those before it, the logarithm of the evidence is {gain} larger; {strong} is strong."
     if c.threshold == d.thresholds.get(c.family, c.threshold):
         return evidence_sentence(d, c.family, c.statistic, c.threshold)
     # a declared number: both are squares, of its distance from the declared one
