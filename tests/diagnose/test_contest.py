@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,9 +26,12 @@ from twin.diagnose.search.contest import (
     tried,
     worth,
 )
+from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.verdict import cause_of
 
 pytestmark = pytest.mark.long
+
+SEARCHED = SimpleNamespace(policy=POLICY)  # all that comparing names needs of a detector
 
 
 def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
@@ -169,17 +173,17 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
     monkeypatch.setattr(contest, "exact", exact)
     nothing = np.zeros(0)
     far = replace(wetted, statistic=0.2 * behind.statistic)
-    order = tried(None, nothing, None, [(heat,), (behind,), (wetted, cold), (far,)])
+    order = tried(SEARCHED, nothing, None, [(heat,), (behind,), (wetted, cold), (far,)])
     assert order.pop() == (far,)
     assert [starts[0].statistic for starts in order] == [1100.0, 950.0, 850.0]
     assert order[0][0].amplitude == cold.amplitude
     assert len(passes) == 2
     assert passes[0] == passes[1] > 0  # some, not as many as a refit needs
     heat = replace(heat, statistic=2000.0)
-    order = tried(None, nothing, None, [(behind,), (heat,), (wetted, cold)])
+    order = tried(SEARCHED, nothing, None, [(behind,), (heat,), (wetted, cold)])
     assert order == [(heat,), (behind,), (wetted, cold)]  # as they were
     assert len(passes) == 2
-    assert tried(None, nothing, None, []) == []
+    assert tried(SEARCHED, nothing, None, []) == []
 
 
 def test_a_capacity_further_behind_is_refitted(monkeypatch):
@@ -193,7 +197,7 @@ def test_a_capacity_further_behind_is_refitted(monkeypatch):
     heat, tank, film = kind("moved", 328.0), kind("capacity", 250.0), kind("film", 250.0)
     monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: replace(h, statistic=h.statistic + 1.0))
     nothing = np.zeros(0)
-    proved, others = judged(None, nothing, None, [(heat,), (tank,), (film,)])
+    proved, others = judged(SEARCHED, nothing, None, [(heat,), (tank,), (film,)])
     assert [h.batch.kind for h in proved] == ["moved", "capacity"]
     assert others == [film]
 
@@ -205,10 +209,10 @@ def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
     lead, near, far = (replace(bent, statistic=s) for s in (1000.0, 950.0, 600.0))
     nothing = np.zeros(0)
     monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: replace(h, statistic=1.2 * h.statistic))
-    proved, others = judged(None, nothing, None, [(lead,), (near,), (far,)])
+    proved, others = judged(SEARCHED, nothing, None, [(lead,), (near,), (far,)])
     assert ([h.statistic for h in proved], others) == ([1200.0, 1140.0], [far])
     monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: replace(h, statistic=5.0 * h.statistic))
-    proved, others = judged(None, nothing, None, [(lead,), (near,), (far,)])
+    proved, others = judged(SEARCHED, nothing, None, [(lead,), (near,), (far,)])
     assert ([h.statistic for h in proved], others) == ([5000.0], [near, far])
 
 
@@ -218,7 +222,7 @@ def test_candidates_of_one_kind_do_not_keep_others_out(monkeypatch):
     many = [replace(bent, statistic=100.0 - 0.1 * k) for k in range(40)]
     film = replace(bent, batch=replace(bent.batch, kind="film"), statistic=93.0)
     monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: h)
-    proved, others = judged(None, np.zeros(0), None, [(h,) for h in (*many, film)])
+    proved, others = judged(SEARCHED, np.zeros(0), None, [(h,) for h in (*many, film)])
     assert 2 <= len(proved) <= 20
     few = len(proved) - 1
     assert proved == [*many[:few], film]
@@ -245,10 +249,10 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
     monkeypatch.setattr(contest, "exact", exact)
     monkeypatch.setattr(contest, "_bent", lambda detector, h: h.batch.kind == "moved")
     nothing = np.zeros(0)
-    order = contest._fair(None, nothing, None, [far, bent, straight])
+    order = contest._fair(SEARCHED, nothing, None, [far, bent, straight])
     assert [h.statistic for h in order] == [97.0, 95.0, 50.0]
     assert refitted == [straight]
-    assert contest._fair(None, nothing, None, [straight, far]) == [straight, far]  # nothing near it was refitted
+    assert contest._fair(SEARCHED, nothing, None, [straight, far]) == [straight, far]  # nothing near it was refitted
     assert refitted == [straight]
 
 

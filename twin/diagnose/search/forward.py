@@ -7,12 +7,14 @@ too small to name or negative, is dropped and not looked at again.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.consistency import differs
 from twin.diagnose.evidence.fitter import Fitted
+from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
@@ -31,50 +33,40 @@ from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.strained import closed, loose_ones, strained
 
 
-def search(detector: Detector, y: np.ndarray) -> Search:
+@dataclass(frozen=True)
+class _Start:
+    """What is known before anything is named."""
+
+    detector: Detector  # with the model discrepancy of what gets hotter than described
+    fitted: Fitted
+    x0: np.ndarray  # (n,) settled without a cause
+    covariance: np.ndarray  # (n, n) of it
+    declared: list[Hypothesis]
+    glance: tuple[Sight, list[Hypothesis], Step]
+    loose: tuple[Loose, ...]
+    relaxed: tuple[Fitted, Accepted] | None
+
+
+def search(described: Detector, y: np.ndarray) -> Search:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
-    fitted, policy = detector.fitter(y), detector.policy
-    described = detector
-    if (detector := hotter(described, fitted.x)) is not described:
-        fitted = detector.fitter(y)
-    x0, covariance = settled(detector, y, ())
-    declared = declared_candidates(detector, y, fitted)
-    known = scored(detector, fitted)
-    glance = look(detector, fitted, declared, known)
-    loose = loose_ones(detector, y, fitted.x, x0)
-    relaxed = strained(detector, y, fitted, loose, glance)
-    alarm = any(h.statistic > detector.thresholds[h.family] for h in glance[1])
-    if alarm or loose:  # without, no cause is named
-        exact = {
-            h.name: h for h in [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
-        }
-        declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
-        glance = look(detector, fitted, declared, known)
-    if relaxed and (ended := closed(detector, y, fitted, declared, glance, relaxed, x0, loose)):
+    start = _start(described, y)
+    detector, policy, fitted, x = start.detector, start.detector.policy, start.fitted, start.x0
+    covariance, loose = start.covariance, start.loose
+    if start.relaxed and (
+        ended := closed(detector, y, fitted, start.declared, start.glance, start.relaxed, x, loose)
+    ):  # fmt: skip
         return ended
     accepted, steps = list[Accepted](), list[Step]()
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
-        seen, ranked, step = look(detector, fitted) if accepted or refused else glance
+        seen, ranked, step = look(detector, fitted) if accepted or refused else start.glance
         if restless := _restless(detector, accepted, step.parts):
             imitated = True
             fitted, accepted = _without(detector, y, fitted, accepted, restless)
             seen, ranked, step = look(detector, fitted)
         steps.append(step)
-        parts = step.parts
-        used = sum((len(a.units) for a in accepted), 0)
-        misfits = policy.misfit * max((a.statistic for a in accepted if a.units), default=0.0)
-        limits = {
-            name: max((policy.later if accepted else 1.0) * value, misfits)
-            for name, value in detector.thresholds.items()
-        }
-        alarm = any(h.statistic > limits[h.family] and (h.family, h.name) not in refused for h in ranked)
-        passing = [
-            h for h in ranked
-            if alarm and h.statistic > policy.named * limits[h.family] and used + h.batch.q <= K
-            and (h.family, h.name) not in refused and not _again(h, accepted)
-            and not _reads(detector.study, h, accepted)
-        ]  # fmt: skip
+        limits = _limits(detector, accepted)
+        passing = _passing(detector, ranked, accepted, refused, limits)
         if not passing or len(accepted) >= policy.causes or fruitless >= policy.tries or imitated:
             break
         ahead = [_starts(seen, h, policy) for h in passing[: policy.ahead]]
@@ -85,25 +77,10 @@ def search(detector: Detector, y: np.ndarray) -> Search:
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
             continue
-        # heat of any history pays for its freedom: a name that explains less than that has imitated it
-        free = max(parts.values(), default=0.0)
-        if free > detector.thresholds["unknown"]:
-            standing = [
-                h for h in standing
-                if (h.statistic > policy.covers * free or fault_of(h).several)
-                and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
-            ]  # fmt: skip
-            if not standing:
-                break
-        chosen = standing[0]
-        rivals = _rivals(detector, fitted, chosen, [*standing, *others, *ranked])
-        start = np.array(chosen.amplitude)
-        units = units_of(detector.study, chosen)
-        accepted.append(
-            Accepted(
-                chosen, units, start, np.eye(len(start)), chosen.statistic, detector.thresholds[chosen.family], rivals
-            )
-        )
+        standing = _covering(detector, standing, step.parts)
+        if not standing:
+            break
+        accepted.append(_chosen(detector, fitted, standing[0], [*standing, *others, *ranked]))
         fitted, accepted = refit(detector, y, beginning(fitted.x, policy), accepted)
         while weak := [a for a in accepted if not _stands(detector, a)]:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
@@ -111,19 +88,79 @@ def search(detector: Detector, y: np.ndarray) -> Search:
         if in_turn := _in_turn(detector.study, accepted):
             imitated = True
             fitted, accepted = _without(detector, y, fitted, accepted, in_turn)
-    if not imitated and (leaking := _leaking(detector, accepted, steps[-1].parts)):
-        fitted, accepted = _without(detector, y, fitted, accepted, leaking)
-        seen, _, step = look(detector, fitted)
-        steps.append(step)
-    if uneven := [a for a in accepted if _of_machine(a) and differs(a.by_run, fault_of(a.hypothesis).own)]:
-        fitted, accepted = _without(detector, y, fitted, accepted, uneven)
-        seen, _, step = look(detector, fitted)
-        steps.append(step)
+    for untenable in (_uneven,) if imitated else (_leaking, _uneven):
+        if dropped := untenable(detector, accepted, steps[-1].parts):
+            fitted, accepted = _without(detector, y, fitted, accepted, dropped)
+            seen, _, step = look(detector, fitted)
+            steps.append(step)
     if accepted:  # which may have been all that made it seem hotter
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
-    else:
-        x = x0
-    return Search(detector, x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance, loose)
+    return Search(
+        detector, start.x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance, loose
+    )  # fmt: skip
+
+
+def _start(described: Detector, y: np.ndarray) -> _Start:
+    fitted = described.fitter(y)
+    if (detector := hotter(described, fitted.x)) is not described:
+        fitted = detector.fitter(y)
+    x0, covariance = settled(detector, y, ())
+    declared = declared_candidates(detector, y, fitted)
+    known = scored(detector, fitted)
+    glance = look(detector, fitted, declared, known)
+    loose = loose_ones(detector, y, fitted.x, x0)
+    relaxed = strained(detector, y, fitted, loose, glance)
+    if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
+        exact = {
+            h.name: h for h in [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
+        }
+        declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
+        glance = look(detector, fitted, declared, known)
+    return _Start(detector, fitted, x0, covariance, declared, glance, loose, relaxed)
+
+
+def _limits(detector: Detector, accepted: Sequence[Accepted]) -> dict[str, float]:
+    """Per family the statistic that a name needs beside the accepted ones, whose misfits look like causes."""
+    policy = detector.policy
+    misfits = policy.misfit * max((a.statistic for a in accepted if a.units), default=0.0)
+    return {
+        name: max((policy.later if accepted else 1.0) * value, misfits) for name, value in detector.thresholds.items()
+    }
+
+
+def _passing(
+    detector: Detector, ranked: Sequence[Hypothesis], accepted: Sequence[Accepted], refused: set[tuple[str, str]],
+    limits: dict[str, float],
+) -> list[Hypothesis]:  # fmt: skip
+    """Hypotheses that may be named next; none where nothing passes its threshold."""
+    left = [h for h in ranked if (h.family, h.name) not in refused]
+    if not any(h.statistic > limits[h.family] for h in left):
+        return []
+    used = sum(len(a.units) for a in accepted)
+    return [
+        h for h in left
+        if h.statistic > detector.policy.named * limits[h.family] and used + h.batch.q <= K
+        and not _again(h, accepted) and not _reads(detector.study, h, accepted)
+    ]  # fmt: skip
+
+
+def _covering(detector: Detector, standing: Sequence[Hypothesis], parts: dict[str, float]) -> list[Hypothesis]:
+    """Those that explain what heat of any history would, which pays for its freedom: less has imitated it."""
+    free, policy = max(parts.values(), default=0.0), detector.policy
+    return [
+        h for h in standing
+        if free <= detector.thresholds["unknown"] or (
+            (h.statistic > policy.covers * free or fault_of(h).several)
+            and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
+        )
+    ]  # fmt: skip
+
+
+def _chosen(detector: Detector, fitted: Fitted, h: Hypothesis, ranked: Sequence[Hypothesis]) -> Accepted:
+    """A hypothesis as a cause, before it is refitted beside the others; ranked: among which its rivals are."""
+    a, units = np.array(h.amplitude), units_of(detector.study, h)
+    rivals = _rivals(detector, fitted, h, ranked)
+    return Accepted(h, units, a, np.eye(len(a)), h.statistic, detector.thresholds[h.family], rivals)
 
 
 def _without(
@@ -191,9 +228,10 @@ def _leaking(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, 
     ]  # fmt: skip
 
 
-def _of_machine(a: Accepted) -> bool:
-    """Whether a cause is a property of the machine: what acts on readings may be set up anew for every run."""
-    return bool(a.units) or fault_of(a.hypothesis).parameter
+def _uneven(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
+    """Causes in the machine of another size in every run: what acts on readings may be set up anew for each."""
+    faults = [fault_of(a.hypothesis) for a in accepted]
+    return [a for a, f in zip(accepted, faults, strict=True) if (a.units or f.parameter) and differs(a.by_run, f.own)]
 
 
 def _misfit(a: Accepted) -> float:
