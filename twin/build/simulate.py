@@ -133,9 +133,7 @@ def simulate_run(
     start = run.initial_temperature
     if start is None and not run.steady_start:
         start = _air(load, drive)
-    result = simulate(
-        full, drive, tcp_time[inside], positions[inside], start, substeps, noise, progress, run.steady_start
-    )
+    result = simulate(full, drive, tcp_time[inside], positions[inside], start, substeps, noise, progress)
     kept = run.loads.time <= drive.time[-1]
     loads = Table(run.loads.time[kept], {k: v[kept] for k, v in run.loads.columns.items()}, run.loads.units)
     temperatures = Table(

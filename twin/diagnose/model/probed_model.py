@@ -51,6 +51,7 @@ class ProbedRun:
     start: float  # degC
     stated_start: bool
     loads: NestedLoads
+    rested: bool = False  # it starts in equilibrium with its surroundings, `start` being those of the machine
 
 
 @dataclass(frozen=True)
@@ -173,8 +174,8 @@ def _assembled(
     made = []
     for run, name, drive, start in zip(runs, names, drives, starts, strict=True):
         made.append(
-            ProbedRun(name, drive, _means(base, run, drive), start, run.initial_temperature is not None,
-                     loads_for(base, drive))
+            ProbedRun(name, drive, _means(base, run, drive), start,
+                      run.steady_start or run.initial_temperature is not None, loads_for(base, drive), run.steady_start)
         )  # fmt: skip
     return ProbedModel(
         base, prepared.layout, prepared.system, ContactPlaces.of(load), tuple(parameters), rich.places,

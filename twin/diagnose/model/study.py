@@ -15,6 +15,7 @@ from twin.diagnose.model.integration import INNER, by_amplitudes, jacobian, outp
 from twin.diagnose.model.probed_model import ProbedModel, ProbedRun
 from twin.diagnose.model.slots import Slots, first_slots, no_slots
 from twin.errors import TwinError
+from twin.run.replay import at_rest
 
 K = 4  # amplitudes that may be active at once
 
@@ -145,6 +146,8 @@ def make_study(probed: ProbedModel, measured: Sequence[Measured], fitted: Sequen
         members = np.asarray(effects.G).reshape(-1, n_poses, 3, body.n)
         rows = Rows(m.tcp_step, m.tcp_share, np.tensordot(m.pose, G, 1), np.einsum("kp,epcr->ekcr", m.pose, members))
         z0 = (run.start - probed.base.reference_temperature) * body.one
+        if run.rested:
+            z0 = at_rest(probed.base, run.drive, run.start)
         planned.append(Planned(run, m, rows, z0))
     return Study(probed, effects, tuple(planned), tuple(fitted))
 
