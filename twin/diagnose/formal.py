@@ -17,6 +17,8 @@ from twin.diagnose.whiten import Whitener
 
 CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
 READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
+LITTLE = 0.5  # K, of a surface above the air: convection of the room's own draught is left below it
+FREE = 25.0  # W/(m^2 K), the most that free convection in a gas is (Incropera, DeWitt, 6th ed. 2007, table 1.1)
 LEAST = 0.7  # standard deviations over all its rows that a direction of a channel's readings must have
 
 
@@ -59,6 +61,7 @@ def known_forms(
     for environment in load.environments:
         for c in elements.block_of.get(("air", environment.name), ()):
             columns.append(form.air * raw[:, c].astype(float))
+    columns += _steeper(study, elements, nominal, raw, form)
     (body,) = probed.base.bodies
     first = {k: sum(study.runs[i].size for i in study.fitted if i < k) for k in study.fitted}
     for s in range(len(probed.base.sensors)):
@@ -76,6 +79,31 @@ def known_forms(
     parts = [whiten(np.hstack([np.stack(columns, axis=1), wind]))] if columns else []
     parts += _wobbles(study, elements, raw, whiten, form)
     return np.hstack([*parts, *_readings(study, J, whiten, form)]) if parts else np.zeros((len(J), 0))
+
+
+def _steeper(
+    study: Study, elements: Elements, nominal: tuple[Nominal, ...], raw: np.ndarray, form: Form
+) -> list[np.ndarray]:
+    """Per film (m,) outputs of another exponent of the rise of its surface above the air: form.steep (ln rise - mean).
+
+    A coefficient that is too large for free convection has it in the share that free convection may be.
+    """
+    load = study.probed.base.load_model
+    (body,) = study.probed.base.bodies
+    M = np.asarray(study.probed.system.M)[:, : len(load.films)]
+    blocks = elements.histories.blocks
+    wide = np.array([b - a for _, a, b in blocks], dtype=float)
+    result = []
+    for f, film in enumerate(load.films):
+        own, area = elements.block_of.get(("group", film.name)), float(M[:, f] @ body.one)
+        if own is None or not area > 0.0:
+            continue
+        rise = {k: np.abs(nominal[k].middle @ M[:, f] / area - nominal[k].outer[:, f]) for k in study.fitted}
+        told = np.array([np.log(np.maximum(rise[i][a:b], LITTLE)).mean() for i, a, b in blocks])
+        most = max(float(nominal[k].convection[:, f].mean()) for k in study.fitted)
+        size = form.steep * min(1.0, FREE / max(most, 1e-30))
+        result.append(size * (raw[:, own].astype(float) @ (told - wide @ told / wide.sum())))
+    return result
 
 
 def _wobbles(study: Study, elements: Elements, raw: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
