@@ -57,17 +57,17 @@ def trials(drawn: DrawnMachine, machine: Machine, power: float) -> list[tuple[st
     rng = np.random.default_rng([drawn.seed, 77])
     sizes = IN_MACHINE | IN_LOG | {"heat_source": f"{max(SHARE * power, 5.0):.3g} W"}
     found = []
-    for family, places in _places(machine).items():
-        if places:
-            place, size = places[int(rng.integers(len(places)))], sizes[family]
+    for family, known in places(machine).items():
+        if known:
+            place, size = known[int(rng.integers(len(known)))], sizes[family]
             if family == "swapped":
-                others = [s for s in places if s != place]
+                others = [s for s in known if s != place]
                 size = others[int(rng.integers(len(others)))]
             found.append((family, place, size))
     return found
 
 
-def _places(machine: Machine) -> dict[str, list[str]]:
+def places(machine: Machine) -> dict[str, list[str]]:
     """Where each family or kind may be hidden."""
     sensors = [f"sensors.{n}" for n, s in machine.sensors.items() if s.environment is None]
     surfaces = [s for f in machine.films.values() for s in f.surfaces if not s.endswith("*")]
@@ -122,21 +122,25 @@ def _simulate(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachin
 
 def main(first: int, count: int, kind: str = "") -> None:
     OUT.mkdir(parents=True, exist_ok=True)
-    answers: dict[tuple[str, bool], Counter[str]] = {}
+    rows: list[Row] = []
     for seed in range(first, first + count):
         path = OUT / f"{kind or 'any'}_{seed}.jsonl"
         if not path.exists():
             with tempfile.TemporaryDirectory() as folder:
-                rows = judged(draw_machine(seed, kind or None), Path(folder))  # type: ignore[arg-type]
-            path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
-        for line in path.read_text(encoding="utf-8").splitlines():
-            row = json.loads(line)
-            visible = any(m >= least for m, least in zip(row.get("moved", VISIBLE), VISIBLE, strict=True))
-            for only in (False, True) if visible else (False,):
-                answers.setdefault((row["hidden"][0], only), Counter())[answer(row)] += 1
-            print(
-                seed, row["hidden"], answer(row), row["verdict"], row["causes"], f"{row['seconds']:.0f} s", flush=True
-            )
+                made = judged(draw_machine(seed, kind or None), Path(folder))  # type: ignore[arg-type]
+            path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
+        rows += [json.loads(line) | {"seed": seed} for line in path.read_text(encoding="utf-8").splitlines()]
+    counted(rows)
+
+
+def counted(rows: Sequence[Row]) -> None:
+    """Print the answers one by one, and how many there are of each."""
+    answers: dict[tuple[str, bool], Counter[str]] = {}
+    for row in rows:
+        visible = any(m >= least for m, least in zip(row.get("moved", VISIBLE), VISIBLE, strict=True))
+        for only in (False, True) if visible else (False,):
+            answers.setdefault((row["hidden"][0], only), Counter())[answer(row)] += 1
+        print(row["seed"], row["hidden"], answer(row), row["verdict"], row["causes"], f"{row['seconds']:.0f} s")
     for only in (False, True):
         print("of those that are visible" if only else "of all")
         for (hidden, seen), of_kind in answers.items():
@@ -171,13 +175,13 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
     healthy = [read_run(p) for p in measured_runs[0][1]]
     rows = []
     for hidden, paths in measured_runs:
-        said = [read_run(p) for p in paths]
-        moved = _moved(said, healthy) if hidden[0] in IN_MACHINE else (np.inf, np.inf)
-        rows.append(_said(detector, hidden, said) | {"moved": moved})
+        own = [read_run(p) for p in paths]
+        by = moved(own, healthy) if hidden[0] in IN_MACHINE else (np.inf, np.inf)
+        rows.append(said(detector, hidden, own) | {"moved": by})
     return rows
 
 
-def _moved(runs: Sequence[Run], healthy: Sequence[Run]) -> tuple[float, float]:
+def moved(runs: Sequence[Run], healthy: Sequence[Run]) -> tuple[float, float]:
     """K and m by which a fault moves the sensor, and the TCP, that it moves most: means of an hour, or of three rows.
 
     Of the same real machine without it; the noise of both is in it.
@@ -219,7 +223,7 @@ def _in_machine(
 def _misread(
     drawn: DrawnMachine, real: Path, logs: Sequence[Path], out: Path, hidden: tuple[str, str, str], seed: int
 ) -> list[Path]:
-    """Runs of a real machine whose logs say a factor too much: as `_said` reads the given logs, it saw less."""
+    """Runs of a real machine whose logs say a factor too much: as `said` reads the given logs, it saw less."""
     saw = [out / "saw" / log.name for log in logs]
     for log, where in zip(logs, saw, strict=True):
         if command(["hide", "signal", hidden[1], f"{1.0 / float(hidden[2]):.12g}", str(log), "-o", str(where)]):
@@ -237,7 +241,7 @@ def _in_log(healthy: Sequence[Path], out: Path, hidden: tuple[str, str, str]) ->
     return made
 
 
-def _said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
+def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     began = time.perf_counter()
     study = detector.study
     usable, stuck = stuck_sensors(runs[:2], study.probed.base.sensors, [p.run.name for p in study.runs[:2]])

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.evidence.discretisation import _acting, differences, inside_of, with_insides
+from twin.diagnose.evidence.discretisation import _acting, _others, differences, inside_of, with_insides
 from twin.diagnose.evidence.pulls import Pulls
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import make_study
 from twin.diagnose.model.surrogate import make_surrogate
 from twin.machine.check_lumped import node_capacity, total_capacity
 from twin.machine.description import Machine
+from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 
 
@@ -59,6 +62,19 @@ def test_the_difference_follows_the_parameters(both):
     exact = np.concatenate([other.outputs(k, x) - study.outputs(k, x) for k in study.fitted])
     assert np.linalg.norm(exact - both[1].at(x)) < 0.2 * np.linalg.norm(exact)
     assert np.linalg.norm(exact - both[1].at(x)) < np.linalg.norm(exact - both[1].d)
+
+
+def test_rails_in_segments_of_half_the_length_are_another_discretisation():
+    machine = load_machine(Path(__file__).parents[1] / "machines" / "slide")
+    moving = {n: c.segments for n, c in machine.contacts.items() if c.kind == "moving"}
+    (same, _, linear), (other, share, quadratic) = _others(machine)
+    assert same is machine
+    assert (linear, quadratic) == (True, False)
+    assert moving
+    assert {n: other.contacts[n].segments for n in moving} == {n: 2 * s for n, s in moving.items()}
+    assert all(other.contacts[n] == c for n, c in machine.contacts.items() if n not in moving)
+    assert share == 2.0  # what enters a half too far off is off by twice as much as it moves to a quarter
+    assert all(o.contacts.keys() >= small_case.machine().contacts.keys() for o, _, _ in _others(small_case.machine()))
 
 
 def test_an_inside_takes_half_of_a_node_and_nothing_is_lost():

@@ -17,6 +17,7 @@ from twin.face.check import check
 from twin.inject.machines.boxes import node_count
 from twin.inject.machines.drawn import RUNS, DrawnMachine, draw_machine, main
 from twin.inject.machines.heat import POWER, SIGNALS, USUAL, drive_law, heat
+from twin.inject.machines.loads import LoadsOfRun, loads_of_run
 from twin.inject.machines.machine_of_boxes import machine_of_boxes
 from twin.inject.machines.network import network
 from twin.inject.machines.other import OFF, other, other_divisions
@@ -32,6 +33,7 @@ from twin.physics.laws import LAWS
 SEEDS = range(40)
 CHECKED = [pytest.param(seed, marks=() if seed < 8 else pytest.mark.slow) for seed in SEEDS]
 WARMEST, MOVED = (3.0, 15.0), (5e-6, 60e-6)  # K, m: what a truth may do in its first run
+MODELS = Path(__file__).parents[2] / "models"
 SLIDE = Path(__file__).parents[1] / "machines" / "slide" / "machine.toml"
 
 
@@ -289,3 +291,22 @@ def test_a_drawn_machine_builds_and_runs(tmp_path):
     artefact = str(tmp_path / "a.h5")
     assert command(["build", str(tmp_path / "m"), "-o", artefact]) == 0
     assert command(["run", artefact, str(tmp_path / "m" / "runs" / "sealed"), "-o", str(tmp_path / "out")]) == 0
+
+
+def test_signals_of_one_drive_rest_together():
+    """A spindle's speed and power are those of one drive where that is told, and of two where it is not."""
+    machine = load_machine(MODELS / "ram_borer")
+    drive = {"spindle_speed": "spindle", "spindle_power": "spindle"}
+    told = _columns(loads_of_run(machine, 3, "told", 8.0, 60.0, drive))
+    alone = _columns(loads_of_run(machine, 3, "alone", 8.0, 60.0))
+    for columns, same in ((told, True), (alone, False)):
+        speed, power = columns["spindle_speed [1/min]"], columns["spindle_power [kW]"]
+        rests, idles = speed == 0.0, power < 0.2 * power.max()
+        assert rests.any()
+        assert np.array_equal(rests, idles) is same
+    np.testing.assert_array_equal(told["y_speed [m/min]"], alone["y_speed [m/min]"])
+
+
+def _columns(run: LoadsOfRun) -> dict[str, np.ndarray]:
+    header, *rows = run.loads.splitlines()
+    return dict(zip(header.split(","), np.array([[float(v) for v in r.split(",")] for r in rows]).T, strict=True))

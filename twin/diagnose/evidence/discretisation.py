@@ -2,8 +2,9 @@
 
 Two sensors beside one rail differ by 0.1 K between two meshes, and the nut of a ball screw sits between two elements:
 no drawn coefficient looks like that, and a joint or an expansion does. So the machine is described once more, with
-linear elements on its mesh, with bars of half the element size, with nodes that are not at one temperature, and what
-the measurements of both differ by is known in its shape, and unknown in its share.
+linear elements on its mesh, with rails in segments of half the length, with bars of half the element size, with nodes
+that are not at one temperature, and what the measurements of both differ by is known in its shape, and unknown in its
+share.
 
     y_other(x) - y(x) = d + D x,      share ~ N(0, 1)
 """
@@ -26,7 +27,8 @@ from twin.machine.description import Contact, Machine, Node
 from twin.progress import Progress, silent
 from twin.rom.parameter import Parameter
 
-FINER = 2  # times the elements of a bar: the half size of a Richardson extrapolation
+FINER = 2  # times the elements of a bar, the segments of a rail: the half size of a Richardson extrapolation
+OF_SEGMENTS = 2.0  # of the difference to half the length: heat enters beside the pad by an error that goes with it
 OF_BARS = 4.0 / 3.0  # of the difference to half the size: the error of linear elements, which goes with its square
 DIFFUSIVITY = 1.3e-5  # m^2/s, of steel and cast iron (VDI Heat Atlas, 2nd ed., D6.1)
 LONG = 2.0  # times the edge of a cube of its capacity that a node's heat has to go: machine parts are no cubes
@@ -69,6 +71,9 @@ def _others(machine: Machine) -> Iterator[tuple[Machine, float, bool]]:
     """Other discretisations: a machine, the share of its difference that is one standard deviation, linear elements."""
     if not machine.lumped:
         yield machine, OF_LINEAR, True
+    if not machine.lumped and (moving := {n: c for n, c in machine.contacts.items() if c.kind == "moving"}):
+        halved = {n: c.model_copy(update={"segments": FINER * c.segments}) for n, c in moving.items()}
+        yield machine.model_copy(update={"contacts": machine.contacts | halved}), OF_SEGMENTS, False
     if machine.bars:
         finer = {n: b.model_copy(update={"elements": FINER * b.elements}) for n, b in machine.bars.items()}
         yield machine.model_copy(update={"bars": finer}), OF_BARS, False

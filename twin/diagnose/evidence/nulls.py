@@ -39,6 +39,9 @@ class Form:
     shape: float = 0.05  # of a film group's coefficient, slowly varying within a run
     shape_time: float = 5400.0  # s, over which it does
     wind: float = 0.25  # of a film group's coefficient at the top speed of its law against that at rest
+    # of the exponent of the rise above the air in a film's law: rms difference of two of 0 (forced air), 1/4 and 1/3
+    # (laminar and turbulent free convection). A nuisance alone (`formal`): synthetic measurements are drawn without it
+    steep: float = 0.2
     contact: float = 0.5  # of the logarithm of a contact's conductance beyond its tolerance: the mesh at its patch
     beside: float = 0.02  # share of a source's heat that enters another face of its part
     lump: float = 3000.0  # J/K, at the patch of a source: how far its heat reaches at once

@@ -167,7 +167,7 @@ def make_detector(
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
     bare = [*bare_forms(study, raw, index), _discretised(other, len(J))]
-    described = described_forms(study, elements, raw, form)
+    described = described_forms(study, elements, nominal, raw, form)
     known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
     fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known]))
     with progress("measurements without a cause: form", counts[0]) as advance:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,7 @@ RESTS = 0.3  # share of blocks in which an axis or spindle rests
 BLOCK = (900.0, 4500.0)  # s, of one job: parts of a small series
 SWING = (0.8, 2.5)  # K, amplitude of the air over a day or a shift
 START = 20.0  # degC, of machine and air
+STRAINED = ("_current", "_power", "_torque")  # endings of signals of a drive that follow its load
 
 
 @dataclass(frozen=True)
@@ -32,21 +34,25 @@ class LoadsOfRun:
         (folder / "run.toml").write_text(self.facts, encoding="utf-8")
 
 
-def loads_of_run(machine: Machine, seed: int, name: str, hours: float, sampling: float) -> LoadsOfRun:
+def loads_of_run(
+    machine: Machine, seed: int, name: str, hours: float, sampling: float, together: Mapping[str, str] = {}
+) -> LoadsOfRun:
     """Loads [units of the signals] of `hours` every `sampling` [s] from a seed; the same seed gives the same bytes.
 
     Columns are told by their names, as `draw_machine` writes them: AXIS_position of the axes, AXIS_speed,
     AXIS_current and AXIS_screw_speed of the same motion; every other signal is an air temperature where its unit is
-    one, a switch where its unit is 1, and a level that changes from job to job otherwise.
+    one, a switch where its unit is 1, and a level that changes from job to job otherwise. together: signals of a drive
+    that their names do not tell -> the axis, or any other name for the drive.
     """
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 3600.0 * hours + 0.5 * sampling, sampling)
     axes = {axis.position: name for name, axis in machine.axes.items()}
-    work = {name: _jobs(rng, time) for name in machine.axes}
+    work = {name: _jobs(rng, time) for name in [*machine.axes, *sorted({*together.values()} - {*machine.axes})]}
     columns = {"time [s]": time}
     for signal, entry in machine.signals.items():
-        axis = axes.get(signal) or next((a for a in machine.axes if signal.startswith(f"{a}_")), "")
-        values = _column(rng, signal, entry, time, work.get(axis))
+        drive = axes.get(signal) or together.get(signal)
+        drive = drive or next((a for a in machine.axes if signal.startswith(f"{a}_")), "")
+        values = _column(rng, signal, entry, time, work.get(drive))
         columns[f"{entry.column or signal} [{entry.unit}]"] = values
     rows = np.column_stack(list(columns.values()))
     lines = [",".join(columns), *(",".join(f"{v:.6g}" for v in row) for row in rows)]
@@ -69,7 +75,7 @@ def _column(
         return (level > 0.0).astype(float) * high if entry.unit == "1" else TOP * high * level
     if signal.endswith("_position"):
         return _position(rng, work, low, high)
-    if signal.endswith("_current"):  # friction, acceleration, and what it cuts with; some at rest
+    if signal.endswith(STRAINED):  # friction, acceleration, and what it cuts with; some at rest
         cutting = np.where(work > 0.0, 0.25 + 0.5 * work + 0.25 * rng.random(len(time)), 0.08)
         return np.asarray(TOP * high * cutting)
     return np.asarray(TOP * high * work)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +29,14 @@ SPLIT_FROM = 8e3  # J/K: lighter nodes are at one temperature
 SETTLES = (300.0, 1200.0)  # s, in which the inside of a split node follows its outside
 
 
-def other(text: str, seed: int, folder: Path = Path(".")) -> str:
+def other(text: str, seed: int, folder: Path = Path("."), off: Mapping[str, float] = OFF) -> str:
     """The text of the real machine that a description stands for, drawn from a seed (>= 0).
 
     Boxes and bars get other divisions, films other laws that agree with the described ones near 5 K above the air,
     sensors move by 1 to 4 mm, heavy nodes of lumped machines are split into an outside and an inside, and parameters
-    that a calibration may fit (`twin.machine.parameters`) are off by up to OFF. Names stay, and nodes are added. It is
-    a machine without a fault: what is hidden in it comes on top. folder: where the text lies or would lie.
+    that a calibration may fit (`twin.machine.parameters`) are off by up to `off`. Names stay, nodes are added. It is
+    a machine without a fault: what is hidden in it comes on top. folder: where the text lies or would lie. off: half
+    widths of uniform factors around 1, by kind of parameter.
 
     Raises DescriptionError for text that is no sound description. Machines with mesh files keep their meshes.
     """
@@ -45,8 +47,8 @@ def other(text: str, seed: int, folder: Path = Path(".")) -> str:
             text = with_table(text, ("films", name), entries)
     text = with_values(text, _mesh(rng, machine) | _sensors(rng, machine))
     text = _split(rng, text, machine)
-    known = [p for p in parameters(load_machine(path, text)) if p.kind in OFF]
-    return edited(text, {p.path: p.nominal * (1.0 + rng.uniform(-OFF[p.kind], OFF[p.kind])) for p in known})
+    known = [p for p in parameters(load_machine(path, text)) if p.kind in off]
+    return edited(text, {p.path: p.nominal * (1.0 + rng.uniform(-off[p.kind], off[p.kind])) for p in known})
 
 
 def other_divisions(rng: np.random.Generator, divisions: tuple[int, ...]) -> tuple[int, ...]:
