@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.diagnose import small_case
-from twin.diagnose.formal import _steeper
+from twin.diagnose.faults.forms import _steeper
 from twin.diagnose.nulls import Form
 from twin.diagnose.probed_model import make_probed_model
 from twin.diagnose.study import make_study
