@@ -24,9 +24,9 @@ from benchmarks.drawn_machines import IN_MACHINE, SHARE, VISIBLE, Row, counted, 
 from benchmarks.shipped_truth import Reduced, reduced
 from twin.build.remesh import remesh
 from twin.build.simulate import simulate_run
-from twin.diagnose.search.detector import Detector
-from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.model.study import Study
+from twin.diagnose.pipeline import Settings, prepare
+from twin.diagnose.search.detector import Detector
 from twin.inject.hide import hide
 from twin.inject.machines.drawn import RUNS
 from twin.inject.machines.loads import loads_of_run

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.nulls import Form
 from twin.diagnose.faults.forms import _steeper
-from twin.diagnose.nulls import Form
-from twin.diagnose.probed_model import make_probed_model
-from twin.diagnose.study import make_study
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.study import make_study
 from twin.machine.parameters import parameters
 from twin.physics.laws import LAWS
 

@@ -79,4 +79,4 @@ def test_a_model_that_misses_by_kelvins_names_nothing(runs, tmp_path):
     found = diagnose(read(tmp_path / "small.h5"), folders, options=DiagnoseOptions(nulls=20, noise="0.05 K"))
     assert found.verdict == "too_poor"
     assert not found.causes
-    assert "follows wall" in str(found)
+    assert "a body that follows" in str(found)

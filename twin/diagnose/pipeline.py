@@ -198,10 +198,12 @@ def diagnose(
         notes.insert(0, opened.note)
         shown, searched = _beside_sensors(found, groups), ()
     gains, described = opened.gains, ""
-    if verdict == "unknown":
+    only_read = bool(causes) and all(groups.get(c.family) == "reading" for c in causes)
+    if verdict == "unknown" or only_read:  # a probe that seems to drift may stand on a body that does
         missing = missing_members(artefact, shown, plans, usable, sealed, settings.seed, progress)
         if missing is not None:
-            verdict, causes, described = "named", (*causes, *missing.causes), missing.description
+            kept = () if only_read else causes
+            verdict, causes, described = "named", (*kept, *missing.causes), missing.description
             gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
             notes.insert(0, missing.note)
     first = found.steps[0]

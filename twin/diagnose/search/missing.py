@@ -1,9 +1,9 @@
 """What moves the tool may be no part of the model: members that follow what is logged (docs/members.md).
 
-Tried where displacements hold an effect that nothing in the catalogue explains. The members are fitted beside the model
-as it was delivered, must halve what the recalibrated model leaves, must predict stretches that they were not fitted to,
-and must not make the sealed runs worse. A lumped machine gets them into its description; of a machine of parts they are
-told alone.
+Tried where displacements hold an effect that nothing in the catalogue explains, or a fault of the reading of the tool
+alone. The members are fitted beside the model as it was delivered, must halve what the model leaves otherwise, must
+predict stretches that they were not fitted to, and must not make the sealed runs worse. A lumped machine gets them into
+its description; of a machine of parts they are told alone.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ def missing_members(
     except TwinError:  # nothing was logged that a body could follow
         return None
     selected, axes = members.selected, list(members.axes)
-    recalibrated = np.array([_rms(m, _recalibrated(found, k, m), axes) for k, m in enumerate(plans[: len(runs)])])
+    explained = np.array([_rms(m, _left(found, k, m), axes) for k, m in enumerate(plans[: len(runs)])])
     left = np.sqrt(np.mean(left_by(members, artefact, runs) ** 2, axis=0))
-    usual = np.sqrt(np.nanmean(recalibrated**2, axis=0))
+    usual = np.sqrt(np.nanmean(explained**2, axis=0))
     policy = found.detector.policy
     if not selected.named or _mean_ratio(left, usual) > policy.halves:
         return None
@@ -103,6 +103,11 @@ def _note(members: Found, written: bool) -> str:
 
 def _recalibrated(found: Search, k: int, m: Measured) -> np.ndarray:
     return m.tcp - found.detector.study.runs[k].split(predicted(found, k).recalibrated)[1]
+
+
+def _left(found: Search, k: int, m: Measured) -> np.ndarray:
+    """What is left with the causes that were found, and without any where there are none."""
+    return m.tcp - found.detector.study.runs[k].split(predicted(found, k).extended)[1]
 
 
 def _rms(m: Measured, error: np.ndarray, axes: Sequence[int]) -> np.ndarray:
