@@ -191,7 +191,7 @@ def _spread(columns: Sequence[Column], axes: Mapping[str, str]) -> list[Column]:
     result = list(columns)
     free = [a for a in AXES if a not in axes]
     waiting = [k for k, c in enumerate(result) if c.role == "displacement"]
-    lettered = {}
+    lettered: dict[int, str] = {}
     for k in waiting:
         match = re.search(r"(?<![a-z])d?([xyz])(?![a-z])", result[k].name, re.IGNORECASE)
         axis = f"d{match[1].lower()}" if match else ""

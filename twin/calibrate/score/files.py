@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from twin.atomic import atomic_path
+from twin.calibrate.score.bootstrap import Difference
 from twin.calibrate.score.metrics import Figures
 from twin.calibrate.score.score import Entry, Score, Settings
 
@@ -31,15 +32,9 @@ def score_json(score: Score, settings: Settings, facts: Mapping[str, Any]) -> di
         "not_scored_inputs_of_the_model": list(score.air),
         "baselines": dict(score.known),
         "model_minus_best_baseline": {
-            part: {
-                "baseline": score.best[part],
-                "rms_difference_m": found.value,
-                "interval_95_m": None if found.low is None else [found.low, found.high],
-                "block_rows": found.block,
-                "rows": found.rows,
-            }
-            for part, found in score.difference.items()
+            part: {"baseline": score.best[part], **_told(found)} for part, found in score.difference.items()
         },
+        "model_minus_regression": {part: _told(found) for part, found in score.regression.items()},
         "figures": [_entry(e) for e in score.entries],
     }
 
@@ -61,3 +56,12 @@ def _entry(e: Entry) -> dict[str, Any]:
     unit = "K" if e.kind == "temperature" else "m"
     names = {"part": e.part, "run": e.run, "segment": e.segment, "output": e.output or "all", "method": e.method}
     return {**names, "unit": unit, **asdict(e.figures)}
+
+
+def _told(found: Difference) -> dict[str, Any]:
+    return {
+        "rms_difference_m": found.value,
+        "interval_95_m": None if found.low is None else [found.low, found.high],
+        "block_rows": found.block,
+        "rows": found.rows,
+    }

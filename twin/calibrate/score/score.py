@@ -6,8 +6,9 @@ What the model computes here is a replay of the loads alone: it has not seen any
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from twin.run.replay import replay
 MODEL = "model"
 HOLD_FIRST = "hold first"
 VECTOR = "vector"
+REGRESSION = "regression"  # of `twin.calibrate.score.baselines.NAMES`
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,7 @@ class RunTold:
     flagged_steps: int  # outside what was certified
     steps: int
     outside_segments: int  # TCP rows in no segment
+    flags: dict[str, int] = field(default_factory=dict)  # what was outside -> in how many steps, the most first
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,7 @@ class Score:
     air: tuple[str, ...]  # sensors whose temperature is an input of the model: not scored
     best: dict[str, str]  # part -> baseline with the smallest rms over its rows, chosen with hindsight
     difference: dict[str, Difference]  # part -> rms of the model minus that of the best baseline, TCP vectors [m]
+    regression: dict[str, Difference] = field(default_factory=dict)  # part -> the same of the ridge regression
 
 
 @dataclass(frozen=True)
@@ -116,7 +120,7 @@ def score(
     found = _baselines(with_tcp, settings)
     predictions = _predictions([*with_tcp["scored"], *with_tcp["sealed"]], found)
     entries: list[Entry] = []
-    best, difference = {}, {}
+    best, difference, regression = {}, {}, {}
     for part in ("scored", "sealed"):
         entries += _temperatures([t for t in tests if t.part == part], part, settings.temperature_sigma)
         entries += _tcp(with_tcp[part], part, predictions)
@@ -124,8 +128,10 @@ def score(
         if rival is not None:
             best[part] = rival
             difference[part] = _difference(with_tcp[part], predictions, rival)
+            if all((REGRESSION, id(t)) in predictions for t in with_tcp[part]):
+                regression[part] = _difference(with_tcp[part], predictions, REGRESSION)
     known = tuple((b.name, b.how) for b in found)
-    return Score(tuple(entries), tuple(told), known, air, best, difference)
+    return Score(tuple(entries), tuple(told), known, air, best, difference, regression)
 
 
 def _replayed(
@@ -133,6 +139,7 @@ def _replayed(
 ) -> tuple[list[_Test], RunTold]:
     """The tests of one run, and what of it is not scored."""
     tests, flagged, steps, lost = [], 0, 0, []
+    named: Counter[str] = Counter()
     for test, segments in split(run, settings.restart):
         result = replay(artefact, test, settings.dt, settings.substeps)
         found = channels(artefact, test, result)
@@ -147,6 +154,7 @@ def _replayed(
         }
         tests.append(_Test(part, Piece(test, name, rows, reference), segments, rises))
         flagged += int(result.flags.any(axis=1).sum())
+        named += Counter(dict(zip(result.flag_names, result.flags.sum(axis=0).tolist(), strict=True)))
         steps += len(result.time) - 1
         lost.append(left_out(test, result))
     inside = sum(int(rows.sum()) for t in tests for rows in members(t.segments, t.piece.rows.time))
@@ -162,7 +170,9 @@ def _replayed(
     )
     references = sum(t.piece.reference is not None for t in tests)
     elsewhere = total - inside - about.tcp_rows - about.tcp_incomplete - references
-    return tests, RunTold(name, part, run.synthetic, about, flagged, steps, max(elsewhere, 0))
+    return tests, RunTold(
+        name, part, run.synthetic, about, flagged, steps, max(elsewhere, 0), {k: n for k, n in named.most_common() if n}
+    )
 
 
 def _baselines(with_tcp: dict[str, list[_Test]], settings: Settings) -> tuple[Baseline, ...]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from twin.calibrate.score.baselines import NAMES
+from twin.calibrate.score.bootstrap import Difference
 from twin.calibrate.score.metrics import Figures
-from twin.calibrate.score.score import HOLD_FIRST, MODEL, VECTOR, Entry, Score
+from twin.calibrate.score.score import HOLD_FIRST, MODEL, REGRESSION, VECTOR, Entry, Score
 
 WORST = 5
 MOST_SEGMENTS = 12
@@ -25,7 +26,10 @@ def score_text(score: Score, artefact: str) -> str:
         lines += _temperatures([e for e in entries if e.kind == "temperature"])
         lines += _tcp([e for e in entries if e.kind == "tcp"])
         if part in score.difference:
-            lines.append(_difference(score, part))
+            name = score.best[part]
+            lines.append(_difference(score.difference[part], f"{name} (the best baseline, in hindsight)"))
+            if part in score.regression and name != REGRESSION:
+                lines.append(_difference(score.regression[part], REGRESSION))
     lines += [f"  {name}: {how}" for name, how in score.known if name != "zero"]
     lines += _notes(score)
     return "\n".join(lines)
@@ -95,9 +99,8 @@ def _tcp_line(name: str, axes: Sequence[Figures], vector: Figures | None, indent
     return line + f"  {_number(vector.fit if vector else None, 7)}  {_number(share, 7)}"
 
 
-def _difference(score: Score, part: str) -> str:
-    found, name = score.difference[part], score.best[part]
-    told = f"  model - {name} (the best baseline, in hindsight): {1e6 * found.value:+.2f} um rms"
+def _difference(found: Difference, name: str) -> str:
+    told = f"  model - {name}: {1e6 * found.value:+.2f} um rms"
     if found.low is None or found.high is None:
         return f"{told}; too few measurements for an interval ({found.rows} in blocks of {found.block})"
     return f"{told}, 95 % between {1e6 * found.low:+.2f} and {1e6 * found.high:+.2f} (blocks of {found.block} rows)"
@@ -118,7 +121,7 @@ def _notes(score: Score) -> list[str]:
                 (lost.tcp_incomplete, "rows of tcp.csv without position or deviation"),
                 (lost.tcp_outside_grid, "rows of tcp.csv beyond the poses"),
                 (told.outside_segments, "rows of tcp.csv in no segment"),
-                (told.flagged_steps, f"of {told.steps} steps outside what was certified"),
+                (told.flagged_steps, f"of {told.steps} steps outside what was certified: {_named(told.flags)}"),
             )
             if n
         ]
@@ -134,3 +137,8 @@ def _notes(score: Score) -> list[str]:
 def _number(value: float | None, width: int, digits: int = 1) -> str:
     """Right-aligned; '-' where it is not defined or not quotable."""
     return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
+
+
+def _named(flags: Mapping[str, int]) -> str:
+    """The three that hold most often."""
+    return ", ".join(f"{name} ({n})" for name, n in list(flags.items())[:3])
