@@ -1,0 +1,38 @@
+"""The table of formats. A new one is one function in a file of its own, one row here, one test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+if TYPE_CHECKING:
+    from twin.export.options import ExportOptions
+    from twin.rom.artefact import Artefact
+
+    # Writes the file, whole or not at all, and returns what to tell of it, a line each.
+    Write = Callable[[Artefact, Path, ExportOptions], tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format; its module is imported when it is asked for."""
+
+    function: str  # "twin.export.c.write:write_c"
+    help: str  # one line
+    options: tuple[str, ...] = ()  # fields of ExportOptions that it reads
+    suffix: str = ""  # of its file
+
+    @property
+    def write(self) -> Write:
+        module, _, name = self.function.partition(":")
+        return cast("Write", getattr(import_module(module), name))
+
+
+FORMATS: dict[str, Format] = {
+    "c": Format("twin.export.c.write:write_c", "one C99 file and its header: the runtime", ("precision",), ".c"),
+    "fmu2": Format("twin.export.fmu.write:write_fmu2", "FMI 2.0 co-simulation, self-contained", ("poses",), ".fmu"),
+    "fmu3": Format("twin.export.fmu.write:write_fmu3", "FMI 3.0 co-simulation, self-contained", ("poses",), ".fmu"),
+}

@@ -1,0 +1,17 @@
+"""What an export may be told besides its artefact and file; each format reads what it needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Options of all formats. Those a format does not know are refused by `twin.face.export.export`."""
+
+    precision: Literal["double", "single"] = "double"  # of the C code's numbers
+    poses: bool = False  # FMUs: TCP errors at all poses among the outputs
+    result: Path | None = None  # folder of `twin run`, where a format is of results
+    time: float | None = None  # s since the start of the run; None: its end
