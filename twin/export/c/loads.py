@@ -106,10 +106,10 @@ def put_laws(out: Arrays, load: LoadModel) -> None:
     of_log, holds = [], []
     for kind, entries in (("source", load.sources), ("film", load.films)):
         for k, entry in enumerate(entries):
-            out.parts.append(law_code(f"{kind}_{k}", entry.use))
+            out.add(law_code(f"{kind}_{k}", entry.use))
             judged = LAWS[entry.use.law].validity
             if judged:
-                out.parts.append(law_code(f"{kind}_{k}_holds", entry.use, holds=True))
+                out.add(law_code(f"{kind}_{k}_holds", entry.use, holds=True))
             if states_of(entry.use):
                 continue
             into = "power" if kind == "source" else "film"
@@ -118,9 +118,9 @@ def put_laws(out: Arrays, load: LoadModel) -> None:
             if judged:
                 test = _call(f"{kind}_{k}_holds", entry.use, place, {})
                 holds.append(f"    raised[flag_of_{kind}_{k}] |= (unsigned char)!{test};\n")
-    out.parts.append("static void laws_of_log(const twin_machine *m, const real *v, real *power, real *film)\n{\n"
+    out.add("static void laws_of_log(const twin_machine *m, const real *v, real *power, real *film)\n{\n"
                      "    (void)m;\n    (void)v;\n    (void)power;\n    (void)film;\n" + "".join(of_log) + "}\n")  # fmt: skip
-    out.parts.append("static void laws_hold(const real *v, unsigned char *raised)\n{\n    (void)v;\n    (void)raised;\n"
+    out.add("static void laws_hold(const real *v, unsigned char *raised)\n{\n    (void)v;\n    (void)raised;\n"
                      + "".join(holds) + "}\n")  # fmt: skip
     _put_switch(out, "film", films, load.films, place, {"surface": "surface", "ambient": "ambient"})
     _put_switch(out, "loss", losses, load.sources, place, {"temperature": "temperature"})
@@ -140,7 +140,7 @@ def _put_switch(
             if not suffix or LAWS[use.law].validity:
                 cases += f"    case {c}: return {_call(f'{name}_{k}{suffix}', use, place, states)};\n"
         otherwise = "1" if suffix else "0"
-        out.parts.append(
+        out.add(
             f"static {result} {kind}_law{suffix}(int which, const real *v, {given})\n{{\n{unused}"
             f"    switch (which) {{\n{cases}    default: return {otherwise};\n    }}\n}}\n"
         )

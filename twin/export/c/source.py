@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from importlib import resources
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from twin.export.c.elastic import MESHED, put_elastic
 from twin.export.c.loads import flags, put_contacts, put_laws, put_signals
-from twin.export.c.text import Arrays, identifier, quoted
+from twin.export.c.text import Arrays, identifier, named, quoted
 from twin.export.c.thermal import put_thermal
 from twin.rom.artefact import Artefact
 from twin.rom.law_values import states_of
@@ -48,12 +47,13 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
     certificate = artefact.certificate
     substeps, step = int(certificate.get("substeps", 1)), float(certificate.get("step", 60.0))
     shortest = float(certificate.get("finest_step", step / substeps))
-    out = Arrays(single)
+    name = identifier(model.name)
+    out = Arrays(single, name)
     layout = prepared.layout
     put_signals(out, load)
     facing, under = put_contacts(out, load, layout.ports)
     at, names = flags(load, shortest, step)
-    out.parts += [f"enum {{ {name} = {place} }};\n" for name, place in at.items()]
+    out.parts += [f"enum {{ {flag} = {place} }};\n" for flag, place in at.items()]
     films = [f for f in enumerate(load.films) if states_of(f[1].use)]
     losses = [s for s in enumerate(load.sources) if states_of(s[1].use)]
     out.integers("flag_film_law", [at.get(f"flag_of_film_{k}", -1) for k, _ in films])
@@ -71,7 +71,6 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
     sizes |= _sizes(prepared, model, sizes)
     sizes |= {"FACING": facing, "UNDER": under, "FLAGS": len(names), "SENSORS": len(sensors),
               "SUBSTEPS": substeps, "FOLLOWING_FILMS": len(films), "FOLLOWING_LOSSES": len(losses)}  # fmt: skip
-    name = identifier(model.name)
     told = f"/* {_told(artefact)}{note} */\n"
     guard = f"TWIN_{name.upper()}_H"
     header = (
@@ -84,25 +83,21 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
         + _core("runtime.h")
         + "\n#ifdef __cplusplus\n}\n#endif\n#endif\n"
     )
-    code = told + f'#include "{name}.h"\n' + _HEAD + _functions(single) + _numbers(artefact, prepared) + out.text()
-    code += "".join(_core(part) for part in _CORE)
-    return Source(name, _named(header, name), _named(code, name), _example(name), sensors, tuple(names))
+    head = told + f'#include "{name}.h"\n' + _HEAD + _functions(single) + _numbers(artefact, prepared)
+    core = "".join(_core(part) for part in _CORE)
+    code = named(head, name) + out.text() + named(core, name)
+    return Source(name, named(header, name), code, _example(name), sensors, tuple(names))
 
 
 def _core(name: str) -> str:
     return (resources.files("twin.export.c") / name).read_text(encoding="utf-8")
 
 
-def _named(text: str, name: str) -> str:
-    """Public names with the machine's in place of `twin`, so that several machines link into one program."""
-    return re.sub(r"\bTWIN_", f"{name.upper()}_", re.sub(r"\btwin_(?!\.)", f"{name}_", text))
-
-
 def _example(name: str) -> str:
     units = [f"{{{quoted(text)}, {factor!r}}}" for row in _TABLE.values() for text, factor in row.items()]
     units += ['{"degC", 1.0}', '{"K", 1.0}']
     text = _core("example.c").replace("TWIN_UNITS", ", ".join(units))
-    return _named(text.replace("twin_.", f"{name}.").replace("twin_run", f"{name}_run"), name)
+    return named(text.replace("twin_.", f"{name}.").replace("twin_run", f"{name}_run"), name)
 
 
 def _sensor_bodies(model: MachineModel) -> tuple[int, ...]:

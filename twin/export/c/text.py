@@ -14,9 +14,13 @@ _LINE = 8  # numbers in a line
 class Arrays:
     """Static arrays of a C file, in the order in which they are added."""
 
-    def __init__(self, single: bool):
-        self.single = single
+    def __init__(self, single: bool, name: str):
+        self.single, self.name = single, name
         self.parts: list[str] = []
+
+    def add(self, text: str) -> None:
+        """Any other code; public names in it begin with twin_."""
+        self.parts.append(named(text, self.name))
 
     def reals(self, name: str, values: Any, kind: str = "static const real") -> None:
         """Numbers in C order, at least one: C knows no empty arrays."""
@@ -37,16 +41,18 @@ class Arrays:
     def names(self, name: str, values: Iterable[str]) -> None:
         self._put(f"const char *const {name}[]", [quoted(v) for v in values], 1)
 
-    def constant(self, name: str, value: int) -> None:
-        self.parts.append(f"enum {{ {name} = {value} }};\n")
-
     def _put(self, head: str, texts: list[str], line: int = _LINE) -> None:
         texts = texts or ["0"]
         lines = (", ".join(texts[i : i + line]) for i in range(0, len(texts), line))
-        self.parts.append(f"{head} = {{\n" + ",\n".join(lines) + "};\n")
+        self.parts.append(named(head, self.name) + " = {\n" + ",\n".join(lines) + "};\n")
 
     def text(self) -> str:
         return "".join(self.parts)
+
+
+def named(text: str, name: str) -> str:
+    """Public names with the machine's in place of `twin`, so that several machines link into one program."""
+    return re.sub(r"\bTWIN_", f"{name.upper()}_", re.sub(r"\btwin_(?!\.)", f"{name}_", text))
 
 
 def quoted(text: str) -> str:
