@@ -32,7 +32,7 @@ class Format:
 
 
 FORMATS: dict[str, Format] = {
-    "c": Format("twin.export.c.write:write_c", "one C99 file and its header: the runtime", ("precision",), ".c"),
+    "c": Format("twin.export.c.write:write_c", "one C99 file and its header: the runtime", ("precision", "run"), ".c"),
     "fmu2": Format("twin.export.fmu.write:write_fmu2", "FMI 2.0 co-simulation, self-contained", ("poses",), ".fmu"),
     "fmu3": Format("twin.export.fmu.write:write_fmu3", "FMI 3.0 co-simulation, self-contained", ("poses",), ".fmu"),
 }

@@ -12,6 +12,7 @@ class ExportOptions:
     """Options of all formats. Those a format does not know are refused by `twin.face.export.export`."""
 
     precision: Literal["double", "single"] = "double"  # of the C code's numbers
+    run: Path | None = None  # C: run folder on which the error against `twin run` is measured
     poses: bool = False  # FMUs: TCP errors at all poses among the outputs
     result: Path | None = None  # folder of `twin run`, where a format is of results
     time: float | None = None  # s since the start of the run; None: its end

@@ -12,7 +12,7 @@ from uuid import NAMESPACE_URL, uuid5
 from twin.atomic import atomic_path
 from twin.export.c.source import Source, source_of
 from twin.export.c.text import named
-from twin.export.fmu.compiler import compiled, targets
+from twin.export.compiler import compiled, targets
 from twin.export.fmu.description import build_description3, description2, description3
 from twin.export.fmu.variables import Variable, variables_of
 from twin.export.options import ExportOptions

@@ -31,7 +31,7 @@ def targets() -> tuple[Target, ...]:
 
     Raises TwinError where there is no C compiler at all.
     """
-    own = next((c for c in (os.environ.get("CC"), "gcc", "clang", "cc") if c and shutil.which(c)), None)
+    own = own_compiler()
     found = []
     if own and sys.platform == "linux" and platform.machine() == "x86_64":
         folders = {"2": "linux64", "3": "x86_64-linux"}
@@ -43,6 +43,11 @@ def targets() -> tuple[Target, ...]:
         what = "no C compiler for any platform: an FMU without a binary runs nowhere"
         raise TwinError(what, "export", "install gcc, or `pip install ziglang`, or name a compiler in CC")
     return tuple(found)
+
+
+def own_compiler() -> str | None:
+    """The C compiler of this machine: what CC names, else gcc, clang or cc."""
+    return next((c for c in (os.environ.get("CC"), "gcc", "clang", "cc") if c and shutil.which(c)), None)
 
 
 def _cross() -> tuple[str, ...]:
