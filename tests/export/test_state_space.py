@@ -209,7 +209,8 @@ def test_the_operating_point_of_a_result(slide_artefact, slide_result):
     third = of_result(slide_result, artefact.digest, load, float(time[3] - time[0]))
     np.testing.assert_array_equal(third.films, films[2])
     np.testing.assert_array_equal(third.position, position[3])
-    for bad, told in (((slide_result, "0" * 64, load), "another artefact"), ((slide_artefact, artefact.digest, load), "not a result"),
+    for bad, told in (((slide_result, "0" * 64, load), "another artefact"),
+                      ((slide_artefact, artefact.digest, load), "not a result"),
                       ((slide_result, artefact.digest, load, 1e9), "the run lasts")):  # fmt: skip
         with pytest.raises(TwinError, match=told):
             of_result(*bad)

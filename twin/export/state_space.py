@@ -83,7 +83,7 @@ def state_space(model: MachineModel, point: OperatingPoint) -> StateSpace:
 
 
 def conductance_matrix(load: LoadModel, position: np.ndarray) -> np.ndarray:
-    """Gamma (n_ports, n_ports) [W/K] of moving contacts at axis positions (n_axes,) [m]: sum of g d d^T over the pairs."""
+    """Gamma (n_ports, n_ports) [W/K] of moving contacts at axis positions (n_axes,) [m]: the sum of g d d^T."""
     gamma = np.zeros((len(load.ports),) * 2)
     for pair in load.pairs:
         d = -_facing(load, pair, position)
