@@ -11,6 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from tests.calibrate import lumped_case
+from twin.build.displacement_field import DisplacementField
+from twin.build.pipeline import full_model
+from twin.build.surface import patch
 from twin.cli.correction import command
 from twin.cli.main import run
 from twin.errors import ModelError, TwinError
@@ -18,7 +21,8 @@ from twin.machine.bodies import bodies_of
 from twin.machine.kinematics import direction, linear_axes, moved_bodies
 from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact
-from twin.rom.tcp import by_body, tcp_at, tcp_rows
+from twin.rom.elastic_ports import cross_matrix
+from twin.rom.tcp import by_body, tcp_at, tcp_rows, tilt_at
 from twin.run.correction import PoseErrors, corrected_error, default_degrees, fit_correction, quality
 from twin.run.correction_axes import _tool_sign, offset_matrix, uncorrectable
 from twin.run.correction_file import read_correction, read_pose_errors, write_correction
@@ -351,3 +355,42 @@ def test_errors_between_the_poses_are_those_of_the_model_where_it_has_its_struct
     interpolated = replace(errors, model=None).at(position)
     assert np.abs(interpolated - wanted).max() > 1e-3 * np.abs(wanted).max()
     np.testing.assert_allclose(errors.at(model.poses), at_poses, rtol=1e-12, atol=1e-15)
+
+
+def test_plus_ten_is_minus_ten():
+    """A tool that stands 10 um too far is moved 10 um back; an axis that carries the work goes the other way."""
+    errors = PoseErrors(("x", "y", "z"), GRID, POSES, np.full((27, 3), 10e-6))
+    offset = fit_correction(errors, CARTESIAN).offset([0.4, 0.1, 0.9])
+    np.testing.assert_allclose(offset, [-10e-6, 10e-6, -10e-6], atol=1e-18)
+
+
+def patch_rotation(full, displacement, surface: str) -> np.ndarray:
+    """(3,) [rad]: least-squares rigid rotation of a patch's nodes in the full model's displacement field."""
+    part, _, face = surface.partition(".")
+    for body, u in zip(full.bodies, displacement, strict=True):
+        if any(p.name == part for p in body.parts):
+            mesh, offset = body.part(part)
+            whole = patch(mesh, mesh.facets(face))
+            nodes, weight = whole.nodes + offset, np.sqrt(np.abs(whole.mean))[:, None]  # area of each node
+            rows = [w * np.hstack([np.eye(3), -cross_matrix(r)]) for w, r in zip(weight, body.nodes[nodes], strict=True)]
+            return np.linalg.lstsq(np.vstack(rows), (weight * u[nodes]).ravel(), rcond=None)[0][3:]
+    raise AssertionError(surface)
+
+
+def test_tilt_is_that_of_the_full_displacement_field(slide_artefact):
+    machine = load_machine("tests/machines/slide")
+    full = full_model(machine)
+    rise = [8.0 * b.nodes[:, 2] + 5.0 * b.nodes[:, 0] * (1 + i) + 3.0 for i, b in enumerate(full.bodies)]
+    u = DisplacementField(machine, full.bodies, full.structure)({"x": 0.13}, rise)
+    tool, work = (patch_rotation(full, u, side.surface) for side in (machine.tcp.tool, machine.tcp.work))
+    told = tilt_at(full.thermal, rise, np.array([[0.13]]))
+    assert np.abs(told).max() > 5e-6
+    np.testing.assert_allclose(told[0], tool - work, atol=0.02 * np.abs(tool - work).max())
+    # the artefact says the same of states that stand for the same field
+    artefact = read_artefact(slide_artefact)
+    states = np.random.default_rng(0).normal(size=artefact.model.n)
+    x = by_body(artefact.model, states)
+    errors = PoseErrors(artefact.model.pose_axes, artefact.model.pose_grid, artefact.model.poses,
+                        tcp_at(artefact.model, x, artefact.model.poses), artefact.model, states)  # fmt: skip
+    correction = fit_correction(errors, np.eye(3)[:, :1])
+    np.testing.assert_allclose(quality(correction, errors).tilt, np.abs(errors.tilt).max(axis=0))

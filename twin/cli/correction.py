@@ -50,6 +50,7 @@ def command(
         ("largest TCP error at the poses", found.before),
         ("misfit of the polynomial at the poses, largest", found.residual),
         ("the same, rms", found.residual_rms),
+        ("misfit of the product form, eq (16.1) as printed", found.product_form),
         ("misfit between the poses, largest", found.between),
         ("in directions that no axis moves in", found.uncorrectable),
         ("left at the poses when corrected", found.after),
@@ -57,3 +58,6 @@ def command(
     ):
         numbers = "  ".join(f"d{c} {1e6 * v:.3f}" for c, v in zip("xyz", values, strict=True))
         click.echo(f"  {label:<48} {numbers} um")
+    if found.tilt is not None:
+        numbers = "  ".join(f"r{c} {1e6 * v:.3f}" for c, v in zip("xyz", found.tilt, strict=True))
+        click.echo(f"  {'tilt at the poses, which linear axes leave':<48} {numbers} urad")

@@ -26,7 +26,7 @@ class AxisLine:
 
 
 def fit_lines(samples: Sampled) -> tuple[AxisLine, ...]:
-    """One line per axis, with P0 in the middle of its range: there K0 is the mean, and rounding the slope does least."""
+    """One line per axis, P0 in the middle of its range: there K0 is the mean, and rounding the slope does least."""
     lines = []
     for k, name in enumerate(samples.axes):
         middle = (samples.grid[k][0] + samples.grid[k][-1]) / 2

@@ -16,6 +16,8 @@ from twin.run.correction_axes import offset_matrix, uncorrectable
 
 SAMPLES = 9  # positions per axis that tables are fitted to: twice the cells of the usual five poses
 
+PLACES = 300  # that a table is judged at: the rms of what is left is known to some per cent
+
 Offsets = Callable[[np.ndarray], np.ndarray]  # positions (m, n_axes) m -> what a table adds to them (m, n_axes) m
 
 
@@ -31,10 +33,10 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Left:
-    """The TCP error at the poses and midway between them, before and after a table, per machine component; (3,) m."""
+    """The TCP error at the poses and at PLACES drawn evenly over the workspace, before and after a table, per machine component; (3,) m."""
 
     before: np.ndarray  # largest
-    before_rms: np.ndarray
+    before_rms: np.ndarray  # over the drawn places
     after: np.ndarray
     after_rms: np.ndarray
     uncorrectable: np.ndarray  # largest in directions that no axis moves in: no table can express them
@@ -57,8 +59,10 @@ def sampled(errors: PoseErrors, jacobian: np.ndarray, samples: int = SAMPLES) ->
 
 
 def left(offsets: Offsets, errors: PoseErrors, jacobian: np.ndarray) -> Left:
-    """What stays when `offsets` are added: w(p + a) + J a, at the poses and midway between them."""
-    places = np.concatenate([errors.poses, errors.between()])
+    """What stays when `offsets` are added: w(p + a) + J a."""
+    low, high = [g[0] for g in errors.grid], [g[-1] for g in errors.grid]
+    drawn = np.random.default_rng(0).uniform(low, high, (PLACES, len(low)))
+    places = np.concatenate([errors.poses, drawn])
     before, offset = errors.at(places), offsets(places)
     after = errors.at(places + offset) + offset @ jacobian.T
 
@@ -66,7 +70,7 @@ def left(offsets: Offsets, errors: PoseErrors, jacobian: np.ndarray) -> Left:
         return np.asarray(np.abs(values).max(axis=0))
 
     def rms(values: np.ndarray) -> np.ndarray:
-        return np.asarray(np.sqrt((values**2).mean(axis=0)))
+        return np.asarray(np.sqrt((values[-PLACES:] ** 2).mean(axis=0)))
 
     return Left(largest(before), rms(before), largest(after), rms(after), largest(uncorrectable(jacobian, before)))
 

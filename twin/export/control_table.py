@@ -33,7 +33,7 @@ def head(source: Source, found: Left, loses: str) -> list[str]:
         f"machine {source.machine}, after {source.time / 3600.0:g} h of the run, model sha256 {source.artefact[:16]}",
         *SIGN,
         f"cannot express: {loses}",
-        "at the poses and midway between them, by the reduced model:",
+        "at the poses and at places drawn evenly over the workspace, by the reduced model:",
         *(f"  {line}" for line in told(found)),
     ]
 

@@ -76,7 +76,8 @@ def write_correction(path: Path, correction: Correction, quality: Quality, facts
         "coefficients_m": [c.ravel().tolist() for c in correction.polynomial.coefficients],
         "design_condition": quality.condition,
         **{f"{name}_um": (1e6 * value).tolist() for name, value in _lengths(quality).items()},
-        "orientation": "a tilt of the tool against the work is not in the result, and linear axes cannot cancel it",
+        "tilt_urad": None if quality.tilt is None else (1e6 * quality.tilt).tolist(),
+        "orientation": "tilt of the tool against the work, largest at the poses: linear axes cannot cancel it",
     }
     if correction.factors:
         told["factors"] = [[f.tolist() for f in component] for component in correction.factors]
@@ -85,7 +86,7 @@ def write_correction(path: Path, correction: Correction, quality: Quality, facts
 
 
 def _lengths(quality: Quality) -> dict[str, np.ndarray]:
-    return {name: value for name, value in vars(quality).items() if isinstance(value, np.ndarray)}
+    return {k: v for k, v in vars(quality).items() if isinstance(v, np.ndarray) and k != "tilt"}
 
 
 def read_correction(path: Path) -> Correction:
