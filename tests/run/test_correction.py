@@ -372,7 +372,9 @@ def patch_rotation(full, displacement, surface: str) -> np.ndarray:
             mesh, offset = body.part(part)
             whole = patch(mesh, mesh.facets(face))
             nodes, weight = whole.nodes + offset, np.sqrt(np.abs(whole.mean))[:, None]  # area of each node
-            rows = [w * np.hstack([np.eye(3), -cross_matrix(r)]) for w, r in zip(weight, body.nodes[nodes], strict=True)]
+            rows = [
+                w * np.hstack([np.eye(3), -cross_matrix(r)]) for w, r in zip(weight, body.nodes[nodes], strict=True)
+            ]
             return np.linalg.lstsq(np.vstack(rows), (weight * u[nodes]).ravel(), rcond=None)[0][3:]
     raise AssertionError(surface)
 

@@ -33,7 +33,7 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Left:
-    """The TCP error at the poses and at PLACES drawn evenly over the workspace, before and after a table, per machine component; (3,) m."""
+    """The TCP error (3,) [m] before and after a table, per machine component, at the poses and PLACES drawn evenly."""
 
     before: np.ndarray  # largest
     before_rms: np.ndarray  # over the drawn places

@@ -15,11 +15,18 @@ from twin.atomic import atomic_path
 from twin.errors import TwinError
 from twin.export.axis_lines import AxisLine, fit_lines, line_offsets
 from twin.export.axis_offsets import Left, left, sampled
-from twin.export.control_table import Source, commented, head
+from twin.export.control_table import Source, commented, head, source_of, summary
+from twin.export.options import ExportOptions
+from twin.rom.artefact import Artefact
 
 LENGTH, SLOPE = 1e-7, 1e-6  # m and 1 per count
 LARGEST = 2**31 - 1  # SGN32
 LOSES = "offsets of one axis that depend on the position of another, curves, and less than 0.1 um"
+
+
+def export_beckhoff(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str, ...]:
+    """The format `beckhoff`: `write_beckhoff` of the result that the options name."""
+    return summary(path, write_beckhoff(path, source_of(artefact, options)))
 
 
 def write_beckhoff(path: Path, source: Source) -> Left:

@@ -24,6 +24,7 @@ class Format:
     help: str  # one line
     options: tuple[str, ...] = ()  # fields of ExportOptions that it reads
     suffix: str = ""  # of its file
+    folder: bool = False  # its output is a folder, with several files
 
     @property
     def write(self) -> Write:
@@ -31,8 +32,21 @@ class Format:
         return cast("Write", getattr(import_module(module), name))
 
 
+RESULT, LINEAR = ("result", "time"), ("result", "time", "at")
+
 FORMATS: dict[str, Format] = {
     "c": Format("twin.export.c.write:write_c", "one C99 file and its header: the runtime", ("precision", "run"), ".c"),
     "fmu2": Format("twin.export.fmu.write:write_fmu2", "FMI 2.0 co-simulation, self-contained", ("poses",), ".fmu"),
     "fmu3": Format("twin.export.fmu.write:write_fmu3", "FMI 3.0 co-simulation, self-contained", ("poses",), ".fmu"),
+    "mat": Format("twin.export.mat:export_mat", "MATLAB: state space and affine terms", LINEAR, ".mat"),
+    "npz": Format("twin.export.npz:export_npz", "NumPy: state space and affine terms", LINEAR, ".npz"),
+    "csv": Format("twin.export.tables_csv:export_csv", "a result, a row per time", ("result",), ".csv"),
+    "json": Format("twin.export.tables_json:export_json", "a result, all tables", ("result",), ".json"),
+    "xarray": Format("twin.export.tables_xarray:export_xarray", "a result as netCDF4", ("result",), ".nc"),
+    "siemens": Format("twin.export.siemens:export_siemens", "SINUMERIK: temperature compensation", RESULT, ".spf"),
+    "beckhoff": Format("twin.export.beckhoff:export_beckhoff", "TwinCAT CNC: temperature compensation", RESULT, ".lis"),
+    "heidenhain": Format(
+        "twin.export.heidenhain:export_heidenhain", "HEIDENHAIN: compensation-value tables", RESULT, folder=True
+    ),
+    "generic": Format("twin.export.generic:export_generic", "axis offsets on a grid, .csv or .json", RESULT, ".csv"),
 }

@@ -10,10 +10,17 @@ from scipy.interpolate import RegularGridInterpolator
 
 from twin.atomic import atomic_path
 from twin.export.axis_offsets import Left, Sampled, left, sampled
-from twin.export.control_table import SIGN, Source, commented, head
+from twin.export.control_table import SIGN, Source, commented, head, source_of, summary
+from twin.export.options import ExportOptions
+from twin.rom.artefact import Artefact
 
 DIGITS = 9  # of a metre: 1 nm
 LOSES = "what bends between the points of the grid (read it linearly between them)"
+
+
+def export_generic(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str, ...]:
+    """The format `generic`: `write_generic` of the result that the options name."""
+    return summary(path, write_generic(path, source_of(artefact, options)))
 
 
 def write_generic(path: Path, source: Source) -> Left:

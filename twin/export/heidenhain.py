@@ -15,10 +15,17 @@ from twin.atomic import atomic_folder, check_folder
 from twin.errors import TwinError
 from twin.export.additive import AdditiveTables, fit_additive
 from twin.export.axis_offsets import Left, left, sampled
-from twin.export.control_table import Source, head
+from twin.export.control_table import Source, head, source_of, summary
+from twin.export.options import ExportOptions
+from twin.rom.artefact import Artefact
 
 DIGITS = 7  # of a metre: the tables count in 0.0001 mm
 LOSES = "what the positions of two axes do together"
+
+
+def export_heidenhain(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str, ...]:
+    """The format `heidenhain`: `write_heidenhain` of the result that the options name."""
+    return summary(path, write_heidenhain(path, source_of(artefact, options)))
 
 
 def write_heidenhain(folder: Path, source: Source) -> Left:

@@ -9,12 +9,18 @@ import numpy as np
 from scipy.io import savemat
 
 from twin.atomic import atomic_path
-from twin.export.matrices import body_arrays, machine_arrays, state_space_arrays
-from twin.export.operating_point import OperatingPoint
+from twin.export.matrices import body_arrays, described, machine_arrays, state_space_arrays
+from twin.export.operating_point import OperatingPoint, chosen
+from twin.export.options import ExportOptions
 from twin.export.state_space import StateSpace, state_space
 from twin.rom.artefact import Artefact
 
 LAST = ("A",)  # of a body: the stack of terms comes last in MATLAB, A(:, :, k)
+
+
+def export_mat(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str, ...]:
+    """The format `mat`: `write_mat` at the operating point that the options ask for."""
+    return described(path, write_mat(path, artefact, chosen(artefact, options)))
 
 
 def write_mat(path: Path, artefact: Artefact, point: OperatingPoint) -> StateSpace:

@@ -5,6 +5,7 @@ The affine terms are those of the artefact (docs/artefact.md): the state space a
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,12 @@ from twin.export.operating_point import OperatingPoint
 from twin.export.state_space import StateSpace, conductance_matrix
 from twin.rom.artefact import Artefact
 from twin.rom.model import AffineBody
+
+
+def described(path: Path, space: StateSpace) -> tuple[str, ...]:
+    """What was written, in a line."""
+    sizes = f"{len(space.states)} states, {len(space.inputs)} inputs, {len(space.outputs)} outputs"
+    return (f"{path}: {sizes}, films and positions held; and the affine terms",)
 
 
 def state_space_arrays(space: StateSpace) -> dict[str, np.ndarray]:

@@ -7,10 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from twin.atomic import atomic_path
-from twin.export.matrices import body_arrays, machine_arrays, state_space_arrays
-from twin.export.operating_point import OperatingPoint
+from twin.export.matrices import body_arrays, described, machine_arrays, state_space_arrays
+from twin.export.operating_point import OperatingPoint, chosen
+from twin.export.options import ExportOptions
 from twin.export.state_space import StateSpace, state_space
 from twin.rom.artefact import Artefact
+
+
+def export_npz(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str, ...]:
+    """The format `npz`: `write_npz` at the operating point that the options ask for."""
+    return described(path, write_npz(path, artefact, chosen(artefact, options)))
 
 
 def write_npz(path: Path, artefact: Artefact, point: OperatingPoint) -> StateSpace:

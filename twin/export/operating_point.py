@@ -15,11 +15,14 @@ import h5py
 import numpy as np
 
 from twin.errors import TwinError
+from twin.export.options import ExportOptions
 from twin.nearest import did_you_mean
 from twin.ordinary import ordinary
+from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
 from twin.rom.load_model import Film, LoadModel
 from twin.run.results import FORMAT
+from twin.units import to_si
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,29 @@ class OperatingPoint:
 
     position: np.ndarray  # (n_axes,) m, in the order of LoadModel.axes
     films: np.ndarray  # (n_films,) W/(m^2 K), radiation included, in the order of LoadModel.films
+
+
+def chosen(artefact: Artefact, options: ExportOptions) -> OperatingPoint:
+    """What the options ask for. Raises TwinError as `of_result` and `moved`, and for positions that are none."""
+    load = artefact.model.load_model
+    if options.result is None and options.time is not None:
+        raise TwinError("a time of no run", "--time", "name the folder of `twin run` with --result")
+    point = middle(load)
+    if options.result is not None:
+        point = of_result(options.result, artefact.digest, load, options.time)
+    return moved(point, load, positions(options.at or ""))
+
+
+def positions(text: str) -> dict[str, float]:
+    """Positions [m] in "x=100 mm, y=0 mm". Raises TwinError for anything else."""
+    found = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, value = item.partition("=")
+        try:
+            found[name.strip()] = to_si(value.strip(), "m") if equals else to_si("", "m")
+        except ValueError as e:
+            raise TwinError(f"'{item}' is no position: {e}", "--at", "write --at 'x=100 mm, y=0 mm'") from e
+    return found
 
 
 def middle(load: LoadModel) -> OperatingPoint:

@@ -16,3 +16,5 @@ class ExportOptions:
     poses: bool = False  # FMUs: TCP errors at all poses among the outputs
     result: Path | None = None  # folder of `twin run`, where a format is of results
     time: float | None = None  # s since the start of the run; None: its end
+    at: str | None = None  # axes of a state space, "x=100 mm, y=0 mm"; others as in the result, or at zero
+    field: bool = False  # ParaView files: the volume by the full model, not the surface alone

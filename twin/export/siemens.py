@@ -15,10 +15,17 @@ from twin.atomic import atomic_path
 from twin.errors import TwinError
 from twin.export.axis_lines import AxisLine, fit_lines, line_offsets
 from twin.export.axis_offsets import Left, left, sampled
-from twin.export.control_table import Source, commented, head
+from twin.export.control_table import Source, commented, head, source_of, summary
+from twin.export.options import ExportOptions
+from twin.rom.artefact import Artefact
 
 STEEPEST = 0.01  # default of MD32760, which limits tan beta (SINUMERIK 808D, parameter manual, MD32760)
 LOSES = "offsets of one axis that depend on the position of another, and curves"
+
+
+def export_siemens(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str, ...]:
+    """The format `siemens`: `write_siemens` of the result that the options name."""
+    return summary(path, write_siemens(path, source_of(artefact, options)))
 
 
 def write_siemens(path: Path, source: Source) -> Left:

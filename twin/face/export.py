@@ -21,7 +21,7 @@ def export(
     Raises TwinError for an unknown format, options that it does not know, an output that is an input or cannot be
     written, and what the format itself refuses (docs/exports.md).
     """
-    from twin.atomic import check_file
+    from twin.atomic import check_file, check_folder
     from twin.export.formats import FORMATS
     from twin.export.options import ExportOptions
     from twin.face.model import read
@@ -35,7 +35,10 @@ def export(
             known = ", ".join(f"--{name}" for name in chosen.options) or "none"
             raise TwinError(f"format '{format}' has no such option", f"--{field.name}", f"its options: {known}")
     target = Path(output)
-    check_file(target)
+    if chosen.folder:
+        check_folder(target)
+    else:
+        check_file(target)
     if target.suffix in (".h5", ".toml", ".msh"):
         raise TwinError("would replace an input", str(target), f"name a file with -o, for example out/x{chosen.suffix}")
     return chosen.write(read(model).artefact, target, wanted)
