@@ -55,13 +55,8 @@ else:
         "rtest": "face.rtest",
         "hide": "face.hide",
     }
-    _PACKAGES = (
-        "build",
-        "run",
-        "calibrate",
-        "diagnose",
-        "export",
-    )  # verbs that are packages: they can be called, twin.verbs
+    # verbs that are packages: they can be called, twin.verbs
+    _PACKAGES = ("build", "run", "calibrate", "diagnose", "export")
     _TYPES = {
         "Machine": "face.machine",
         "Model": "face.model",

@@ -32,7 +32,7 @@ class Format:
         return cast("Write", getattr(import_module(module), name))
 
 
-RESULT, LINEAR = ("result", "time"), ("result", "time", "at")
+RESULT, LINEAR, SERIES = ("result", "time"), ("result", "time", "at"), ("result", "frames", "field")
 
 FORMATS: dict[str, Format] = {
     "c": Format("twin.export.c.write:write_c", "one C99 file and its header: the runtime", ("precision", "run"), ".c"),
@@ -43,6 +43,8 @@ FORMATS: dict[str, Format] = {
     "csv": Format("twin.export.tables_csv:export_csv", "a result, a row per time", ("result",), ".csv"),
     "json": Format("twin.export.tables_json:export_json", "a result, all tables", ("result",), ".json"),
     "xarray": Format("twin.export.tables_xarray:export_xarray", "a result as netCDF4", ("result",), ".nc"),
+    "vtk": Format("twin.export.paraview:export_vtk", "ParaView: PVD and a VTU per time", SERIES, folder=True),
+    "vtkhdf": Format("twin.export.vtkhdf:export_vtkhdf", "VTK 9.3 and later: one file", SERIES, ".vtkhdf"),
     "siemens": Format("twin.export.siemens:export_siemens", "SINUMERIK: temperature compensation", RESULT, ".spf"),
     "beckhoff": Format("twin.export.beckhoff:export_beckhoff", "TwinCAT CNC: temperature compensation", RESULT, ".lis"),
     "heidenhain": Format(

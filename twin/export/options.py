@@ -17,4 +17,5 @@ class ExportOptions:
     result: Path | None = None  # folder of `twin run`, where a format is of results
     time: float | None = None  # s since the start of the run; None: its end
     at: str | None = None  # axes of a state space, "x=100 mm, y=0 mm"; others as in the result, or at zero
+    frames: int = 60  # ParaView files: so many times of the run, evenly spaced; 60 of the five-axis machine are 30 MB
     field: bool = False  # ParaView files: the volume by the full model, not the surface alone
