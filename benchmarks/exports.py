@@ -17,7 +17,7 @@ from twin.build.stepper import CoupledStepper
 from twin.build.volumetric import displacements
 from twin.export.additive import fit_additive
 from twin.export.axis_lines import fit_lines, line_offsets
-from twin.export.axis_offsets import Offsets, left, sampled
+from twin.export.axis_offsets import Offsets, at_poses, left, sampled
 from twin.export.formats import FORMATS
 from twin.export.generic import grid_offsets
 from twin.export.options import ExportOptions
@@ -61,7 +61,7 @@ def truth() -> Callable[[np.ndarray], np.ndarray]:
 
 def tables(errors: PoseErrors, jacobian: np.ndarray, displacement: Callable[[np.ndarray], np.ndarray]) -> None:
     samples = sampled(errors, jacobian)
-    lines, additive = fit_lines(samples), fit_additive(samples)
+    lines, additive = fit_lines(at_poses(errors, jacobian)), fit_additive(samples)
     offsets: dict[str, Offsets] = {
         "offset and slope per axis (siemens, beckhoff)": lambda p: line_offsets(lines, p),
         "tables of every axis over every other (heidenhain)": additive.offsets,

@@ -43,9 +43,14 @@ class Left:
 
     @property
     def share(self) -> float:
-        """rms left over rms before, of all components; zero where there was no error."""
+        """rms that is left, as a share of that before, of all components; zero where there was no error."""
         size = float(np.sum(self.before_rms**2))
         return float(np.sqrt(np.sum(self.after_rms**2) / size)) if size > 0.0 else 0.0
+
+
+def at_poses(errors: PoseErrors, jacobian: np.ndarray) -> Sampled:
+    """The offsets at the poses themselves: nothing is solved for."""
+    return Sampled(errors.axes, errors.grid, errors.poses, errors.tcp @ offset_matrix(jacobian).T)
 
 
 def sampled(errors: PoseErrors, jacobian: np.ndarray, samples: int = SAMPLES) -> Sampled:
@@ -59,12 +64,15 @@ def sampled(errors: PoseErrors, jacobian: np.ndarray, samples: int = SAMPLES) ->
 
 
 def left(offsets: Offsets, errors: PoseErrors, jacobian: np.ndarray) -> Left:
-    """What stays when `offsets` are added: w(p + a) + J a."""
+    """What stays when `offsets` are added: w(p) + J a. That w changes over the offset itself is nanometres.
+
+    (`twin.run.correction.corrected_error` counts that, too; it doubles the positions to be solved for.)
+    """
     low, high = [g[0] for g in errors.grid], [g[-1] for g in errors.grid]
     drawn = np.random.default_rng(0).uniform(low, high, (PLACES, len(low)))
     places = np.concatenate([errors.poses, drawn])
-    before, offset = errors.at(places), offsets(places)
-    after = errors.at(places + offset) + offset @ jacobian.T
+    before = np.concatenate([errors.tcp, errors.at(drawn)])
+    after = before + offsets(places) @ jacobian.T
 
     def largest(values: np.ndarray) -> np.ndarray:
         return np.asarray(np.abs(values).max(axis=0))

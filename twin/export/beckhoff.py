@@ -14,7 +14,7 @@ from pathlib import Path
 from twin.atomic import atomic_path
 from twin.errors import TwinError
 from twin.export.axis_lines import AxisLine, fit_lines, line_offsets
-from twin.export.axis_offsets import Left, left, sampled
+from twin.export.axis_offsets import Left, at_poses, left
 from twin.export.control_table import Source, commented, head, source_of, summary
 from twin.export.options import ExportOptions
 from twin.rom.artefact import Artefact
@@ -31,7 +31,7 @@ def export_beckhoff(artefact: Artefact, path: Path, options: ExportOptions) -> t
 
 def write_beckhoff(path: Path, source: Source) -> Left:
     """Write one block of parameters per axis; returns what they leave. Raises TwinError where a value does not fit."""
-    lines = [_rounded(line) for line in fit_lines(sampled(source.errors, source.jacobian))]
+    lines = [_rounded(line) for line in fit_lines(at_poses(source.errors, source.jacobian))]
     for line in lines:
         if max(abs(_count(line.constant, LENGTH)), abs(_count(line.reference, LENGTH))) > LARGEST:
             what = f"axis '{line.name}' has a position or an offset that its parameter cannot hold (SGN32 of 0.1 um)"

@@ -14,7 +14,7 @@ from pathlib import Path
 from twin.atomic import atomic_path
 from twin.errors import TwinError
 from twin.export.axis_lines import AxisLine, fit_lines, line_offsets
-from twin.export.axis_offsets import Left, left, sampled
+from twin.export.axis_offsets import Left, at_poses, left
 from twin.export.control_table import Source, commented, head, source_of, summary
 from twin.export.options import ExportOptions
 from twin.rom.artefact import Artefact
@@ -30,7 +30,7 @@ def export_siemens(artefact: Artefact, path: Path, options: ExportOptions) -> tu
 
 def write_siemens(path: Path, source: Source) -> Left:
     """Write the table; returns what it leaves. Raises TwinError for slopes that the control would limit."""
-    lines = [_rounded(line) for line in fit_lines(sampled(source.errors, source.jacobian))]
+    lines = [_rounded(line) for line in fit_lines(at_poses(source.errors, source.jacobian))]
     for line in lines:
         if abs(line.slope) > STEEPEST:
             what = f"axis '{line.name}' needs a slope of {line.slope:.3g}, more than MD32760 lets through"

@@ -22,7 +22,7 @@ def export_xarray(artefact: Artefact, path: Path, options: ExportOptions) -> tup
     with atomic_path(path) as temporary:
         data.to_netcdf(temporary, engine="h5netcdf")
     sizes = ", ".join(f"{size} {name}" for name, size in data.sizes.items())
-    return (f"{path}: {', '.join(data.data_vars)} over {sizes}",)
+    return (f"{path}: {', '.join(result.tables)} over {sizes}",)
 
 
 def dataset(result: RunResult) -> xarray.Dataset:

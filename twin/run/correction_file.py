@@ -63,7 +63,10 @@ def write_correction(
     facts: Mapping[str, Any],
     rotary: RotaryCorrection | None = None,
 ) -> None:
-    """Write correction.json, led by `facts`; `rotary`: with offsets of rotary axes, too. Raises TwinError if the file cannot be written."""
+    """Write correction.json, led by `facts`; rotary: with offsets of rotary axes, too.
+
+    Raises TwinError if the file cannot be written.
+    """
     axes = correction.polynomial.axes
     exponents = list(product(*(range(a.degree + 1) for a in axes)))
     told = {

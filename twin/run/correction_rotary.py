@@ -1,9 +1,9 @@
 """Offsets of linear and rotary axes together: what also takes up a tilt of the tool against the work.
 
-The geometric Jacobian J (6, n) maps axis motions to the motion of the tool as seen from the work, displacement above and
-rotation below. The column of a rotary axis that carries the work is -[d x (q - c); d], d its direction, c a point on it
-and q the tool centre point, both in space at the pose; of one that carries the tool the opposite. Offsets -J^+ [w; tilt]
-are for angles at zero, where the model knows its errors. About directions that no rotary axis has the tilt stays.
+The geometric Jacobian J (6, n) maps axis motions to the motion of the tool as seen from the work: displacement above,
+rotation below. The column of a rotary axis that carries the work is -[d x (q - c); d], d its direction, c a point on
+it and q the tool centre point, both in space at the pose; of one that carries the tool it is the opposite. Offsets are
+-J^+ [w; tilt], for angles at zero, where the model knows its errors. Tilt about other directions stays.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def rotary_axes(artefact: Artefact) -> tuple[RotaryAxis, ...]:
 def geometric_jacobian(
     artefact: Artefact, linear: tuple[str, ...], rotary: tuple[RotaryAxis, ...], position: Mapping[str, float]
 ) -> np.ndarray:
-    """J (6, n_linear + n_rotary) at positions [m] of the linear axes; others at zero. Raises ModelError as its parts."""
+    """J (6, n_linear + n_rotary) at positions [m] of the linear axes, others at zero. Raises ModelError."""
     structure = artefact.model.structure
     assert isinstance(structure, ElasticStructure)
     system = structure.system
