@@ -26,13 +26,13 @@ class AxisLine:
 
 
 def fit_lines(samples: Sampled) -> tuple[AxisLine, ...]:
-    """One line per axis, P0 in the middle of its range: there K0 is the mean, and rounding the slope does least."""
+    """One line per axis, P0 in the middle of its range, where rounding the slope does least; level at a single place."""
     lines = []
     for k, name in enumerate(samples.axes):
         middle = (samples.grid[k][0] + samples.grid[k][-1]) / 2
         along, offset = samples.position[:, k] - middle, samples.offset[:, k]
-        square = float(along @ along)
-        lines.append(AxisLine(name, float(offset.mean()), float(along @ offset) / square if square else 0.0, middle))
+        (constant, slope), *_ = np.linalg.lstsq(np.column_stack([np.ones_like(along), along]), offset, rcond=None)
+        lines.append(AxisLine(name, float(constant), float(slope), middle))
     return tuple(lines)
 
 
