@@ -26,7 +26,7 @@ class AxisLine:
 
 
 def fit_lines(samples: Sampled) -> tuple[AxisLine, ...]:
-    """One line per axis, P0 in the middle of its range, where rounding the slope does least; level at a single place."""
+    """One line per axis, P0 in the middle of its range, where rounding the slope does least; level where it has one."""
     lines = []
     for k, name in enumerate(samples.axes):
         middle = (samples.grid[k][0] + samples.grid[k][-1]) / 2
