@@ -88,12 +88,12 @@ def main() -> None:
         for name, format in FORMATS.items():
             options = ExportOptions(result=out if "result" in format.options else None)
             target = Path(folder) / name / f"x{format.suffix}"
-            began = time.perf_counter()
+            began, worked = time.perf_counter(), time.process_time()
             format.write(artefact, target, options)
-            seconds = time.perf_counter() - began
+            seconds, cpu = time.perf_counter() - began, time.process_time() - worked
             size = sum(p.stat().st_size for p in target.parent.rglob("*") if p.is_file())
             limit = "" if name in SERIES else f" (limit {LIMIT:g} s)"
-            print(f"   {name}: {seconds:.2f} s{limit}, {size / 1e6:.2f} MB")
+            print(f"   {name}: {seconds:.2f} s{limit}, {cpu:.2f} s of one core, {size / 1e6:.2f} MB")
         errors, _ = read_pose_errors(out, artefact.digest, 3600.0 * HOURS)
         errors = replace(errors, model=artefact.model)
         tables(errors, axis_jacobian(artefact, errors.axes), truth())
