@@ -59,7 +59,7 @@ def test_what_editors_are_told_is_what_there_is():
     source = (ROOT / "twin" / "__init__.py").read_text(encoding="utf-8")
     told = {line.split(" as ")[-1].strip() for line in source.splitlines() if " import " in line and " as " in line}
     offered = {n for n in dir(twin) if not n.startswith("_") and not inspect.ismodule(getattr(twin, n))}
-    offered |= {"build", "run", "calibrate", "diagnose"}
+    offered |= {"build", "run", "calibrate", "diagnose", "export"}
     assert told <= offered
     assert all(getattr(twin, name) is not None for name in told)
 

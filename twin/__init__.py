@@ -19,12 +19,14 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:  # for editors and type checkers; what runs is below
     from twin.build.pipeline import BuildOptions as BuildOptions
     from twin.errors import TwinError as TwinError
+    from twin.export.options import ExportOptions as ExportOptions
     from twin.face.build import build as build
     from twin.face.calibrate import CalibrateOptions as CalibrateOptions
     from twin.face.calibrate import calibrate as calibrate
     from twin.face.check import check as check
     from twin.face.diagnose import DiagnoseOptions as DiagnoseOptions
     from twin.face.diagnose import diagnose as diagnose
+    from twin.face.export import export as export
     from twin.face.hide import HideOptions as HideOptions
     from twin.face.hide import hide as hide
     from twin.face.machine import Machine as Machine
@@ -53,7 +55,8 @@ else:
         "rtest": "face.rtest",
         "hide": "face.hide",
     }
-    _PACKAGES = ("build", "run", "calibrate", "diagnose")  # verbs that are packages: they can be called, twin.verbs
+    # verbs that are packages: they can be called, twin.verbs
+    _PACKAGES = ("build", "run", "calibrate", "diagnose", "export")
     _TYPES = {
         "Machine": "face.machine",
         "Model": "face.model",
@@ -68,6 +71,7 @@ else:
         "RTestOptions": "face.rtest",
         "DiagnoseOptions": "face.diagnose",
         "HideOptions": "face.hide",
+        "ExportOptions": "export.options",
     }
 
     def __getattr__(name: str) -> object:

@@ -11,6 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from tests.calibrate import lumped_case
+from twin.build.displacement_field import DisplacementField
+from twin.build.pipeline import full_model
+from twin.build.surface import patch
 from twin.cli.correction import command
 from twin.cli.main import run
 from twin.errors import ModelError, TwinError
@@ -18,9 +21,10 @@ from twin.machine.bodies import bodies_of
 from twin.machine.kinematics import direction, linear_axes, moved_bodies
 from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact
-from twin.rom.tcp import by_body, tcp_at, tcp_rows
+from twin.rom.elastic_ports import cross_matrix
+from twin.rom.tcp import by_body, tcp_at, tcp_rows, tilt_at
 from twin.run.correction import PoseErrors, corrected_error, default_degrees, fit_correction, quality
-from twin.run.correction_axes import _tool_sign, offset_matrix, uncorrectable
+from twin.run.correction_axes import _tool_sign, axis_jacobian, offset_matrix, uncorrectable
 from twin.run.correction_file import read_correction, read_pose_errors, write_correction
 from twin.run.correction_polynomial import (
     NormalisedAxis,
@@ -30,6 +34,7 @@ from twin.run.correction_polynomial import (
     fit_without_constant,
     normalised_axes,
 )
+from twin.run.correction_rotary import fit_rotary, geometric_jacobian, rotary_axes
 
 GRID = (np.array([0.0, 0.5, 1.0]),) * 3
 POSES = np.array(list(itertools.product(*GRID)))
@@ -351,3 +356,104 @@ def test_errors_between_the_poses_are_those_of_the_model_where_it_has_its_struct
     interpolated = replace(errors, model=None).at(position)
     assert np.abs(interpolated - wanted).max() > 1e-3 * np.abs(wanted).max()
     np.testing.assert_allclose(errors.at(model.poses), at_poses, rtol=1e-12, atol=1e-15)
+
+
+def test_plus_ten_is_minus_ten():
+    """A tool that stands 10 um too far is moved 10 um back; an axis that carries the work goes the other way."""
+    errors = PoseErrors(("x", "y", "z"), GRID, POSES, np.full((27, 3), 10e-6))
+    offset = fit_correction(errors, CARTESIAN).offset([0.4, 0.1, 0.9])
+    np.testing.assert_allclose(offset, [-10e-6, 10e-6, -10e-6], atol=1e-18)
+
+
+def patch_rotation(full, displacement, surface: str) -> np.ndarray:
+    """(3,) [rad]: least-squares rigid rotation of a patch's nodes in the full model's displacement field."""
+    part, _, face = surface.partition(".")
+    for body, u in zip(full.bodies, displacement, strict=True):
+        if any(p.name == part for p in body.parts):
+            mesh, offset = body.part(part)
+            whole = patch(mesh, mesh.facets(face))
+            nodes, weight = whole.nodes + offset, np.sqrt(np.abs(whole.mean))[:, None]  # area of each node
+            rows = [
+                w * np.hstack([np.eye(3), -cross_matrix(r)]) for w, r in zip(weight, body.nodes[nodes], strict=True)
+            ]
+            return np.linalg.lstsq(np.vstack(rows), (weight * u[nodes]).ravel(), rcond=None)[0][3:]
+    raise AssertionError(surface)
+
+
+def test_tilt_is_that_of_the_full_displacement_field(slide_artefact):
+    machine = load_machine("tests/machines/slide")
+    full = full_model(machine)
+    rise = [8.0 * b.nodes[:, 2] + 5.0 * b.nodes[:, 0] * (1 + i) + 3.0 for i, b in enumerate(full.bodies)]
+    u = DisplacementField(machine, full.bodies, full.structure)({"x": 0.13}, rise)
+    tool, work = (patch_rotation(full, u, side.surface) for side in (machine.tcp.tool, machine.tcp.work))
+    told = tilt_at(full.thermal, rise, np.array([[0.13]]))
+    assert np.abs(told).max() > 5e-6
+    np.testing.assert_allclose(told[0], tool - work, atol=0.02 * np.abs(tool - work).max())
+    # the artefact says the same of states that stand for the same field
+    artefact = read_artefact(slide_artefact)
+    states = np.random.default_rng(0).normal(size=artefact.model.n)
+    x = by_body(artefact.model, states)
+    errors = PoseErrors(artefact.model.pose_axes, artefact.model.pose_grid, artefact.model.poses,
+                        tcp_at(artefact.model, x, artefact.model.poses), artefact.model, states)  # fmt: skip
+    correction = fit_correction(errors, np.eye(3)[:, :1])
+    np.testing.assert_allclose(quality(correction, errors).tilt, np.abs(errors.tilt).max(axis=0))
+
+
+WITH_ROTARY = """
+[axes.c]
+kind = "rotary"
+direction = [0.0, 0.0, 1.0]
+point = ["120 mm", -0.05, "80 mm"]
+carries = ["bed"]
+position = "x_position"
+"""
+
+
+def turned(p: np.ndarray, angle: float) -> np.ndarray:
+    """A point turned about the axis of WITH_ROTARY, exactly."""
+    c, s = np.cos(angle), np.sin(angle)
+    at = np.array([0.12, -0.05, 0.08])
+    return at + np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ (p - at)
+
+
+def test_geometric_jacobian_is_the_derivative_of_exact_motions(slide_artefact):
+    artefact = read_artefact(slide_artefact)
+    artefact = replace(artefact, description=artefact.description + WITH_ROTARY)
+    (axis,) = rotary_axes(artefact)
+    J = geometric_jacobian(artefact, ("x",), (axis,), {"x": 0.13})
+    tool = artefact.model.structure.system.tool_point + np.array([0.13, 0.0, 0.0])  # the slide carries the tool
+    step = 1e-5
+    work = (turned(tool, step) - turned(tool, -step)) / (2.0 * step)  # the work turns away under the tool
+    np.testing.assert_allclose(J[:, 1], [*-work, 0.0, 0.0, -1.0], atol=1e-9)
+    np.testing.assert_allclose(J[:, 0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_a_rotary_axis_takes_up_the_tilt_about_it(slide_artefact, slide_result, tmp_path):
+    plain = read_artefact(slide_artefact)
+    artefact = replace(plain, description=plain.description + WITH_ROTARY)
+    errors, _ = read_pose_errors(slide_result, artefact.digest)
+    errors = replace(errors, model=artefact.model)
+    found = fit_rotary(artefact, errors)
+    tilt = errors.tilt
+    assert found.axes == ("x", "c")
+    # tilt about x and y stays; that about z is weighed against dy, which turning makes: together less is left
+    np.testing.assert_allclose(found.left_tilt[:2], np.abs(tilt[:, :2]).max(axis=0))
+    before = np.hstack([errors.tcp[:, 1:2], 0.1 * tilt[:, 2:]])
+    after = []
+    for pose, w, r, offset in zip(errors.poses, errors.tcp, tilt, found.polynomial(errors.poses), strict=True):
+        tool = artefact.model.structure.system.tool_point + np.array([pose[0], 0.0, 0.0])
+        moved = w + [offset[0], 0.0, 0.0] - (turned(tool, offset[1]) - tool)
+        after.append([moved[1], 0.1 * (r[2] - offset[1])])
+        assert abs(moved[0]) < 0.02 * np.abs(errors.tcp[:, 0]).max()  # the polynomial's misfit
+    assert np.linalg.norm(after) < 0.9 * np.linalg.norm(before)
+    correction = fit_correction(errors, axis_jacobian(artefact, errors.axes))
+    write_correction(tmp_path / "c.json", correction, quality(correction, errors), {}, found)
+    told = json.loads((tmp_path / "c.json").read_text())["with_rotary_axes"]
+    assert told["units"] == ["m", "rad"]
+    np.testing.assert_allclose(told["left_tilt_urad"], 1e6 * found.left_tilt)
+
+
+def test_no_rotary_axis_to_correct_with(slide_artefact, slide_result, tmp_path):
+    with pytest.raises(TwinError, match="no rotary axis"):
+        call(slide_artefact, slide_result, "-o", tmp_path / "c.json", "--rotary")
+    assert not (tmp_path / "c.json").exists()

@@ -26,6 +26,7 @@ from twin.build.pipeline import (
     rich_model,
 )
 from twin.errors import ArtefactError
+from twin.machine.description import Machine
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 from twin.progress import Progress, silent
@@ -94,6 +95,25 @@ def verify_artefact(
     return result
 
 
+def machine_of(artefact: Artefact, machine_path: Path | None, where: str) -> Machine:
+    """The machine that an artefact was built from, read from there or from `machine_path`.
+
+    where: the artefact's name in messages. Raises ArtefactError where the machine is gone, or another one.
+    """
+    origin = Path(machine_path or artefact.provenance.get("machine", ""))
+    if not origin.exists():
+        raise ArtefactError(f"its machine description is not at {origin}", where, "name it with --machine")
+    calibrated = "calibrated_from" in artefact.provenance and not machine_path
+    machine = load_machine(origin, artefact.description if calibrated else None)
+    if not calibrated and machine_hash(machine) != artefact.provenance.get("machine_hash"):
+        raise ArtefactError(
+            f"{origin} is not the machine this artefact was built from (description or meshes differ)",
+            where,
+            "build again, or name the right description with --machine",
+        )
+    return machine
+
+
 def verified(
     artefact: Artefact,
     machine_path: Path | None = None,
@@ -107,18 +127,7 @@ def verified(
 
     where: the artefact's name in messages. mesh: with the error of the mesh, on two of the scenarios.
     """
-    where = where or artefact.model.name
-    origin = Path(machine_path or artefact.provenance.get("machine", ""))
-    if not origin.exists():
-        raise ArtefactError(f"its machine description is not at {origin}", where, "name it with --machine")
-    calibrated = "calibrated_from" in artefact.provenance and not machine_path
-    machine = load_machine(origin, artefact.description if calibrated else None)
-    if not calibrated and machine_hash(machine) != artefact.provenance.get("machine_hash"):
-        raise ArtefactError(
-            f"{origin} is not the machine this artefact was built from (description or meshes differ)",
-            where,
-            "build again, or name the right description with --machine",
-        )
+    machine = machine_of(artefact, machine_path, where or artefact.model.name)
     if mesh:
         refuse_lumped(machine)
     full = full_model(machine, progress)

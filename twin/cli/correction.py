@@ -23,9 +23,10 @@ from twin.cli.quantity import Quantity
 @click.option("--zero-at", type=Quantity("m", negative=True),
               help="position of the only axis where the error is held at zero, e.g. '-500 mm': "
               "the fixed bearing, if it does not move; within the stroke  [default: a constant is fitted]")  # fmt: skip
+@click.option("--rotary", is_flag=True, help="offsets of the rotary axes besides, which take up tilt about them")
 def command(
     artefact: str, result: str, output: str, time: float | None, degree: str | None,
-    form: Literal["full", "product"], zero_at: float | None,
+    form: Literal["full", "product"], zero_at: float | None, rotary: bool,
 ) -> None:  # fmt: skip
     """Compress the TCP error that `twin run ARTEFACT RUN -o RESULT` found at all poses, at one time, for the control.
 
@@ -35,7 +36,7 @@ def command(
     """
     from twin.face.correction import correct
 
-    made = correct(artefact, result, output, time, degree, form, zero_at)
+    made = correct(artefact, result, output, time, degree, form, zero_at, rotary)
     correction, found = made.correction, made.quality
     count = correction.polynomial.coefficients.size
     if form == "product":
@@ -50,6 +51,7 @@ def command(
         ("largest TCP error at the poses", found.before),
         ("misfit of the polynomial at the poses, largest", found.residual),
         ("the same, rms", found.residual_rms),
+        ("misfit of the product form, eq (16.1) as printed", found.product_form),
         ("misfit between the poses, largest", found.between),
         ("in directions that no axis moves in", found.uncorrectable),
         ("left at the poses when corrected", found.after),
@@ -57,3 +59,15 @@ def command(
     ):
         numbers = "  ".join(f"d{c} {1e6 * v:.3f}" for c, v in zip("xyz", values, strict=True))
         click.echo(f"  {label:<48} {numbers} um")
+    if found.tilt is not None:
+        numbers = "  ".join(f"r{c} {1e6 * v:.3f}" for c, v in zip("xyz", found.tilt, strict=True))
+        click.echo(f"  {'tilt at the poses, which linear axes leave':<48} {numbers} urad")
+    if made.rotary is not None:
+        for label, values, unit in (
+            ("left at the poses, rotary axes helping", made.rotary.left, "um"),
+            ("tilt left at the poses, rotary axes helping", made.rotary.left_tilt, "urad"),
+        ):
+            numbers = "  ".join(
+                f"{'d' if unit == 'um' else 'r'}{c} {1e6 * v:.3f}" for c, v in zip("xyz", values, strict=True)
+            )
+            click.echo(f"  {label:<48} {numbers} {unit}")

@@ -39,6 +39,7 @@ COMMANDS = {
     "report": "Draw the pictures of a result.",
     "poses": "Find the pose grid that suffices for a run, and the shares of the volumetric error.",
     "correction": "Compress the TCP error of a result to polynomials for the control.",
+    "export": "Write an artefact for other tools: C, FMU, state space, control tables.",
     "warmup": "Tell when a result has warmed up, and how it drifts at the end.",
     "demo": "Build, verify and run the shipped five-axis machine.",
 }

@@ -12,6 +12,7 @@ from twin.face.inputs import Quantity, positive, quantity
 if TYPE_CHECKING:
     from twin.face.model import Model
     from twin.run.correction import Correction, Quality
+    from twin.run.correction_rotary import RotaryCorrection
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class Corrected:
     quality: Quality
     axes: tuple[str, ...]
     time: float  # s since the start of the run
+    rotary: RotaryCorrection | None = None
 
 
 def correct(
@@ -32,11 +34,13 @@ def correct(
     degree: str | None = None,
     form: Literal["full", "product"] = "full",
     zero_at: Quantity | None = None,
+    rotary: bool = False,
 ) -> Corrected:
     """Compress the TCP error that `twin.run` wrote to the folder `result`, at one time, for the control.
 
     time: since the start of the run, by default its end. degree: of the polynomial, "2", or "x=4,y=2". form: all
     products of powers, or one factor per axis. zero_at: position of the only axis where the error is held at zero.
+    rotary: offsets of rotary axes besides, which take up tilt about them; their descriptions must have a `point`.
     Raises TwinError for models without a TCP, results of another model, times outside the run, and an output that is no
     correction.
     """
@@ -46,6 +50,7 @@ def correct(
     from twin.run.correction import check_zero, default_degrees, fit_correction, quality
     from twin.run.correction_axes import axis_jacobian
     from twin.run.correction_file import read_pose_errors, write_correction
+    from twin.run.correction_rotary import fit_rotary
 
     wanted = None if time is None else positive("time", time, "s", zero=True)
     zero = None if zero_at is None else quantity("zero_at", zero_at, "m")
@@ -61,8 +66,9 @@ def correct(
     correction = fit_correction(errors, axis_jacobian(loaded, errors.axes), degrees, form, zero)
     found = quality(correction, errors)
     facts = {"machine": loaded.model.name, "artefact": loaded.digest, "result": str(result), "time_s": at}
-    write_correction(Path(output), correction, found, facts)
-    return Corrected(correction, found, errors.axes, at)
+    turned = fit_rotary(loaded, errors) if rotary else None
+    write_correction(Path(output), correction, found, facts, turned)
+    return Corrected(correction, found, errors.axes, at, turned)
 
 
 def _check_output(path: Path) -> None:

@@ -143,6 +143,7 @@ class Axis(Entry):
     kind: Literal["linear", "rotary"] = "linear"
     direction: Vector
     stroke: tuple[Length, Length] = (0.0, 0.0)  # rotary axes carry no stroke: structure is evaluated at angle zero
+    point: Point | None = None  # rotary axes: a point on the axis, at axis positions zero
     carries: tuple[str, ...]  # parts that move with the axis (their whole bodies do)
     position: str  # signal
     encoder: Encoder = Encoder()

@@ -132,6 +132,8 @@ def _axes(machine: Machine) -> Iterator[Problem]:
                 yield Problem(f"unknown part '{part}'", f"{where}.carries", remedy)
         if entry.kind == "rotary" and not math.hypot(*entry.direction) > 0:
             yield Problem("the direction has no length", f"{where}.direction", "give a vector like [1, 0, 0]")
+        if entry.kind == "linear" and entry.point is not None:
+            yield Problem("'point' of a linear axis", f"{where}.point", "remove it: only a rotary axis has a place")
         if entry.kind == "rotary" and entry.position not in machine.signals:
             remedy = did_you_mean(entry.position, machine.signals, "signals")
             yield Problem(f"unknown signal '{entry.position}'", f"{where}.position", remedy)

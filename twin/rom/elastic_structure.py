@@ -62,7 +62,15 @@ class ElasticStructure:
 
         Raises Mechanism where a body can move freely.
         """
-        J, t = self.system.gap_rows(positions), self.system.tcp_rows(positions)
+        return self._rows(positions, self.system.tcp_rows(positions))
+
+    def tilt_rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
+        """The same of the tool's rotation [rad] against the work, about x, y, z of the machine; scales turn nothing."""
+        return self._rows(positions, self.system.tilt_rows())
+
+    def _rows(self, positions: Positions, t: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What t (k, P) reads of port displacements, per port displacement of the supported bodies, body by body."""
+        J = self.system.gap_rows(positions)
         # the system is symmetric: solved for the rows of the TCP
         f, _ = self._solve(J, -J @ (self._flexibility @ t.T), (t @ self._motions).T)
         return tuple(np.split(t + f.T @ J, self.system.offsets[1:-1], axis=1))

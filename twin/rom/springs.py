@@ -99,6 +99,14 @@ class SpringSystem:
             t += np.outer(self._lever(encoder) * encoder.sign, self.reader_row(encoder, positions))
         return t
 
+    def tilt_rows(self) -> np.ndarray:
+        """(3, P): rotation [rad] of the tool minus that of the work side, the same at every position."""
+        t = np.zeros((3, int(self.offsets[-1])))
+        for port, sign in ((self.tool, 1.0), (self.work, -1.0)):
+            column = self.offsets[port.body] + port.first + 3  # behind the mean displacement
+            t[:, column : column + 3] += sign * np.eye(3)
+        return t
+
     def scale_rows(self, positions: Positions) -> list[tuple[int, np.ndarray, np.ndarray]]:
         """What the growth of each scale adds: (body, its nodes (m,), displacement (3, m) [m/K] per T - T_ref there)."""
         at = self.vector(positions)

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.errors import ModelError
+from twin.rom.elastic_structure import ElasticStructure
 from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.model import MachineModel
 from twin.rom.poses import Kind, pose_weights
@@ -146,6 +147,21 @@ def tcp_over(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray
     rows = elastic_rows(model, positions)
     parts = [np.tensordot(states @ inputs(model, b).T, rows[b], (1, 2)) for b, states in enumerate(x)]
     return np.asarray(np.sum(parts, axis=0))
+
+
+def tilt_at(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray) -> np.ndarray | None:
+    """Rotations (m, 3) [rad] of the tool against the work at states x_b (n_b,) and positions (m, n_axes) [m].
+
+    About x, y, z of the machine. None of models that do not know it: lumped ones, and those without structure.
+    """
+    if not isinstance(model.structure, ElasticStructure) or not is_exact(model):
+        return None
+    tilt = np.zeros((len(positions), 3))
+    read = [inputs(model, b) @ states for b, states in enumerate(x)]
+    for i, position in enumerate(_within_grid(model, positions)):
+        for ports, displacement in zip(model.structure.tilt_rows(position), read, strict=True):
+            tilt[i] += ports @ displacement[: ports.shape[1]]  # what scales read follows the ports
+    return tilt
 
 
 def by_body(model: MachineModel, states: np.ndarray) -> list[np.ndarray]:

@@ -18,7 +18,7 @@ from twin.errors import TwinError
 from twin.rom.load_model import AxisWiring
 from twin.rom.model import MachineModel
 from twin.rom.poses import pose_weights
-from twin.rom.tcp import by_body, is_exact, tcp_at
+from twin.rom.tcp import by_body, is_exact, tcp_at, tilt_at
 from twin.run.correction_axes import offset_matrix, uncorrectable
 from twin.run.correction_polynomial import (
     Polynomial,
@@ -54,6 +54,13 @@ class PoseErrors:
             return tcp_at(self.model, by_body(self.model, self.state), position)
         weights, _ = pose_weights(self.grid, position)
         return np.asarray(weights @ self.tcp)
+
+    @property
+    def tilt(self) -> np.ndarray | None:
+        """(n_poses, 3) [rad] of the tool against the work at the poses; None where the model does not tell it."""
+        if self.model is None or self.state is None:
+            return None
+        return tilt_at(self.model, by_body(self.model, self.state), self.poses)
 
     def between(self) -> np.ndarray:
         """Positions (m, n_axes) [m] in the middle of every cell of the grid; single positions stay."""
@@ -102,6 +109,10 @@ class Quality:
     after: np.ndarray  # largest error at the poses with the offsets applied
     after_between: np.ndarray  # the same midway between the poses
     condition: float  # of the design matrix: how much rounding may grow in the coefficients
+    product_form: (
+        np.ndarray
+    )  # largest misfit of the product form, eq (16.1) as printed, at the poses, whatever the form
+    tilt: np.ndarray | None = None  # rad, largest tilt of the tool against the work: linear axes leave all of it
 
 
 def default_degrees(errors: PoseErrors) -> tuple[int, ...]:
@@ -170,6 +181,9 @@ def quality(correction: Correction, errors: PoseErrors) -> Quality:
     def largest(values: np.ndarray) -> np.ndarray:
         return np.abs(values).max(axis=0)
 
+    axes = correction.polynomial.axes
+    printed = fit_product(axes, errors.poses, errors.tcp).expanded()
+    tilt = errors.tilt
     return Quality(
         before=largest(errors.tcp),
         residual=largest(misfit),
@@ -178,5 +192,7 @@ def quality(correction: Correction, errors: PoseErrors) -> Quality:
         uncorrectable=largest(uncorrectable(correction.jacobian, errors.tcp)),
         after=largest(corrected_error(correction, errors, errors.poses)),
         after_between=largest(corrected_error(correction, errors, middles)),
-        condition=float(np.linalg.cond(design_matrix(correction.polynomial.axes, errors.poses))),
+        condition=float(np.linalg.cond(design_matrix(axes, errors.poses))),
+        product_form=largest(errors.tcp - printed(errors.poses)),
+        tilt=None if tilt is None else largest(tilt),
     )

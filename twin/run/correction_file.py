@@ -17,6 +17,7 @@ from twin.ordinary import ordinary
 from twin.rom.hdf5_file import strings
 from twin.run.correction import Correction, PoseErrors, Quality
 from twin.run.correction_polynomial import NormalisedAxis, Polynomial
+from twin.run.correction_rotary import RotaryCorrection
 from twin.run.results import FORMAT as RESULT_FORMAT
 
 FORMAT, VERSION = "twin correction", 1
@@ -55,8 +56,17 @@ def read_pose_errors(path: Path, artefact: str, time: float | None = None) -> tu
         raise TwinError("not a result of `twin run`", str(path), remedy) from e
 
 
-def write_correction(path: Path, correction: Correction, quality: Quality, facts: Mapping[str, Any]) -> None:
-    """Write correction.json, led by `facts`. Raises TwinError if the file cannot be written."""
+def write_correction(
+    path: Path,
+    correction: Correction,
+    quality: Quality,
+    facts: Mapping[str, Any],
+    rotary: RotaryCorrection | None = None,
+) -> None:
+    """Write correction.json, led by `facts`; rotary: with offsets of rotary axes, too.
+
+    Raises TwinError if the file cannot be written.
+    """
     axes = correction.polynomial.axes
     exponents = list(product(*(range(a.degree + 1) for a in axes)))
     told = {
@@ -76,16 +86,33 @@ def write_correction(path: Path, correction: Correction, quality: Quality, facts
         "coefficients_m": [c.ravel().tolist() for c in correction.polynomial.coefficients],
         "design_condition": quality.condition,
         **{f"{name}_um": (1e6 * value).tolist() for name, value in _lengths(quality).items()},
-        "orientation": "a tilt of the tool against the work is not in the result, and linear axes cannot cancel it",
+        "tilt_urad": None if quality.tilt is None else (1e6 * quality.tilt).tolist(),
+        "orientation": "tilt of the tool against the work, largest at the poses: linear axes cannot cancel it",
     }
     if correction.factors:
         told["factors"] = [[f.tolist() for f in component] for component in correction.factors]
+    if rotary is not None:
+        told["with_rotary_axes"] = _rotary(rotary)
     with atomic_path(Path(path)) as temporary:
         temporary.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
 
 
+def _rotary(rotary: RotaryCorrection) -> dict[str, Any]:
+    """Instead of the offsets of the linear axes alone; degrees of the polynomials are their own."""
+    axes = rotary.polynomial.axes
+    return {
+        "how": "offset of an axis = sum over terms of coefficient * product of s^exponent; s as above",
+        "axes": list(rotary.axes),
+        "units": ["m"] * len(axes) + ["rad"] * (len(rotary.axes) - len(axes)),
+        "exponents": [list(e) for e in product(*(range(a.degree + 1) for a in axes))],
+        "coefficients": [c.ravel().tolist() for c in rotary.polynomial.coefficients],
+        "left_um": (1e6 * rotary.left).tolist(),
+        "left_tilt_urad": (1e6 * rotary.left_tilt).tolist(),
+    }
+
+
 def _lengths(quality: Quality) -> dict[str, np.ndarray]:
-    return {name: value for name, value in vars(quality).items() if isinstance(value, np.ndarray)}
+    return {k: v for k, v in vars(quality).items() if isinstance(v, np.ndarray) and k != "tilt"}
 
 
 def read_correction(path: Path) -> Correction:

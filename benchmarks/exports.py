@@ -1,0 +1,103 @@
+"""Exports of the five-axis machine: seconds and size, and what control tables leave of the full model's error."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.five_axis import FOLDER, full
+from twin.build.pipeline import BuildOptions
+from twin.build.product import build_artefact
+from twin.build.stepper import CoupledStepper
+from twin.build.volumetric import displacements
+from twin.export.additive import fit_additive
+from twin.export.axis_lines import fit_lines, line_offsets
+from twin.export.axis_offsets import Offsets, at_poses, left, sampled
+from twin.export.formats import FORMATS
+from twin.export.generic import grid_offsets
+from twin.export.options import ExportOptions
+from twin.logs.read import read_run
+from twin.logs.signals import signal_values
+from twin.progress import bar
+from twin.rom.artefact import read_artefact
+from twin.rom.drive import evaluate
+from twin.run.correction import PoseErrors, fit_correction
+from twin.run.correction_axes import axis_jacobian
+from twin.run.correction_file import read_pose_errors
+from twin.run.replay import replay
+from twin.run.results import write_results
+
+HOURS = 4.0  # of experiment A: the X axis has moved
+LIMIT = 10.0  # s, any format but series of fields
+SERIES = ("vtk", "vtkhdf")
+
+
+@dataclass(frozen=True)
+class TrueErrors(PoseErrors):
+    """The full model's TCP errors, at any position."""
+
+    displacement: Callable[[np.ndarray], np.ndarray] = np.zeros_like
+
+    def at(self, position: np.ndarray) -> np.ndarray:
+        return self.displacement(position)
+
+
+def truth() -> Callable[[np.ndarray], np.ndarray]:
+    """TCP error (m, 3) [m] of the full model at positions (m, n_axes) [m], after HOURS."""
+    model, run = full().thermal, read_run(FOLDER / "runs" / "experiment_a")
+    signals = signal_values(run, model.load_model.signals)
+    drive = evaluate(model.load_model, run.loads.time, signals, 60.0, round(60 * HOURS))
+    stepper = CoupledStepper(model)
+    x = stepper.uniform(float(run.initial_temperature or model.reference_temperature))
+    for _, x, _ in stepper.run(drive, x, 1):  # noqa: B020  x goes on from where it began
+        last = x
+    return lambda position: displacements(full().structure, position, [last])[0]
+
+
+def tables(errors: PoseErrors, jacobian: np.ndarray, displacement: Callable[[np.ndarray], np.ndarray]) -> None:
+    samples = sampled(errors, jacobian)
+    lines, additive = fit_lines(at_poses(errors, jacobian)), fit_additive(samples)
+    offsets: dict[str, Offsets] = {
+        "offset and slope per axis (siemens, beckhoff)": lambda p: line_offsets(lines, p),
+        "tables of every axis over every other (heidenhain)": additive.offsets,
+        "grid of 9 x 9 x 9 (generic)": lambda p: grid_offsets(samples, p),
+        "27 coefficients per component (twin correction)": fit_correction(errors, jacobian).offsets,
+        "product of parabolas, eq (16.1) as printed": fit_correction(errors, jacobian, form="product").offsets,
+    }
+    true = TrueErrors(errors.axes, errors.grid, errors.poses, displacement(errors.poses), displacement=displacement)
+    size = left(np.zeros_like, true, jacobian)
+    print(f"   TCP error of the full model: rms {1e6 * np.linalg.norm(size.before_rms):.2f} um")
+    for name, function in offsets.items():
+        found = left(function, true, jacobian)
+        largest = 1e6 * found.after.max()
+        print(f"   left by {name}: {100 * found.share:.1f} % of the rms, at most {largest:.2f} um along an axis")
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "five_axis.h5"
+        build_artefact(FOLDER, path, BuildOptions(held_out=1), bar)
+        artefact = read_artefact(path)
+        run, out = FOLDER / "runs" / "experiment_a", Path(folder) / "out"
+        write_results(out, replay(artefact, read_run(run)), {"run": str(run)})
+        for name, format in FORMATS.items():
+            options = ExportOptions(result=out if "result" in format.options else None)
+            target = Path(folder) / name / f"x{format.suffix}"
+            began, worked = time.perf_counter(), time.process_time()
+            format.write(artefact, target, options)
+            seconds, cpu = time.perf_counter() - began, time.process_time() - worked
+            size = sum(p.stat().st_size for p in target.parent.rglob("*") if p.is_file())
+            limit = "" if name in SERIES else f" (limit {LIMIT:g} s)"
+            print(f"   {name}: {seconds:.2f} s{limit}, {cpu:.2f} s of one core, {size / 1e6:.2f} MB")
+        errors, _ = read_pose_errors(out, artefact.digest, 3600.0 * HOURS)
+        errors = replace(errors, model=artefact.model)
+        tables(errors, axis_jacobian(artefact, errors.axes), truth())
+
+
+if __name__ == "__main__":
+    main()

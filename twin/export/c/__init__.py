@@ -1,0 +1,1 @@
+"""The runtime as C: one C99 file and its header."""

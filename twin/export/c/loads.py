@@ -1,0 +1,186 @@
+"""What drives a machine as C arrays and functions: signals, laws, environments, contacts, flags."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.export.c.law_code import arguments_of, law_code
+from twin.export.c.text import Arrays
+from twin.physics.laws import LAWS
+from twin.rom.drive import outside_flag
+from twin.rom.law_values import states_of
+from twin.rom.load_model import Film, LawUse, LoadModel, Source
+
+
+def put_signals(out: Arrays, load: LoadModel) -> None:
+    names = [s.name for s in load.signals]
+    place = {name: k for k, name in enumerate(names)}
+    needed = {n for entry in (*load.sources, *load.films) for n in entry.use.signals.values()}
+    needed |= {a.position for a in load.axes} | {e.signal for e in load.environments}
+    needed |= {e.switch for e in (*load.environments, *load.joints, *load.pairs)}
+    followed = {n for entry in (*load.sources, *load.films) if states_of(entry.use) for n in entry.use.signals.values()}
+    out.names("twin_signal_name", [s.column for s in load.signals])
+    out.names("twin_signal_unit", [s.unit for s in load.signals])
+    out.names("twin_axis_name", [a.name for a in load.axes])
+    out.reals("signal_low", [s.low for s in load.signals])
+    out.reals("signal_high", [s.high for s in load.signals])
+    out.reals("signal_margin", [_margin(s.low, s.high) for s in load.signals])
+    out.reals("signal_default", [np.nan if s.default is None else s.default for s in load.signals])
+    out.reals("signal_factor", [s.factor for s in load.signals])
+    out.integers("signal_peak", [s.kind == "peak" for s in load.signals])
+    out.integers("signal_needed", [s.name in needed for s in load.signals])
+    out.integers("is_followed", [s.name in followed for s in load.signals])
+    out.integers("twin_axis_signal", [place[a.position] for a in load.axes], "const int")
+    out.reals("axis_low", [a.low for a in load.axes])
+    out.reals("axis_high", [a.high for a in load.axes])
+    out.reals("axis_margin", [_margin(a.low, a.high) for a in load.axes])
+    defaults = {s.name: s.default or 0.0 for s in load.signals}
+    out.reals("axis_default", [defaults[a.position] for a in load.axes])
+    environments = load.environments
+    out.integers("environment_signal", [place[e.signal] if e.signal else -1 for e in environments])
+    out.reals("environment_temperature", [e.temperature for e in environments])
+    out.reals("environment_offset", [e.offset for e in environments])
+    out.integers("environment_switch", [place[e.switch] if e.switch else -1 for e in environments])
+    out.reals("environment_switched", [e.switched_offset for e in environments])
+    out.integers("joint_switch", [place[j.switch] if j.switch else -1 for j in load.joints])
+    out.reals("joint_switched", [j.switched for j in load.joints])
+    out.reals("joint_conductance", [j.conductance for j in load.joints])
+    air = [environments[f.environment] for f in load.films]
+    out.integers("film_environment", [f.environment for f in load.films])
+    out.integers("film_radiant", [f.radiant for f in load.films])
+    out.reals("film_emissivity", [f.emissivity for f in load.films])
+    out.reals("film_gradient", [e.gradient for e in air])
+    out.reals("film_height", [e.height for e in air])
+    out.reals("film_low", [f.low for f in load.films])
+    out.reals("film_high", [f.high for f in load.films])
+
+
+def put_contacts(out: Arrays, load: LoadModel, ports: tuple[tuple[int, ...], ...]) -> tuple[int, int]:
+    """Pairs and their rails; ports: per body. Returns the numbers of `facing` and `under` entries."""
+    place = {s.name: k for k, s in enumerate(load.signals)}
+    owner = {port: (b, i) for b, of_body in enumerate(ports) for i, port in enumerate(of_body)}
+    rails = [load.rails[p.rail] for p in load.pairs]
+    counts = [len(r.stations) for r in rails]
+    starts = np.cumsum([0, *(len(r.stations) for r in load.rails)])
+    sources = [[j for j, s in enumerate(load.sources) if s.contact == p.contact] for p in load.pairs]
+    under = [len(s) * n for s, n in zip(sources, counts, strict=True)]
+    out.reals("station", [s for r in load.rails for s in r.stations])
+    out.integers("pair_station", [starts[p.rail] for p in load.pairs])
+    out.integers("pair_count", counts)
+    out.integers("pair_facing", np.cumsum([0, *counts])[:-1])
+    out.integers("pair_under", np.cumsum([0, *under])[:-1])
+    out.integers("pair_axis", [p.axis for p in load.pairs])
+    out.integers("pair_port", [r.first_port for r in rails])
+    out.integers("pair_pad", [p.pad_port for p in load.pairs])
+    out.reals("pair_at", [p.station for p in load.pairs])
+    out.reals("pair_sign", [-1.0 if p.rail_moves else 1.0 for p in load.pairs])
+    out.integers("pair_by_segment", [p.assignment == "segment" for p in load.pairs])
+    out.reals("pair_conductance", [p.conductance * p.area for p in load.pairs])
+    out.integers("pair_switch", [place[p.switch] if p.switch else -1 for p in load.pairs])
+    out.reals("pair_switched", [p.switched for p in load.pairs])
+    out.reals("pair_margin", [_margin(r.stations[0], r.stations[-1]) for r in rails])
+    out.integers("pair_sources", [len(s) for s in sources])
+    out.integers("pair_source_first", np.cumsum([0, *(len(s) for s in sources)])[:-1])
+    out.integers("pair_source", [j for s in sources for j in s])
+    out.reals("pair_divisor", [sum(q.contact == p.contact for q in load.pairs) for p in load.pairs])
+    out.reals("rail_share", [s.rail_share for s in load.sources])
+    if load.pairs:
+        out.integers("pair_rail_body", [owner[r.first_port][0] for r in rails])
+        out.integers("pair_rail_local", [owner[r.first_port][1] for r in rails])
+        out.integers("pair_pad_body", [owner[p.pad_port][0] for p in load.pairs])
+        out.integers("pair_pad_local", [owner[p.pad_port][1] for p in load.pairs])
+    return sum(counts), sum(under)
+
+
+def put_laws(out: Arrays, load: LoadModel) -> None:
+    """The laws as functions, and the functions that call them."""
+    place = {s.name: k for k, s in enumerate(load.signals)}
+    films = [k for k, f in enumerate(load.films) if states_of(f.use)]
+    losses = [k for k, s in enumerate(load.sources) if states_of(s.use)]
+    out.reals("source_gain", [s.gain for s in load.sources])
+    out.reals("film_gain", [f.gain for f in load.films])
+    out.integers("following_film", films)
+    out.integers("film_alone", [not load.films[k].use.signals for k in films])
+    out.integers("following_loss", losses)
+    out.integers("follows", [bool(states_of(s.use)) for s in load.sources])
+    of_log, holds = [], []
+    for kind, entries in (("source", load.sources), ("film", load.films)):
+        for k, entry in enumerate(entries):
+            out.add(law_code(f"{kind}_{k}", entry.use))
+            judged = LAWS[entry.use.law].validity
+            if judged:
+                out.add(law_code(f"{kind}_{k}_holds", entry.use, holds=True))
+            if states_of(entry.use):
+                continue
+            into = "power" if kind == "source" else "film"
+            call = _call(f"{kind}_{k}", entry.use, place, {})
+            of_log.append(f"    {into}[{k}] = m->{kind}_gain[{k}] * {call};\n")
+            if judged:
+                test = _call(f"{kind}_{k}_holds", entry.use, place, {})
+                holds.append(f"    raised[flag_of_{kind}_{k}] |= (unsigned char)!{test};\n")
+    out.add("static void laws_of_log(const twin_machine *m, const real *v, real *power, real *film)\n{\n"
+                     "    (void)m;\n    (void)v;\n    (void)power;\n    (void)film;\n" + "".join(of_log) + "}\n")  # fmt: skip
+    out.add("static void laws_hold(const real *v, unsigned char *raised)\n{\n    (void)v;\n    (void)raised;\n"
+                     + "".join(holds) + "}\n")  # fmt: skip
+    _put_switch(out, "film", films, load.films, place, {"surface": "surface", "ambient": "ambient"})
+    _put_switch(out, "loss", losses, load.sources, place, {"temperature": "temperature"})
+
+
+def _put_switch(
+    out: Arrays, kind: str, which: list[int], entries: tuple[Film, ...] | tuple[Source, ...], place: dict[str, int],
+    states: dict[str, str],
+) -> None:  # fmt: skip
+    name = "source" if kind == "loss" else "film"
+    given = ", ".join(f"real {s}" for s in states)
+    unused = "".join(f"    (void){s};\n" for s in ("v", *states))
+    for suffix, result in (("", "real"), ("_holds", "int")):
+        cases = ""
+        for c, k in enumerate(which):
+            use = entries[k].use
+            if not suffix or LAWS[use.law].validity:
+                cases += f"    case {c}: return {_call(f'{name}_{k}{suffix}', use, place, states)};\n"
+        otherwise = "1" if suffix else "0"
+        out.add(
+            f"static {result} {kind}_law{suffix}(int which, const real *v, {given})\n{{\n{unused}"
+            f"    switch (which) {{\n{cases}    default: return {otherwise};\n    }}\n}}\n"
+        )
+
+
+def _call(name: str, use: LawUse, place: dict[str, int], states: dict[str, str]) -> str:
+    given = [f"v[{place[use.signals[a]]}]" if a in use.signals else states[a] for a in arguments_of(use)]
+    return f"{name}({', '.join(given)})"
+
+
+def flags(load: LoadModel, shortest: float, step: float) -> tuple[dict[str, int], list[str]]:
+    """Places of the first flag of each kind, and the names of all, as `twin run` names them."""
+    names: list[str] = []
+    at: dict[str, int] = {}
+    at["flag_signal"] = len(names)
+    for s in load.signals:
+        names += [f"signals.{s.name} {side} {v:g} {s.unit}" for side, v in (("below", s.low), ("above", s.high))]
+    at["flag_missing"] = len(names)
+    names += [f"signals.{s.name} missing, last value held" for s in load.signals]
+    at["flag_stroke"] = len(names)
+    names += [f"axes.{a.name} beyond its stroke" for a in load.axes]
+    at["flag_rail"] = len(names)
+    names += [
+        f"contacts.{p.contact}: {load.ports[p.pad_port]} beyond the stations of its rail" for p in load.pairs
+    ]
+    for kind, entries in (("source", load.sources), ("film", load.films)):
+        for k, entry in enumerate(entries):
+            if validity := LAWS[entry.use.law].validity:
+                at[f"flag_of_{kind}_{k}"] = len(names)
+                names.append(outside_flag(f"{kind}s", entry.name, validity.text))
+    at["flag_film"] = len(names)
+    for f in load.films:
+        names += [f"films.{f.name} {side} {v:g} W/(m^2*K)" for side, v in (("below", f.low), ("above", f.high))]
+    at["flag_grid"] = len(names)
+    names.append("position outside the pose grid, TCP error of its border")
+    at["flag_step"] = len(names)
+    names += [f"substep shorter than the certified {shortest:g} s", f"step longer than the certified {step:g} s"]
+    return at, names
+
+
+def _margin(low: float, high: float) -> float:
+    """Values at a bound stay inside in spite of rounding, as in `twin.rom.drive`."""
+    return 1e-9 * max((abs(v) for v in (low, high) if np.isfinite(v)), default=0.0)

@@ -1,0 +1,1 @@
+"""The runtime as a Functional Mock-up Unit."""

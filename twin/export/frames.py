@@ -1,0 +1,170 @@
+"""Frames of a result for ParaView: the surface by the artefact, or the volume by the full model stepped again.
+
+An artefact holds the temperatures of the surface, not its displacements: the machine stands where its axes are,
+undeformed. With the full model at hand (`--field`) every node has its temperature and its displacement.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from twin.errors import TwinError
+from twin.export.options import ExportOptions
+from twin.ordinary import ordinary
+from twin.rom.artefact import Artefact
+from twin.rom.hdf5_file import strings
+from twin.rom.tcp import by_body
+from twin.run.results import FORMAT
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The machine at one time."""
+
+    time: float  # s since the start of the run
+    points: np.ndarray  # (n, 3) m, axes where they are, undeformed
+    data: dict[str, np.ndarray]  # temperature (n,) degC; displacement (n, 3) m of volumes
+
+
+@dataclass(frozen=True)
+class Frames:
+    """A series: the same cells at every time."""
+
+    cell_type: str  # as meshio names it: "triangle", "tetra10"
+    cells: np.ndarray  # (c, k) numbers of points
+    count: int
+    frames: Iterator[Frame]
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """What a result says of its times."""
+
+    time: np.ndarray  # (n + 1,) s
+    states: np.ndarray  # (n + 1, N)
+    axes: tuple[str, ...]
+    position: np.ndarray  # (n + 1, n_axes) m
+    chosen: np.ndarray  # rows that become frames
+    folder: Path
+
+
+def frames_of(artefact: Artefact, options: ExportOptions) -> Frames:
+    """The series that the options ask for.
+
+    Raises TwinError where no result is named or the machine has no meshes, ArtefactError for `field` where the machine
+    that the artefact was built from is gone.
+    """
+    if not artefact.fields:
+        raise TwinError("the artefact has no surface: a lumped machine", artefact.model.name, "use --format json")
+    stored = _stored(artefact, options)
+    return _volume(artefact, stored) if options.field else _surface(artefact, stored)
+
+
+def _stored(artefact: Artefact, options: ExportOptions) -> _Stored:
+    remedy = "name the folder of `twin run -o`, made with this artefact"
+    if options.result is None:
+        raise TwinError("this format is of a result", "--result", remedy)
+    path = Path(options.result)
+    path = path / "result.h5" if path.is_dir() else path
+    try:
+        with h5py.File(ordinary(path), "r") as f:
+            if f.attrs.get("format") != FORMAT:
+                raise TwinError("not a result of `twin run`", str(path), remedy)
+            if f.attrs["artefact"] != artefact.digest:
+                raise TwinError("a result of another artefact", str(path), remedy)
+            time = f["time"][...]
+            chosen = np.unique(np.linspace(0, len(time) - 1, min(options.frames, len(time))).round().astype(int))
+            return _Stored(time, f["states"][...], strings(f["axis"]), f["position"][...], chosen, path.parent)
+    except (OSError, KeyError) as e:
+        raise TwinError("not a result of `twin run`", str(path), remedy) from e
+
+
+def _surface(artefact: Artefact, stored: _Stored) -> Frames:
+    from twin.machine.description import Machine
+
+    machine = Machine.model_validate(tomllib.loads(artefact.description))
+    order = [body.name for body in artefact.model.bodies]
+    sizes = np.cumsum([0, *(len(f.nodes) for f in artefact.fields)])
+    triangles = np.vstack([f.triangles + first for f, first in zip(artefact.fields, sizes, strict=False)])
+
+    def made() -> Iterator[Frame]:
+        for row in stored.chosen:
+            x = by_body(artefact.model, stored.states[row])
+            warm = [f.basis.astype(float) @ x[order.index(f.body)] for f in artefact.fields]
+            points = _placed(machine, [(f.body, f.nodes) for f in artefact.fields], stored, row)
+            temperature = artefact.model.reference_temperature + np.concatenate(warm)
+            yield Frame(float(stored.time[row] - stored.time[0]), points, {"temperature": temperature})
+
+    return Frames("triangle", triangles, len(stored.chosen), made())
+
+
+def _volume(artefact: Artefact, stored: _Stored) -> Frames:
+    from twin.build.displacement_field import DisplacementField
+    from twin.build.pipeline import full_model
+    from twin.build.product import machine_of
+    from twin.build.stepper import CoupledStepper
+    from twin.logs.read import read_run
+    from twin.logs.signals import signal_values
+    from twin.rom.drive import evaluate
+
+    machine = machine_of(artefact, None, artefact.model.name)
+    run = read_run(_run_folder(stored.folder))
+    full = full_model(machine)
+    load, dt = full.thermal.load_model, float(stored.time[1] - stored.time[0])
+    drive = evaluate(load, run.loads.time, signal_values(run, load.signals), dt, int(stored.chosen[-1]))
+    stepper = CoupledStepper(full.thermal)
+    deformed = DisplacementField(machine, full.bodies, full.structure)  # type: ignore[arg-type]  # it has meshes
+    start = by_body(artefact.model, stored.states[0])
+    uniform = [float(b.energy @ x / (b.energy @ b.one)) for b, x in zip(artefact.model.bodies, start, strict=True)]
+    x = [u * b.one for u, b in zip(uniform, full.thermal.bodies, strict=True)]
+    sizes = np.cumsum([0, *(b.n for b in full.bodies)])
+    cells = np.vstack([b.elements + first for b, first in zip(full.bodies, sizes, strict=False)])
+
+    def frame(row: int, x: list[np.ndarray]) -> Frame:
+        positions = dict(zip(stored.axes, stored.position[row], strict=True))
+        linear = {axis: positions[axis] for axis in full.structure.axes}
+        points = _placed(machine, [(b.name, b.nodes) for b in full.bodies], stored, row)
+        nodal = [state[: b.n] for state, b in zip(x, full.bodies, strict=True)]  # tanks come after the nodes
+        temperature = full.thermal.reference_temperature + np.concatenate(nodal)
+        data = {"temperature": temperature, "displacement": np.vstack(deformed(linear, x))}
+        return Frame(float(stored.time[row] - stored.time[0]), points, data)
+
+    def made() -> Iterator[Frame]:
+        wanted = set(stored.chosen.tolist())
+        if 0 in wanted:
+            yield frame(0, x)
+        for step, now, _ in stepper.run(drive, x, 1):
+            if step + 1 in wanted:
+                yield frame(step + 1, now)
+
+    return Frames("tetra10", cells, len(stored.chosen), made())
+
+
+def _run_folder(folder: Path) -> Path:
+    """The run whose loads a result is of, as its summary.json names it."""
+    try:
+        named = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["run"]
+    except (OSError, ValueError, KeyError) as e:
+        remedy = "run the artefact again, with `twin run -o`"
+        raise TwinError("does not say which run it is of", str(folder / "summary.json"), remedy) from e
+    if not Path(named).is_dir():
+        remedy = "call from the folder where `twin run` was called"
+        raise TwinError(f"the run '{named}' is not here", str(folder / "summary.json"), remedy)
+    return Path(named)
+
+
+def _placed(machine: object, bodies: list[tuple[str, np.ndarray]], stored: _Stored, row: int) -> np.ndarray:
+    """Points (n, 3) [m] of all bodies with the axes where they are."""
+    from twin.machine.description import Machine
+    from twin.machine.kinematics import displacement, linear_axes
+
+    assert isinstance(machine, Machine)
+    positions = {a: p for a, p in zip(stored.axes, stored.position[row], strict=True) if a in linear_axes(machine)}
+    return np.vstack([nodes + displacement(machine, name, positions) for name, nodes in bodies])
