@@ -13,7 +13,7 @@ from twin.build.cache import arrays_hash, cached, machine_hash
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
 from twin.diagnose.catalogue import FAMILIES, VERSION, Family
-from twin.diagnose.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.channels_check import broken_sensors, refuted_sensors, stuck_sensors
 from twin.diagnose.coarse import too_coarse
 from twin.diagnose.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.diagnosis import Cause, Diagnosis, Series, Unknown, Verdict
@@ -160,7 +160,8 @@ def diagnose(
     names = run_names([*runs, *sealed])
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
-    faults += broken_sensors(usable, sensors, names[: len(runs)])
+    usable, refuted = refuted_sensors(usable, sensors, names[: len(runs)])
+    faults += [*broken_sensors(usable, sensors, names[: len(runs)]), *refuted]
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from twin.diagnose.channels_check import REFUTED
 from twin.diagnose.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival
 from twin.diagnose.report_numbers import interval_and_unit, number, quantity, size_words
 from twin.diagnose.report_recalibration import left_words, moved_words
@@ -269,6 +270,8 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
             "broken": f"Its reading is noise, or at a limit, from {number(at / 3600.0)} h on",
         }[c.history]
         return f"{what}; no statistic is needed to see that."
+    if c.history.endswith(REFUTED):
+        return f"All other channels refute it: a statistic of {number(c.statistic)}, where {number(c.threshold)} is needed."
     if c.threshold == d.thresholds.get(c.family, c.threshold):
         return evidence_sentence(d, c.family, c.statistic, c.threshold)
     # a declared number: both are squares, of its distance from the declared one

@@ -1,0 +1,95 @@
+"""All that is wrong with the temperature channels of several runs, and the runs without those readings."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.calibrate.channels.finding import Finding, What
+from twin.calibrate.channels.readings import emptied, readings
+from twin.calibrate.channels.refute import refuted
+from twin.logs.faults.fault import Fault
+from twin.logs.run import Run
+
+# Of normal noise: how far a reading typically (median) departs from the mean of its neighbours, in standard deviations
+_DEPARTS = 0.6745 * 1.5**0.5
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is wrong with the channels of runs."""
+
+    findings: tuple[Finding, ...]  # single channels, in the order of what is surest
+    splices: tuple[tuple[int, Fault], ...]  # number of the run, and from where on its rows are of another time
+
+
+def judge(runs: Sequence[Run], within: Collection[str] | None = None) -> Judgement:
+    """Find broken and stuck channels and splices in each run, then what all channels together say of each of them.
+
+    within: columns that may be judged, all temperatures by default; all take part as witnesses. Nothing is changed.
+    """
+    return judged([emptied(run) for run in runs], within)
+
+
+def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[str] | None = None) -> Judgement:
+    """The same, of what `emptied` has made of each run."""
+    plain = [run for run, _ in parts]
+    own = [_own(k, f, channel) for k, (_, faults) in enumerate(parts) for f in faults if f.kind != "splice"
+           for channel in f.channels]  # fmt: skip
+    splices = tuple((k, f) for k, (_, faults) in enumerate(parts) for f in faults if f.kind == "splice")
+    table = readings(plain)
+    found = [*own, *(refuted(table) if table is not None else [])]
+    found = [f for f in found if within is None or any(c in within for c in f.channels)]
+    return Judgement(tuple(found), splices)
+
+
+def _own(run: int, f: Fault, channel: str) -> Finding:
+    what: What = "noise" if f.kind == "noise" else "rail" if f.kind == "rail" else "stuck"
+    size = f.size / _DEPARTS if what == "noise" else f.size if what == "rail" else f.last_time - f.first_time
+    return Finding(what, (channel,), (run,), f.first_time, f.last_time, size, (size, size), np.inf)
+
+
+def set_aside(runs: Sequence[Run], findings: Sequence[Finding]) -> list[Run]:
+    """The runs without the readings that findings are about: of a leap or a swapped pair from its start on, of an offset
+    or a drift throughout its run. Nothing is corrected."""
+    return [_without(run, k, [f for f in findings if k in f.runs]) for k, run in enumerate(runs)]
+
+
+def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
+    if run.temperatures is None or not found:
+        return run
+    time = run.temperatures.time
+    columns = dict(run.temperatures.columns)
+    for f in found:
+        wrong = np.ones(len(time), dtype=bool)
+        if f.what not in ("offset", "drift") and number == f.runs[0]:
+            wrong = time >= f.start
+        if f.what in ("noise", "rail", "stuck"):
+            wrong &= time <= f.end
+        for name in f.channels:
+            if name in columns:
+                columns[name] = np.where(wrong, np.nan, columns[name])
+    return replace(run, temperatures=replace(run.temperatures, columns=columns))
+
+
+def words(f: Finding, names: Sequence[str]) -> str:
+    """As "'PT05' reads 5.12 K (4.9 to 5.3) too much in 20200701 from 2.00 h on, by all other channels". names: of runs."""
+    where = ", ".join(names[k] for k in f.runs)
+    if f.what in ("leap", "swapped") and f.start > 0.0:
+        where += f" from {f.start / 3600.0:.2f} h on"
+    during = f"{where} from {f.start / 3600.0:.2f} to {f.end / 3600.0:.2f} h"
+    if f.what == "swapped":
+        return f"'{f.channels[0]}' and '{f.channels[1]}' have each other's names in {where}, by all other channels"
+    name = f"'{f.channels[0]}'"
+    if f.what == "noise":
+        return f"{name} is noise of {f.size:.3g} K in {during}"
+    if f.what == "rail":
+        return f"{name} rests at {f.size:.4g} degC in {during}"
+    if f.what == "stuck":
+        return f"{name} stands still while others go on in {during}"
+    low, high = (f"{abs(v):.3g}" for v in sorted(f.interval, key=abs))
+    much = f"{abs(f.size):.3g} K ({low} to {high}) too {'much' if f.size > 0.0 else 'little'}"
+    verb = f"drifts to {much} at the end of" if f.what == "drift" else f"reads {much} in"
+    return f"{name} {verb} {where}, by all other channels"
