@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.calibrate.channels.finding import Finding, What
-from twin.calibrate.channels.readings import emptied, readings
+from twin.calibrate.channels.readings import EMPTIED, emptied, readings
 from twin.calibrate.channels.refute import refuted
 from twin.logs.faults.fault import Fault
 from twin.logs.run import Run
@@ -23,6 +23,7 @@ class Judgement:
 
     findings: tuple[Finding, ...]  # single channels, in the order of what is surest
     splices: tuple[tuple[int, Fault], ...]  # number of the run, and from where on its rows are of another time
+    leaps: tuple[tuple[int, str], ...]  # number of the run and channel of every leap, once for each
 
 
 def judge(runs: Sequence[Run], within: Collection[str] | None = None) -> Judgement:
@@ -36,13 +37,14 @@ def judge(runs: Sequence[Run], within: Collection[str] | None = None) -> Judgeme
 def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[str] | None = None) -> Judgement:
     """The same, of what `emptied` has made of each run."""
     plain = [run for run, _ in parts]
-    own = [_own(k, f, channel) for k, (_, faults) in enumerate(parts) for f in faults if f.kind != "splice"
-           for channel in f.channels]  # fmt: skip
-    splices = tuple((k, f) for k, (_, faults) in enumerate(parts) for f in faults if f.kind == "splice")
+    faults = [(k, f) for k, (_, found) in enumerate(parts) for f in found]
+    own = [_own(k, f, channel) for k, f in faults if f.kind in EMPTIED for channel in f.channels]
+    splices = tuple((k, f) for k, f in faults if f.kind == "splice")
+    leaps = tuple((k, channel) for k, f in faults if f.kind == "leap" for channel in f.channels)
     table = readings(plain)
     found = [*own, *(refuted(table) if table is not None else [])]
     found = [f for f in found if within is None or any(c in within for c in f.channels)]
-    return Judgement(tuple(found), splices)
+    return Judgement(tuple(found), splices, leaps)
 
 
 def _own(run: int, f: Fault, channel: str) -> Finding:

@@ -14,7 +14,7 @@ from twin.logs.run import Run, Table
 BINS = (600.0, 900.0, 1800.0, 3600.0)  # s: the first that leaves
 MOST = 200  # rows or less: a judgement takes some seconds then
 FEWEST = 12  # rows with this many bins: less than an hour says nothing about how channels belong together
-_EMPTIED: tuple[Kind, ...] = ("noise", "rail", "stuck")  # readings that are none, found in the run itself
+EMPTIED: tuple[Kind, ...] = ("noise", "rail", "stuck")  # readings that are none, found in the run itself
 _LEAST = 1800.0  # s that a channel must stand still to be called stuck
 _QUIET = 0.03  # K: no mean over a bin is better known
 _NORMAL = 1.4826  # from a median of magnitudes to a standard deviation
@@ -41,17 +41,15 @@ class Readings:
 
 def emptied(run: Run) -> tuple[Run, tuple[Fault, ...]]:
     """The run without readings that are noise, rest at a limit or stand still, and without all rows after a splice; and
-    the faults that this is for. Files and other tables are left as they are."""
+    all faults of its temperatures, leaps too. Files and other tables are left as they are."""
     table = run.temperatures
     if table is None:
         return run, ()
-    found = tuple(
-        f for f in faults_of(run)
-        if f.table == "temperatures" and (f.kind == "splice" or f.kind in _EMPTIED and _lasts(f))
-    )  # fmt: skip
+    found = tuple(f for f in faults_of(run) if f.table == "temperatures" and _lasts(f))
     columns = {name: np.array(values, dtype=float) for name, values in table.columns.items()}
     for f in found:
-        for name in columns if f.kind == "splice" else f.channels:
+        names = columns if f.kind == "splice" else f.channels if f.kind in EMPTIED else ()
+        for name in names:
             columns[name][f.first_row : f.last_row + 1] = np.nan
     return replace(run, temperatures=replace(table, columns=columns)), found
 
