@@ -1,8 +1,8 @@
 """One temperature channel of a real lathe damaged in two or three of its runs: is it named, and its size told.
 
 Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. Thresholds were chosen on days 1, 3, 5 ...;
-the others were judged once. `python -m benchmarks.lathe_channels 0` judges the first half alone, `... 1 detail` the other,
-with every trial that went wrong.
+the others were judged once. `python -m benchmarks.lathe_channels 0 12` takes the first half alone and 12 trials of each
+kind; `... 1 34 detail` tells every trial of the other that went wrong.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from twin.inject.damage.kinds import damaged
 from twin.logs.faults.fault import Fault
 from twin.logs.run import Run
 
-TRIALS = 34  # of each kind: 204 in all
-CLEAN = 100
+TRIALS = 34  # of each kind: 204 in all, and three times as many clean pairs
 MOTORS = ("Spindle Motor", "X Motor", "Z Motor")  # of 1 K resolution: witnesses, not among the 21
 RIGHT = 0.2  # of a size
 SEEN = 2.0  # K rms by which two swapped channels differ, and
@@ -43,7 +42,8 @@ class Trial:
 
 
 def main() -> None:
-    halves = [int(sys.argv[1])] if len(sys.argv) > 1 and sys.argv[1].isdigit() else [0, 1]
+    given = [int(a) for a in sys.argv if a.isdigit()]
+    halves, trials = given[:1] or [0, 1], given[1] if len(given) > 1 else TRIALS
     detail = "detail" in sys.argv
     for half in halves:
         paths = lathe_days()[half::2]
@@ -53,19 +53,19 @@ def main() -> None:
         runs = [lathe_run(p) for p in paths]
         print(f"   {('thresholds chosen on', 'judged on')[half]} {len(runs)} days")
         rng = np.random.default_rng(half)
-        clean(rng, runs, detail)
-        print(f"   {TRIALS} trials each{'':26}channel   size  others blamed")
+        clean(np.random.default_rng(100 + half), runs, 3 * trials, detail)
+        print(f"   {trials} trials each{'':26}channel   size  others blamed")
         total = np.zeros(4, dtype=int)
         for name, draw in KINDS.items():
-            figures = row(rng, runs, draw, detail)
+            figures = row(rng, runs, draw, trials, detail)
             total += figures if name != ALWAYS else 0
             shown(name, figures)
         shown(f"all but the one that says '{ALWAYS}'", total)
 
 
-def clean(rng: np.random.Generator, runs: Sequence[Run], detail: bool) -> None:
+def clean(rng: np.random.Generator, runs: Sequence[Run], number: int, detail: bool) -> None:
     """Pairs of days without damage: how many have a channel named."""
-    pairs = [tuple(int(k) for k in rng.choice(len(runs), 2, replace=False)) for _ in range(CLEAN)]
+    pairs = [tuple(int(k) for k in rng.choice(len(runs), 2, replace=False)) for _ in range(number)]
     named = 0
     for pair in pairs:
         told = judged([alone(runs[k]) for k in pair])
@@ -75,16 +75,16 @@ def clean(rng: np.random.Generator, runs: Sequence[Run], detail: bool) -> None:
         for k, f in told.splices:
             if detail:
                 print(f"      {runs[pair[k]].provenance}: splice from line {f.first_row + 2}")
-    print(f"   {CLEAN} clean pairs: a channel named in {named}")
+    print(f"   {number} clean pairs: a channel named in {named}")
 
 
 def row(
     rng: np.random.Generator, runs: Sequence[Run], draw: Callable[[np.random.Generator, Sequence[Run]], Trial | None],
-    detail: bool,
+    trials: int, detail: bool,
 ) -> np.ndarray:  # fmt: skip
     """Trials, channel right, size right, trials with another channel named."""
     figures = np.zeros(4, dtype=int)
-    while figures[0] < TRIALS:
+    while figures[0] < trials:
         trial = draw(rng, runs)
         if trial is None:
             continue

@@ -32,13 +32,13 @@ def exchanges(
     """The likeliest exchange of two channels that is worth a name, None where there is none. predictions: of every channel
     that may be one of them, by all others but those that are gone.
 
-    All pairs and onsets are looked at first with the pair itself among its predictors, the best then without.
+    All pairs and onsets are looked at first at one size of the discrepancy, the best then closely.
     """
     whole = [c for c in predictions if np.isfinite(r.values[:, c]).all()]
     if len(whole) < 3:
         return None
     spans = _spans(r)
-    gains = {c: _gains(r, c, predictions[c].precision(usual), predictions[c].above, whole, spans) for c in whole}
+    gains = {c: _gains(r, c, predictions[c], usual, whole, spans) for c in whole}
     found = []
     for i, a in enumerate(whole):
         for b in whole[i + 1 :]:
@@ -48,7 +48,7 @@ def exchanges(
             found.append((float(both[s][onset]), (a, b), spans[s], onset))
     best: Exchange | None = None
     for rough, pair, span, onset in sorted(found, key=lambda f: -f[0])[:_TRIED]:
-        if rough <= 0.0:
+        if rough < THRESHOLD / 4.0:
             break
         rows = span.rows[onset:]
         apart = float(np.sqrt(np.mean((r.values[rows, pair[0]] - r.values[rows, pair[1]]) ** 2)))
@@ -81,27 +81,38 @@ def _spans(r: Readings) -> list[_Span]:
 
 
 def _gains(
-    r: Readings, channel: int, P: np.ndarray, above: np.ndarray, partners: Sequence[int], spans: Sequence[_Span]
+    r: Readings, channel: int, prediction: Prediction, usual: float, partners: Sequence[int], spans: Sequence[_Span]
 ) -> dict[int, list[np.ndarray]]:
     """Per partner and span: twice the gain in log-likelihood (onsets,) of one channel if it showed the partner.
 
     With D the difference of both and P the precision, -2 Dᵀ P y - Dᵀ P D over the rows from the onset on: for all
-    onsets at once by sums from the end. A swap that always is cannot be seen in the runs themselves.
+    onsets at once by sums from the end. The partner is no predictor then: its column x leaves the covariance by the
+    formula of Sherman and Morrison. A swap that always is cannot be seen in the runs themselves.
     """
-    Py = P @ above
+    y, P = prediction.above, prediction.precision(usual)
     others = [c for c in partners if c != channel]
     D = r.values[:, others] - r.values[:, [channel]]
+    x = D + y[:, None]  # above the median of the others, as y is
+    Px = P @ x
+    left = prediction.weight / np.maximum(1.0 - prediction.weight * np.einsum("np,np->p", x, Px), 1e-9)
+    Py = (P @ y)[:, None] + left * Px * (y @ Px)
     result: dict[int, list[np.ndarray]] = {c: [] for c in others}
     for span in spans:
-        d, own = D[span.rows], P[np.ix_(span.rows, span.rows)]
-        square = d * (2.0 * np.triu(own, 1) @ d + np.diag(own)[:, None] * d)
-        gain = np.cumsum((-2.0 * d * Py[span.rows, None] - square)[::-1], axis=0)[::-1][: span.onsets]
+        d, s, own = D[span.rows], Px[span.rows], P[np.ix_(span.rows, span.rows)]
+        above = np.triu(own, 1) @ d + left * s * (_from_the_end(s * d) - s * d)
+        square = d * (2.0 * above + (np.diag(own)[:, None] + left * s**2) * d)
+        gain = _from_the_end(-2.0 * d * Py[span.rows] - square)[: span.onsets]
         if len(span.runs) == r.runs:
             time = r.time[span.rows[: span.onsets]]
             gain[time - time[0] < BEFORE] = -np.inf
         for k, c in enumerate(others):
             result[c].append(gain[:, k])
     return result
+
+
+def _from_the_end(values: np.ndarray) -> np.ndarray:
+    """Sums over each row and all that follow (m, p)."""
+    return np.cumsum(values[::-1], axis=0)[::-1]
 
 
 def _exact(r: Readings, pair: tuple[int, int], rows: np.ndarray, usual: float, gone: tuple[int, ...]) -> float:

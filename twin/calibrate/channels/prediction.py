@@ -55,6 +55,7 @@ class Prediction:
     to: np.ndarray  # (m, m) 1/K: Qᵀ L⁻¹
     slow: np.ndarray  # (m,) variances of what no mix gives, at size 1, in units of the known part
     volume: float  # log det L
+    weight: float  # variance of the weight of each other channel
 
     @classmethod
     def of(cls, r: Readings, channel: int, without: tuple[int, ...] = ()) -> Prediction:
@@ -67,12 +68,13 @@ class Prediction:
         run, time = r.run[rows], r.time[rows]
         same = (run[:, None] == run[None, :]).astype(float)
         local = same * np.exp(-np.abs(time[:, None] - time[None, :]) / LASTS)
-        known = MIX**2 / len(others) * X @ X.T + CONSTANT**2 + r.noise[channel] ** 2 * np.eye(len(rows))
+        weight = MIX**2 / len(others)
+        known = weight * X @ X.T + CONSTANT**2 + r.noise[channel] ** 2 * np.eye(len(rows))
         L = np.linalg.cholesky(known)
         inverse = solve_triangular(L, np.eye(len(rows)), lower=True)
         slow, Q = np.linalg.eigh(inverse @ (PER_RUN**2 * same + LOCAL**2 * local) @ inverse.T)
         volume = float(np.log(np.diag(L)).sum())
-        return cls(rows, r.values[rows, channel] - middle, Q.T @ inverse, np.maximum(slow, 0.0), volume)
+        return cls(rows, r.values[rows, channel] - middle, Q.T @ inverse, np.maximum(slow, 0.0), volume, weight)
 
     def likelihoods(self) -> np.ndarray:
         """Logarithms, at every one of SIZES."""

@@ -64,7 +64,7 @@ def readings(runs: Sequence[Run]) -> Readings | None:
     A bin counts where it has half of its rows; a row of the table where half of the channels are known.
     """
     tables = [(k, run.temperatures) for k, run in enumerate(runs) if run.temperatures is not None]
-    names = tuple(dict.fromkeys(n for _, t in tables for n, unit in t.units.items() if unit == "degC"))
+    names = tuple(dict.fromkeys(n for _, t in tables for n in t.columns if t.units[n] == "degC"))
     span = sum(float(np.ptp(t.time)) for _, t in tables if len(t.time))
     length = next((b for b in BINS if span / b <= MOST), BINS[-1])
     parts = [(k, *_binned(t, names, length)) for k, t in tables]
