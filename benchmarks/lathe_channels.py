@@ -1,8 +1,8 @@
 """One temperature channel of a real lathe damaged in two or three of its runs: is it named, and its size told.
 
-Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. Thresholds were chosen on days 1, 3, 5 ...;
-the others were judged once. `python -m benchmarks.lathe_channels 0 12` takes the first half alone and 12 trials of each
-kind; `... 1 34 detail` tells every trial of the other that went wrong.
+Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. Thresholds were chosen on days 1, 3, 5
+...; the others were judged once. `python -m benchmarks.lathe_channels 0 12` takes the first half alone and 12 trials of
+each kind; `... 1 34 detail` tells every trial of the other that went wrong.
 """
 
 from __future__ import annotations
@@ -139,7 +139,9 @@ def _size(rng: np.random.Generator, low: float, high: float) -> float:
 
 def _trial(runs: list[Run], damages: dict[int, Damage], size: float, kind: str, channels: tuple[str, ...]) -> Trial:
     days = tuple(("*" if k in damages else "") + r.provenance for k, r in enumerate(runs))
-    return Trial([damaged(r, damages[k]) if k in damages else r for k, r in enumerate(runs)], days, kind, channels, size)
+    return Trial(
+        [damaged(r, damages[k]) if k in damages else r for k, r in enumerate(runs)], days, kind, channels, size
+    )
 
 
 def _breaks(rng: np.random.Generator, runs: Sequence[Run]) -> Trial:

@@ -73,7 +73,10 @@ def _channels(rows: Sequence[Mapping[str, Any]], most: int) -> list[str]:
     shown = [*marked[:most], *worst[: max(0, most - len(marked))]]
     width = max(len(r["channel"]) for r in shown)
     long = max(len(r["run"]) for r in shown)
-    lines = ["", f"{'channel':<{width}} {'run':<{long}} {'rms':>9} {'kept':>6} {'leaps':>6}  ({len(rows)} in the report)"]
+    lines = [
+        "",
+        f"{'channel':<{width}} {'run':<{long}} {'rms':>9} {'kept':>6} {'leaps':>6}  ({len(rows)} in the report)",
+    ]
     for r in shown:
         rms = "" if r["rms"] is None else f"{r['rms']:.3f} K" if r["unit"] == "K" else f"{1e6 * r['rms']:.2f} um"
         lines.append(

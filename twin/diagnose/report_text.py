@@ -271,7 +271,7 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
         }[c.history]
         return f"{what}; no statistic is needed to see that."
     if c.history.endswith(REFUTED):
-        return f"All other channels refute it: a statistic of {number(c.statistic)}, where {number(c.threshold)} is needed."
+        return f"All other channels refute it: a statistic of {number(c.statistic)}; {number(c.threshold)} is needed."
     if c.threshold == d.thresholds.get(c.family, c.threshold):
         return evidence_sentence(d, c.family, c.statistic, c.threshold)
     # a declared number: both are squares, of its distance from the declared one

@@ -157,9 +157,10 @@ def calibrate(
     """Fit the parameters of a model to the temperatures and TCP deviations measured in runs.
 
     Temperatures are first judged by each other, over all runs: what they refute is not used, and told in `channels` of
-    the report. only, hold: parameters to fit and to leave as they are, each a path or a pattern such as "sources.*". Bounded least
-    squares with priors; an interrupt keeps the best values so far. on_iteration, on_window: told of each as it comes.
-    Raises LogError for runs that hold nothing to compare, TwinError for parameters and sensors that there are not.
+    the report. only, hold: parameters to fit and to leave as they are, each a path or a pattern such as "sources.*".
+    Bounded least squares with priors; an interrupt keeps the best values so far. on_iteration, on_window: told of each
+    as it comes. Raises LogError for runs that hold nothing to compare, TwinError for parameters and sensors that there
+    are not.
 
     >>> import twin
     >>> model = twin.build("tests/machines/spindle", options=twin.BuildOptions(held_out=4))

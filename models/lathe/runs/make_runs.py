@@ -1,10 +1,12 @@
-"""Run folders from the measured days of a lathe: `python make_runs.py DATA -o FOLDER [--days 20200701 ...]`. Needs numpy
-only. Without DATA it writes `warm_up` beside this file: synthetic loads, for commands that need a run and no measurement.
+"""Run folders from the measured days of a lathe: `python make_runs.py DATA -o FOLDER [--days 20200701 ...]`.
 
-DATA holds one CSV file a day: `Time` [min], 24 temperatures [degC], `Disp. X` and `Disp. Z` [um], a row about every 36 s.
-Each becomes a run folder of its name. The spindle speed was not logged: it follows PLAN. All temperatures go to
-temperatures.csv, those that the description uses as air to loads.csv as well; a displacement every five minutes to tcp.csv.
-Nothing is left out or repaired: `twin check` says what is wrong with a day.
+Needs numpy only. Without DATA it writes `warm_up` beside this file: synthetic loads, for commands that need a run and
+no measurement.
+
+DATA holds one CSV file a day: `Time` [min], 24 temperatures [degC], `Disp. X` and `Disp. Z` [um], a row about every 36
+s. Each becomes a run folder of its name. The spindle speed was not logged: it follows PLAN. All temperatures go to
+temperatures.csv, those that the description uses as air to loads.csv as well; a displacement every five minutes to
+tcp.csv. Nothing is left out or repaired: `twin check` says what is wrong with a day.
 """
 
 from __future__ import annotations
@@ -85,7 +87,9 @@ def read_day(path: Path) -> Day:
 
 def write_table(path: Path, columns: dict[str, np.ndarray], decimals: int) -> None:
     lines = [",".join(columns)]
-    lines += [",".join(f"{v + 0.0:.10g}" for v in row) for row in np.round(np.column_stack([*columns.values()]), decimals)]
+    lines += [
+        ",".join(f"{v + 0.0:.10g}" for v in row) for row in np.round(np.column_stack([*columns.values()]), decimals)
+    ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -138,7 +142,9 @@ def write_runs(data: Path, folder: Path, days: Sequence[str] = ()) -> list[Path]
     paths = {path.stem: path for path in sorted(data.glob("*.csv"))}
     missing = [day for day in days if day not in paths]
     if missing or not paths:
-        raise ValueError(f"{data}: no day {', '.join(missing) or 'at all'}; days are {', '.join(paths) or 'files DATE.csv'}")
+        raise ValueError(
+            f"{data}: no day {', '.join(missing) or 'at all'}; days are {', '.join(paths) or 'files DATE.csv'}"
+        )
     chosen = list(days) or list(paths)
     for day in chosen:
         write_run(folder / day, read_day(paths[day]))

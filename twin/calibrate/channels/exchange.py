@@ -29,8 +29,9 @@ class Exchange:
 def exchanges(
     r: Readings, predictions: Mapping[int, Prediction], usual: float, gone: tuple[int, ...] = ()
 ) -> Exchange | None:
-    """The likeliest exchange of two channels that is worth a name, None where there is none. predictions: of every channel
-    that may be one of them, by all others but those that are gone.
+    """The likeliest exchange of two channels that is worth a name, None where there is none.
+
+    predictions: of every channel that may be one of them, by all others but those that are gone.
 
     All pairs and onsets are looked at first at one size of the discrepancy, the best then closely.
     """

@@ -54,8 +54,10 @@ def _own(run: int, f: Fault, channel: str) -> Finding:
 
 
 def set_aside(runs: Sequence[Run], findings: Sequence[Finding]) -> list[Run]:
-    """The runs without the readings that findings are about: of a leap or a swapped pair from its start on, of an offset
-    or a drift throughout its run. Nothing is corrected."""
+    """The runs without the readings that findings are about. Nothing is corrected.
+
+    Of a leap or a swapped pair they go from its start on, of an offset or a drift throughout its run.
+    """
     return [_without(run, k, [f for f in findings if k in f.runs]) for k, run in enumerate(runs)]
 
 
@@ -77,7 +79,10 @@ def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
 
 
 def words(f: Finding, names: Sequence[str]) -> str:
-    """As "'PT05' reads 5.12 K (4.9 to 5.3) too much in 20200701 from 2.00 h on, by all other channels". names: of runs."""
+    """As "'PT05' reads 5.1 K (4.9 to 5.3) too much in monday from 2.00 h on, by all other channels".
+
+    names: of the runs.
+    """
     where = ", ".join(names[k] for k in f.runs)
     if f.what in ("leap", "swapped") and f.start > 0.0:
         where += f" from {f.start / 3600.0:.2f} h on"

@@ -1,11 +1,12 @@
 """One channel from all others: a Gaussian process whose mean is theirs, and what a fault would do to it.
 
-A machine that is warmer throughout is so in every channel, so a channel is compared with the median of the others. Above
-that, it is a mix of how they differ from their median, of unknown weights, plus a constant, plus what no mix gives: one
-constant per run and a slow, local part. All of these are Gaussian (a linear kernel, constants, an exponential one), so
-that nothing is fitted but the size of the last two, by the likelihood: Rasmussen, Williams, Gaussian Processes for
-Machine Learning, 2006, sections 2.7 (explicit columns: the faults), 4.2 and 5.4.1. One size is shared by all channels
-(their median), so that a channel at fault cannot call its fault usual: each may depart from it, at a price.
+A machine that is warmer throughout is so in every channel, so a channel is compared with the median of the others.
+Above that, it is a mix of how they differ from their median, of unknown weights, plus a constant, plus what no mix
+gives: one constant per run and a slow, local part. All of these are Gaussian (a linear kernel, constants, an
+exponential one), so that nothing is fitted but the size of the last two, by the likelihood: Rasmussen, Williams,
+Gaussian Processes for Machine Learning, 2006, sections 2.7 (explicit columns: the faults), 4.2 and 5.4.1. One size is
+shared by all channels (their median), so that a channel at fault cannot call its fault usual: each may depart from it,
+at a price.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ def predictors(r: Readings, channel: int, without: tuple[int, ...] = ()) -> list
 
 @dataclass(frozen=True)
 class Prediction:
-    """One channel, in the m rows in which it is known, in coordinates in which its covariance is diagonal at every size.
+    """One channel, in the m rows in which it is known, in coordinates in which its covariance is diagonal at every
+    size.
 
     With known = L Lᵀ and L⁻¹ slow L⁻ᵀ = Q diag(slow) Qᵀ, the covariance of Qᵀ L⁻¹ y is 1 + size² slow.
     """

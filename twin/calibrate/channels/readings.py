@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -89,7 +90,7 @@ def _binned(table: Table, names: Sequence[str], length: float) -> tuple[np.ndarr
     edges = np.searchsorted(index, np.arange(int(index.max()) + 2))
     usual = float(np.median(np.diff(edges)))
     result = np.full((len(edges) - 1, len(names)), np.nan)
-    for b, (first, last) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for b, (first, last) in enumerate(pairwise(edges)):
         ordered = np.sort(values[first:last], axis=0)  # NaN last
         known = np.isfinite(ordered).sum(axis=0)
         enough = (2 * known >= last - first) & (2 * (last - first) >= usual) & (known > 0)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from twin.calibrate.channels.finding import Finding
 from twin.calibrate.channels.exchange import Exchange, exchanges
+from twin.calibrate.channels.finding import Finding
 from twin.calibrate.channels.prediction import Prediction, Scan, predictors, usual_size
 from twin.calibrate.channels.readings import Readings
 from twin.calibrate.channels.shapes import Histories, History, Shape, histories
 
-# Of a statistic, for a name. In clean pairs and triples of every other day of a lathe leaps and drifts of LEAST reach 57
-# where the machine itself begins to heat beside one sensor; offsets, of which there are few histories, 10
-THRESHOLDS: dict[Shape, float] = {"leap": 60.0, "drift": 60.0, "offset": 25.0}
+# Of a statistic, for a name. In clean pairs and triples of every other day of a lathe leaps and drifts of LEAST reach
+# 57 where the machine itself begins to heat beside one sensor; offsets, of which there are few histories, 10
+THRESHOLDS: dict[Shape, float] = {"leap": 70.0, "drift": 70.0, "offset": 25.0}
 # Of an offset in all runs: a place that is always warm looks alike, and beside the mix nothing says how warm one may be
 ALWAYS = 60.0
 LEAST = 1.5  # K that are worth a name: a thermocouple of class 1 may be off by that (IEC 60584-1)
@@ -69,12 +69,16 @@ def shape_of(f: Finding) -> Shape:
 
 def _suspects(r: Readings, predictions: Mapping[int, Prediction], of: Histories, usual: float) -> list[Suspect]:
     """Channels with a fault that is worth a name, the most likely first."""
-    found = [s for s in (_suspect(r, c, p.scan(of.columns, usual), of) for c, p in predictions.items()) if s is not None]
+    found = [
+        s for s in (_suspect(r, c, p.scan(of.columns, usual), of) for c, p in predictions.items()) if s is not None
+    ]
     return sorted(found, key=lambda s: -s.statistic)
 
 
 def _suspect(r: Readings, channel: int, scan: Scan, of: Histories) -> Suspect | None:
-    least = np.array([ALWAYS if h.shape == "offset" and len(h.runs) == r.runs > 1 else THRESHOLDS[h.shape] for h in of.of])
+    least = np.array(
+        [ALWAYS if h.shape == "offset" and len(h.runs) == r.runs > 1 else THRESHOLDS[h.shape] for h in of.of]
+    )
     worth = np.where((np.abs(scan.amplitude) >= LEAST) & (scan.statistic >= least), scan.statistic, 0.0)
     k = int(np.argmax(worth))
     if worth[k] == 0.0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,8 @@ TCP = ("dx", "dy", "dz")
 def channel_table(fit: Fit, judgement: Judgement | None) -> list[dict[str, Any]]:
     """A row per run and channel: rms [K or m], share of weight kept, leaps, and what is wrong with it, in words.
 
-    A reading that was set aside, or is missing, keeps nothing; one in an hour that fits far worse than the channel's best
-    keeps the ratio of their weights.
+    A reading that was set aside, or is missing, keeps nothing; one in an hour that fits far worse than the channel's
+    best keeps the ratio of their weights.
     """
     names = [run.name for run in fit.problem.runs]
     rows = []

@@ -5,8 +5,9 @@ reflective method (Branch, Coleman, Li, SIAM J. Sci. Comput. 21, 1999; scipy.opt
 through the window model. Paper 000, Fig. 5: compare at the sensors, change parameters inside physical bounds, stop at
 the minimum or at the maximum of iterations, so that the run time is bounded.
 
-Afterwards residuals are whitened with what they were seen to be (`twin.calibrate.fit.noise`), hours that fit far worse than
-the others of their channel lose weight (`twin.calibrate.fit.weights`), and the fit is repeated; covariance, pulls and intervals belong to that last one.
+Afterwards residuals are whitened with what they were seen to be (`twin.calibrate.fit.noise`), hours that fit far worse
+than the others of their channel lose weight (`twin.calibrate.fit.weights`), and the fit is repeated; covariance, pulls
+and intervals belong to that last one.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Weights of a channel's hours: one bad hour shall not decide a fit, nor be thrown away unseen.
 
-Residuals of a stretch of about an hour, whitened, are taken as a multivariate Student t: one unknown scale per stretch, its
-spread given by the degrees of freedom. These and the scale of the channel are those of the highest likelihood over all its
-stretches in all runs; where a normal distribution is as likely, nothing is weighted. The weight of a stretch of m rows with
-mean square q is (nu + m)/(nu + m q/s²): Lange, Little, Taylor, J. Am. Statist. Assoc. 84, 1989, eq (3).
+Residuals of a stretch of about an hour, whitened, are taken as a multivariate Student t: one unknown scale per stretch,
+its spread given by the degrees of freedom. These and the scale of the channel are those of the highest likelihood over
+all its stretches in all runs; where a normal distribution is as likely, nothing is weighted. The weight of a stretch of
+m rows with mean square q is (nu + m)/(nu + m q/s²): Lange, Little, Taylor, J. Am. Statist. Assoc. 84, 1989, eq (3).
 """
 
 from __future__ import annotations
@@ -25,14 +25,16 @@ _STEPS = 30  # of the iteration for the scale; it gains a digit in three
 def stretch_weights(white: Sequence[np.ndarray], time: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Weights (n,) of the rows of one channel in each run; ones where plain least squares is right.
 
-    white: whitened residuals (n,) of each run, zero where nothing was measured; time: (n,) s. Relative to a channel whose
-    scale is that of its good stretches, so weights may exceed one where bad ones had made it look noisy.
+    white: whitened residuals (n,) of each run, zero where nothing was measured; time: (n,) s. Relative to a channel
+    whose scale is that of its good stretches, so weights may exceed one where bad ones had made it look noisy.
     """
     if not white:
         return []
     index = [np.floor(t / STRETCH).astype(int) for t in time]
     used = [w != 0.0 for w in white]
-    rows = np.concatenate([np.bincount(i[u], minlength=int(i.max(initial=0)) + 1) for i, u in zip(index, used, strict=True)])
+    rows = np.concatenate(
+        [np.bincount(i[u], minlength=int(i.max(initial=0)) + 1) for i, u in zip(index, used, strict=True)]
+    )
     squares = np.concatenate(
         [np.bincount(i, w**2, minlength=int(i.max(initial=0)) + 1) for i, w in zip(index, white, strict=True)]
     )
