@@ -70,6 +70,11 @@ def test_a_swapped_pair_is_named_as_a_pair(runs):
     (found,) = judge([damaged(runs[0], swapped), runs[1]]).findings
     assert found.what == "swapped"
     assert set(found.channels) == {warm, cold}
+    back, sound = set_aside([damaged(runs[0], swapped)], [found])[0].temperatures, runs[0].temperatures
+    for name in (warm, cold):
+        known = np.isfinite(back.columns[name])
+        np.testing.assert_array_equal(back.columns[name][known], sound.columns[name][known])
+        assert known.mean() > 0.9
 
 
 def test_a_rail_is_read_and_not_estimated(runs):

@@ -62,8 +62,9 @@ def refuted_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence
         whole = [k for k in f.runs if f.what in ("offset", "drift") or k != f.runs[0]]
         ends = {k: _end(runs[k]) for k in f.runs}
         windows = tuple(Window(names[k], 0.0 if k in whole else f.start, ends[k]) for k in f.runs)
+        place = f"sensors.{'<>'.join(f.channels)}"
         causes.append(
-            Cause("sensor", f"sensors.{'<>'.join(f.channels)}", "", f.size, f.interval, UNITS[f.what], f.statistic, least,
+            Cause("sensor", place, "", f.size, f.interval, UNITS[f.what], f.statistic, least,
                   history=f"{_SAID[f.what]} {REFUTED}", windows=windows)
         )  # fmt: skip
     return set_aside(runs, found), causes

@@ -91,8 +91,8 @@ def score(
     """Replay measured runs on a model and compare, beside baselines that need no model.
 
     sealed: runs kept back from every fit, scored by themselves. train: runs that baselines learn from, not scored.
-    output: folder for score.json and score.csv. Temperature channels that all others refute are told in `refuted`; they are
-    scored all the same.
+    output: folder for score.json and score.csv. Temperature channels that all others refute are told in `refuted`; they
+    are scored all the same.
     Raises LogError for runs without anything measured, TwinError for a run that is given twice.
 
     >>> import twin

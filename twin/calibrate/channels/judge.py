@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from twin.logs.run import Run
 
 # Of normal noise: how far a reading typically (median) departs from the mean of its neighbours, in standard deviations
 _DEPARTS = 0.6745 * 1.5**0.5
+NEAR = 1200.0  # s about the start of a swap: two bins of the judgement
 
 
 @dataclass(frozen=True)
@@ -54,9 +55,10 @@ def _own(run: int, f: Fault, channel: str) -> Finding:
 
 
 def set_aside(runs: Sequence[Run], findings: Sequence[Finding]) -> list[Run]:
-    """The runs without the readings that findings are about. Nothing is corrected.
+    """The runs without the readings that findings are about, and with swapped pairs back in place.
 
-    Of a leap or a swapped pair they go from its start on, of an offset or a drift throughout its run.
+    Of a leap readings go from its start on, of an offset or a drift throughout its run; of a pair that is swapped from
+    some time on only those within NEAR of it: when exactly is not known.
     """
     return [_without(run, k, [f for f in findings if k in f.runs]) for k, run in enumerate(runs)]
 
@@ -67,6 +69,9 @@ def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
     time = run.temperatures.time
     columns = dict(run.temperatures.columns)
     for f in found:
+        if f.what == "swapped" and set(f.channels) <= set(columns):
+            columns |= _exchanged(columns, time, f, number == f.runs[0])
+            continue
         wrong = np.ones(len(time), dtype=bool)
         if f.what not in ("offset", "drift") and number == f.runs[0]:
             wrong = time >= f.start
@@ -76,6 +81,15 @@ def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
             if name in columns:
                 columns[name] = np.where(wrong, np.nan, columns[name])
     return replace(run, temperatures=replace(run.temperatures, columns=columns))
+
+
+def _exchanged(columns: Mapping[str, np.ndarray], time: np.ndarray, f: Finding, begins: bool) -> dict[str, np.ndarray]:
+    """The two columns of a swapped pair, each with its own readings. begins: it was swapped during this run."""
+    a, b = (columns[name] for name in f.channels)
+    swapped = time >= f.start if begins else np.ones(len(time), dtype=bool)
+    unsure = swapped.any() & ~swapped.all() & (np.abs(time - f.start) <= NEAR)
+    pair = np.where(swapped, b, a), np.where(swapped, a, b)
+    return {name: np.where(unsure, np.nan, values) for name, values in zip(f.channels, pair, strict=True)}
 
 
 def words(f: Finding, names: Sequence[str]) -> str:

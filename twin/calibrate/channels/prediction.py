@@ -64,7 +64,7 @@ class Prediction:
         """A channel by all others but some; at least one must be left."""
         others = predictors(r, channel, without)
         rows = np.flatnonzero(np.isfinite(r.values[:, channel]))
-        theirs = r.values[np.ix_(rows, others)]
+        theirs = r.values[rows][:, others]
         middle = np.median(theirs, axis=1)
         X = theirs - middle[:, None]
         run, time = r.run[rows], r.time[rows]

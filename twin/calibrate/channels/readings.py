@@ -78,7 +78,7 @@ def readings(runs: Sequence[Run]) -> Readings | None:
     run, time, values = run[known], time[known], values[known]
     if len(time) < FEWEST:
         return None
-    digits = np.array([_digit([t.columns[n] for _, t in tables if n in t.columns]) for n in names])
+    digits = np.array([_digit([t for _, t in tables], n) for n in names])
     noise = np.array([_noise(run, values[:, c]) for c in range(len(names))])
     return Readings(names, len(runs), run, time, values, np.maximum(np.hypot(noise, digits / 12**0.5), _QUIET), length)
 
@@ -99,8 +99,9 @@ def _binned(table: Table, names: Sequence[str], length: float) -> tuple[np.ndarr
     return table.time[0] + (np.arange(len(result)) + 0.5) * length, result
 
 
-def _digit(columns: Sequence[np.ndarray]) -> float:
+def _digit(tables: Sequence[Table], name: str) -> float:
     """The smallest change that a channel ever shows."""
+    columns = [t.columns[name] for t in tables if name in t.columns]
     change = np.abs(np.concatenate([np.diff(c[np.isfinite(c)]) for c in columns]))
     change = change[change > 1e-9]
     return float(change.min()) if len(change) else 0.0
