@@ -46,11 +46,17 @@ def test_a_leap_is_named_with_its_size_and_set_aside(runs, size, start):
     assert (found.what, found.channels, found.runs) == ("leap", (name,), (0,))
     assert found.size == pytest.approx(size, rel=0.1)
     assert found.start == pytest.approx(start, abs=1200.0)  # two bins
-    time = bad[0].temperatures.time
+    time, sound = bad[0].temperatures.time, runs[0].temperatures.columns[name]
     first, other = (run.temperatures.columns[name] for run in set_aside(bad, [found]))
-    assert np.isnan(first[time > start]).all()
-    assert np.isfinite(first[time < start - 1200.0]).all()
+    near = np.abs(time - found.start) <= 1200.0
     assert np.isfinite(other).all()
+    if np.ptp(found.interval) <= 1.0:  # known to half a kelvin
+        assert np.isnan(first[near]).all()
+        np.testing.assert_allclose(first[~near], sound[~near], atol=0.1 * abs(size))
+    vague = replace(found, interval=(found.size - 2.0, found.size + 2.0))
+    first = set_aside(bad, [vague])[0].temperatures.columns[name]
+    assert np.isnan(first[time > found.start]).all()
+    assert np.isfinite(first[time < found.start]).all()
     assert f"'{name}' reads" in words(found, ["monday", "tuesday"])
 
 

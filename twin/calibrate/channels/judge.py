@@ -15,6 +15,7 @@ from twin.logs.run import Run
 
 # Of normal noise: how far a reading typically (median) departs from the mean of its neighbours, in standard deviations
 _DEPARTS = 0.6745 * 1.5**0.5
+KNOWN = 0.5  # K, half of a 95 % interval: the tolerance of a good sensor (class B of IEC 60751 at 40 degC)
 NEAR = 1200.0  # s about the start of a swap: two bins of the judgement
 
 
@@ -55,10 +56,12 @@ def _own(run: int, f: Fault, channel: str) -> Finding:
 
 
 def set_aside(runs: Sequence[Run], findings: Sequence[Finding]) -> list[Run]:
-    """The runs without the readings that findings are about, and with swapped pairs back in place.
+    """The runs without the readings that findings are about, or with them corrected.
 
-    Of a leap readings go from its start on, of an offset or a drift throughout its run; of a pair that is swapped from
-    some time on only those within NEAR of it: when exactly is not known.
+    Swapped pairs are put back in place. What reads too much by a size that is known to KNOWN is corrected by it:
+    readings that are lost move a fit of a poor model as far as wrong ones. Within NEAR of a start readings go: when
+    exactly it was is not known. Else readings go from the start of a leap on, of an offset or a drift throughout its
+    run.
     """
     return [_without(run, k, [f for f in findings if k in f.runs]) for k, run in enumerate(runs)]
 
@@ -72,6 +75,9 @@ def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
         if f.what == "swapped" and set(f.channels) <= set(columns):
             columns |= _exchanged(columns, time, f, number == f.runs[0])
             continue
+        if f.what in ("leap", "offset", "drift") and np.ptp(f.interval) <= 2.0 * KNOWN:
+            columns[f.channels[0]] = _corrected(columns[f.channels[0]], time, f, number == f.runs[0])
+            continue
         wrong = np.ones(len(time), dtype=bool)
         if f.what not in ("offset", "drift") and number == f.runs[0]:
             wrong = time >= f.start
@@ -81,6 +87,14 @@ def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
             if name in columns:
                 columns[name] = np.where(wrong, np.nan, columns[name])
     return replace(run, temperatures=replace(run.temperatures, columns=columns))
+
+
+def _corrected(values: np.ndarray, time: np.ndarray, f: Finding, begins: bool) -> np.ndarray:
+    """A channel less what it reads too much. begins: it is at fault from some time of this run on."""
+    since = time >= f.start if begins else np.ones(len(time), dtype=bool)
+    share = np.clip((time - f.start) / max(f.end - f.start, 1.0), 0.0, 1.0) if f.what == "drift" else 1.0
+    unsure = (f.what == "leap") & begins & (np.abs(time - f.start) <= NEAR)
+    return np.where(unsure, np.nan, values - f.size * share * since)
 
 
 def _exchanged(columns: Mapping[str, np.ndarray], time: np.ndarray, f: Finding, begins: bool) -> dict[str, np.ndarray]:

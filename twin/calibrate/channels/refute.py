@@ -124,6 +124,7 @@ def _told(r: Readings, s: Suspect) -> Finding:
 
 
 def _times(r: Readings, history: History) -> tuple[float, float]:
-    """Edges of bins [s]: from the start of the run where the first bin is meant."""
+    """Edges of bins [s]; what is so throughout begins before the first row."""
     last = np.flatnonzero(r.run == history.runs[-1])[-1]
-    return float(r.time[history.first] - r.length / 2), float(r.time[last] + r.length / 2)
+    begins = float(r.time[history.first] - r.length / 2)
+    return min(0.0, begins - r.length) if history.shape == "offset" else begins, float(r.time[last] + r.length / 2)
