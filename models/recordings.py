@@ -28,6 +28,7 @@ def lathe_run(path: Path) -> Run:
         loads=Table(time, {}, {}),
         temperatures=Table(time, temperatures, dict.fromkeys(temperatures, "degC")),
         tcp=_tcp(time, {k: columns[n] for n, k in _PROBES.items()}),
+        provenance=path.stem,
         folder=path.parent,
     )
 

@@ -16,6 +16,7 @@ from twin.face.model import Model, read
 from twin.progress import Progress, reporter
 
 if TYPE_CHECKING:
+    from twin.calibrate.channels.judge import Judgement
     from twin.calibrate.fit.fit import Iteration, Stop
     from twin.calibrate.fit.options import Options
     from twin.logs.run import Run
@@ -155,9 +156,11 @@ def calibrate(
 ) -> Calibration:
     """Fit the parameters of a model to the temperatures and TCP deviations measured in runs.
 
-    only, hold: parameters to fit and to leave as they are, each a path or a pattern such as "sources.*". Bounded least
-    squares with priors; an interrupt keeps the best values so far. on_iteration, on_window: told of each as it comes.
-    Raises LogError for runs that hold nothing to compare, TwinError for parameters and sensors that there are not.
+    Temperatures are first judged by each other, over all runs: what they refute is not used, and told in `channels` of
+    the report. only, hold: parameters to fit and to leave as they are, each a path or a pattern such as "sources.*".
+    Bounded least squares with priors; an interrupt keeps the best values so far. on_iteration, on_window: told of each
+    as it comes. Raises LogError for runs that hold nothing to compare, TwinError for parameters and sensors that there
+    are not.
 
     >>> import twin
     >>> model = twin.build("tests/machines/spindle", options=twin.BuildOptions(held_out=4))
@@ -171,6 +174,7 @@ def calibrate(
     """
     import twin.run.jax_setup  # noqa: F401  isort: skip  first: it prepares JAX before NumPy is loaded
 
+    from twin.calibrate.channels.judge import judge, set_aside
     from twin.calibrate.fit.calibration import chosen
 
     options = options or CalibrateOptions()
@@ -184,10 +188,12 @@ def calibrate(
     unknown = sorted(set(options.exclude) - set(known))
     if unknown:
         raise TwinError(f"no sensor '{unknown[0]}'", "--exclude", f"sensors are: {', '.join(known)}")
-    read_runs = runs_of(given)
+    whole = runs_of(given)
+    judgement = judge(whole)
+    read_runs = set_aside(whole, judgement.findings)
     steps = [read_runs] if options.window is None else [[run] for run in _windows(read_runs, options)]
     parameters = chosen(loaded.artefact, only, hold, any(run.tcp is not None for run in read_runs))
-    fitter = _Fitter(loaded.artefact, parameters, settings, options, reporter(progress), on_iteration)
+    fitter = _Fitter(loaded.artefact, parameters, settings, options, reporter(progress), on_iteration, judgement)
     facts = fitter.through(steps, on_window)
     if facts is None:
         remedy = "give a run with temperatures.csv or tcp.csv"
@@ -218,6 +224,7 @@ class _Fitter:
     options: CalibrateOptions
     progress: Progress
     on_iteration: Callable[[Iteration], None]
+    judgement: Judgement
 
     def through(self, steps: Sequence[Sequence[Run]], on_window: Callable[[Window], None]) -> dict[str, Any] | None:
         """The report of the last step that holds something to compare; None where none does."""
@@ -236,7 +243,7 @@ class _Fitter:
                     raise
                 on_window(Window(hours, problem=e.problems[0].what))
                 continue
-            facts = told(result, these, experiments=k == len(steps) - 1)
+            facts = told(result, these, k == len(steps) - 1, self.judgement)
             if self.options.window is not None:
                 on_window(Window(hours, facts))
             if result.fit.stopped == "interrupted":

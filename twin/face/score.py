@@ -75,7 +75,8 @@ class Score:
     def __str__(self) -> str:
         from twin.calibrate.score.text import score_text
 
-        return score_text(self.figures, self.source)
+        refuted = [f"refuted: {what}" for what in self.facts.get("refuted", [])]
+        return "\n".join([score_text(self.figures, self.source), *refuted])
 
 
 def score(
@@ -90,7 +91,8 @@ def score(
     """Replay measured runs on a model and compare, beside baselines that need no model.
 
     sealed: runs kept back from every fit, scored by themselves. train: runs that baselines learn from, not scored.
-    output: folder for score.json and score.csv.
+    output: folder for score.json and score.csv. Temperature channels that all others refute are told in `refuted`; they
+    are scored all the same.
     Raises LogError for runs without anything measured, TwinError for a run that is given twice.
 
     >>> import twin
@@ -104,6 +106,7 @@ def score(
 
     from twin import __version__
     from twin.atomic import check_folder
+    from twin.calibrate.channels.judge import judge, words
     from twin.calibrate.score.files import score_json, write_score
     from twin.calibrate.score.score import score as figures
     from twin.face.model import read
@@ -123,6 +126,9 @@ def score(
         "twin": __version__,
     }
     told = score_json(found, settings, facts)
+    measured = [*scored, *kept]
+    judgement = judge([run for _, run in measured])
+    told["refuted"] = [words(f, [Path(name).name for name, _ in measured]) for f in judgement.findings]
     if output is not None:
         write_score(Path(output), told, found)
     return Score(told, found, loaded.source or loaded.name)

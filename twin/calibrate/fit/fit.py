@@ -5,15 +5,16 @@ reflective method (Branch, Coleman, Li, SIAM J. Sci. Comput. 21, 1999; scipy.opt
 through the window model. Paper 000, Fig. 5: compare at the sensors, change parameters inside physical bounds, stop at
 the minimum or at the maximum of iterations, so that the run time is bounded.
 
-Afterwards residuals are whitened with what they were seen to be (`twin.calibrate.fit.noise`) and the fit is repeated;
-covariance, pulls and intervals belong to that last one.
+Afterwards residuals are whitened with what they were seen to be (`twin.calibrate.fit.noise`), hours that fit far worse
+than the others of their channel lose weight (`twin.calibrate.fit.weights`), and the fit is repeated; covariance, pulls
+and intervals belong to that last one.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -21,6 +22,7 @@ from scipy.optimize import least_squares
 from twin.calibrate.fit.evaluated import Evaluated, floors, information, noise_at, whitened_jacobian
 from twin.calibrate.fit.noise import Noise, estimated, white
 from twin.calibrate.fit.problem import Problem
+from twin.calibrate.fit.weights import stretch_weights
 
 WHITENINGS = 2  # fits with estimated noise after the first one
 TOLERANCE = 1e-5  # relative change of the cost, and of the parameters
@@ -136,7 +138,32 @@ def _seen(
         (estimated(sensors.without_form(T), floor[0]), estimated(tcp.without_form(w), floor[1]))
         for (T, w), (sensors, tcp), floor in zip(evaluated.residuals(x), noise, limits, strict=True)
     ]
-    return noise_at(evaluated, channels, x)
+    return _weighted(evaluated, noise_at(evaluated, channels, x), limits, x)
+
+
+def _weighted(
+    evaluated: Evaluated,
+    noise: tuple[tuple[Noise, Noise], ...],
+    limits: list[tuple[np.ndarray, np.ndarray]],
+    x: np.ndarray,
+) -> tuple[tuple[Noise, Noise], ...]:
+    """The noise with weights of the hours of every channel, judged over all runs that have it."""
+    runs = [run.measured for run in evaluated.problem.runs]
+    residuals = evaluated.residuals(x)
+    white = [(s.whiten(T), tcp.whiten(w)) for (T, w), (s, tcp) in zip(residuals, noise, strict=True)]
+    weight = [(np.ones_like(T), np.ones_like(w)) for T, w in white]
+    for name in dict.fromkeys([*(n for m in runs for n in m.sensors), 0, 1, 2]):
+        own = [(k, 0, m.sensors.index(name), m.bin_time) for k, m in enumerate(runs) if name in m.sensors]
+        if isinstance(name, int):
+            own = [(k, 1, name, m.tcp_time) for k, m in enumerate(runs) if len(m.tcp)]
+        found = stretch_weights([white[k][kind][:, c] for k, kind, c, _ in own], [time for *_, time in own])
+        for (k, kind, c, _), one in zip(own, found, strict=True):
+            most = (noise[k][kind].channels.sigma[c] / limits[k][kind][c]) ** 2  # no better than the instrument
+            weight[k][kind][:, c] = np.minimum(one, most)
+    return tuple(
+        (replace(s, weight=of_s), replace(tcp, weight=of_tcp))
+        for (s, tcp), (of_s, of_tcp) in zip(noise, weight, strict=True)
+    )
 
 
 def _minimise(

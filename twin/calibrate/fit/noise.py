@@ -48,15 +48,16 @@ class Noise:
 
     channels: Channels
     form: np.ndarray  # (n, c, k), NaN where nothing was measured
+    weight: np.ndarray | None = None  # (n, c) of each row (`twin.calibrate.fit.weights`); None: all alike
 
     def __post_init__(self) -> None:
-        white = self.channels.whiten(self.form)
+        white = self._white(self.form)
         parts = [np.linalg.svd(white[:, c], full_matrices=False)[:2] for c in range(white.shape[1])]
         object.__setattr__(self, "_modes", parts)
 
     def whiten(self, values: np.ndarray) -> np.ndarray:
         """values (n, c, ...) -> the same, of unit variance: (1 + U S^2 U^T)^(-1/2) after the channels; NaN: zero."""
-        white = self.channels.whiten(values)
+        white = self._white(values)
         for c, (U, s) in enumerate(self._modes):  # type: ignore[attr-defined]
             part = white[:, c].reshape(len(white), int(np.prod(white.shape[2:])))
             part = part - U @ ((1.0 - 1.0 / np.sqrt(1.0 + s**2))[:, None] * (U.T @ part))
@@ -66,11 +67,17 @@ class Noise:
     def without_form(self, residual: np.ndarray) -> np.ndarray:
         """residual (n, c) less the most likely share of the model discrepancy: what is left is noise."""
         result = residual.copy()
-        white, form = self.channels.whiten(residual), self.channels.whiten(self.form)
+        white, form = self._white(residual), self._white(self.form)
         for c in range(residual.shape[1]):
             F = form[:, c]
             result[:, c] -= self.form[:, c] @ np.linalg.solve(F.T @ F + np.eye(F.shape[1]), F.T @ white[:, c])
         return result
+
+    def _white(self, values: np.ndarray) -> np.ndarray:
+        white = self.channels.whiten(values)
+        if self.weight is None:
+            return white
+        return white * np.sqrt(self.weight).reshape(*self.weight.shape, *([1] * (values.ndim - 2)))
 
 
 def white(floor: np.ndarray) -> Channels:

@@ -11,7 +11,9 @@ import numpy as np
 
 from twin import __version__
 from twin.atomic import atomic_path
+from twin.calibrate.channels.judge import Judgement, words
 from twin.calibrate.fit.calibration import Calibration
+from twin.calibrate.fit.channel_table import channel_table
 from twin.calibrate.fit.experiments import propose
 from twin.calibrate.fit.fit import Fit
 from twin.calibrate.fit.separation import Separation, sentences, separation
@@ -59,8 +61,10 @@ def rows(fit: Fit, found: Separation) -> list[dict[str, Any]]:
     return result
 
 
-def told(result: Calibration, runs: Sequence[Run], experiments: bool = True) -> dict[str, Any]:
-    """What there is to report about a calibration, as JSON values."""
+def told(
+    result: Calibration, runs: Sequence[Run], experiments: bool = True, judgement: Judgement | None = None
+) -> dict[str, Any]:
+    """What there is to report about a calibration, as JSON values. judgement: of the channels of its runs."""
     fit = result.fit
     found = separation(fit.problem.names, fit.information)
     proposals = propose(fit, found.combinations) if experiments else {}
@@ -90,6 +94,8 @@ def told(result: Calibration, runs: Sequence[Run], experiments: bool = True) -> 
             }
             for run, original, (T, w) in zip(fit.problem.runs, runs, fit.residual, strict=True)
         ],
+        "set_aside": [words(f, [r.name for r in fit.problem.runs]) for f in judgement.findings] if judgement else [],
+        "channels": channel_table(fit, judgement),
         "parameters": rows(fit, found),
         "initial": [
             {"path": name, "unit": "K", "value": float(fit.x[n + i] * s.sigma), "sigma": float(sizes[n + i] * s.sigma)}

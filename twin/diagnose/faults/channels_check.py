@@ -7,12 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from twin.calibrate.channels.exchange import THRESHOLD as EXCHANGE
+from twin.calibrate.channels.finding import UNITS
+from twin.calibrate.channels.judge import judge, set_aside
+from twin.calibrate.channels.refute import THRESHOLDS, shape_of
 from twin.diagnose.result.diagnosis import Cause, Window
 from twin.logs.faults.usable import BROKEN, usable
 from twin.logs.run import Run, Table
 from twin.logs.stuck import Standstill, frozen_throughout, standstills
 
 LEAST = 1800.0  # s that a channel must stand still
+REFUTED = "that all other channels refute"  # in the history of a channel: a leap that ...
+_SAID = {"leap": "a leap", "offset": "an offset", "drift": "a drift", "swapped": "names"}
 
 
 def stuck_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[str]) -> tuple[list[Run], list[Cause]]:
@@ -44,6 +50,29 @@ def broken_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[
                           history=history, windows=(window,))
                 )  # fmt: skip
     return causes
+
+
+def refuted_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[str]) -> tuple[list[Run], list[Cause]]:
+    """Runs without the readings of sensors that all other channels refute, and a cause for each: found before anything
+    is fitted, which a single wrong channel would drag along."""
+    found = [f for f in judge(runs, sensors).findings if f.statistic < np.inf]  # the others are told already
+    causes = []
+    for f in found:
+        least = EXCHANGE if f.what == "swapped" else THRESHOLDS[shape_of(f)]
+        whole = [k for k in f.runs if f.what in ("offset", "drift") or k != f.runs[0]]
+        ends = {k: _end(runs[k]) for k in f.runs}
+        windows = tuple(Window(names[k], 0.0 if k in whole else f.start, ends[k]) for k in f.runs)
+        place = f"sensors.{'<>'.join(f.channels)}"
+        causes.append(
+            Cause("sensor", place, "", f.size, f.interval, UNITS[f.what], f.statistic, least,
+                  history=f"{_SAID[f.what]} {REFUTED}", windows=windows)
+        )  # fmt: skip
+    return set_aside(runs, found), causes
+
+
+def _end(run: Run) -> float:
+    assert run.temperatures is not None
+    return float(run.temperatures.time[-1])
 
 
 def _emptied(

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from twin.diagnose.faults.channels_check import REFUTED
 from twin.diagnose.faults.table import family_of
 from twin.diagnose.report.recalibration import left_words, moved_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival
@@ -244,6 +245,8 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
     if entry and entry.weighed:
         gain, strong = number(c.statistic / 2.0), number(c.threshold / 2.0)
         return f"With it, and those before it, the logarithm of the evidence is {gain} larger; {strong} is strong."
+    if c.history.endswith(REFUTED):
+        return f"All other channels refute it: a statistic of {number(c.statistic)}; {number(c.threshold)} is needed."
     if c.threshold == d.thresholds.get(c.family, c.threshold):
         return evidence_sentence(d, c.family, c.statistic, c.threshold)
     # a declared number: both are squares, of its distance from the declared one

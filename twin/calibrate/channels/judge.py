@@ -1,0 +1,130 @@
+"""All that is wrong with the temperature channels of several runs, and the runs without those readings."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.calibrate.channels.finding import Finding, What
+from twin.calibrate.channels.readings import EMPTIED, emptied, readings
+from twin.calibrate.channels.refute import refuted
+from twin.logs.faults.fault import Fault
+from twin.logs.run import Run
+
+# Of normal noise: how far a reading typically (median) departs from the mean of its neighbours, in standard deviations
+_DEPARTS = 0.6745 * 1.5**0.5
+KNOWN = 0.5  # K, half of a 95 % interval: the tolerance of a good sensor (class B of IEC 60751 at 40 degC)
+NEAR = 1200.0  # s about the start of a swap: two bins of the judgement
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is wrong with the channels of runs."""
+
+    findings: tuple[Finding, ...]  # single channels, in the order of what is surest
+    splices: tuple[tuple[int, Fault], ...]  # number of the run, and from where on its rows are of another time
+    leaps: tuple[tuple[int, str], ...]  # number of the run and channel of every leap, once for each
+
+
+def judge(runs: Sequence[Run], within: Collection[str] | None = None) -> Judgement:
+    """Find broken and stuck channels and splices in each run, then what all channels together say of each of them.
+
+    within: columns that may be judged, all temperatures by default; all take part as witnesses. Nothing is changed.
+    """
+    return judged([emptied(run) for run in runs], within)
+
+
+def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[str] | None = None) -> Judgement:
+    """The same, of what `emptied` has made of each run."""
+    plain = [run for run, _ in parts]
+    faults = [(k, f) for k, (_, found) in enumerate(parts) for f in found]
+    own = [_own(k, f, channel) for k, f in faults if f.kind in EMPTIED for channel in f.channels]
+    splices = tuple((k, f) for k, f in faults if f.kind == "splice")
+    leaps = tuple((k, channel) for k, f in faults if f.kind == "leap" for channel in f.channels)
+    table = readings(plain)
+    found = [*own, *(refuted(table) if table is not None else [])]
+    found = [f for f in found if within is None or any(c in within for c in f.channels)]
+    return Judgement(tuple(found), splices, leaps)
+
+
+def _own(run: int, f: Fault, channel: str) -> Finding:
+    what: What = "noise" if f.kind == "noise" else "rail" if f.kind == "rail" else "stuck"
+    size = f.size / _DEPARTS if what == "noise" else f.size if what == "rail" else f.last_time - f.first_time
+    return Finding(what, (channel,), (run,), f.first_time, f.last_time, size, (size, size), np.inf)
+
+
+def set_aside(runs: Sequence[Run], findings: Sequence[Finding]) -> list[Run]:
+    """The runs without the readings that findings are about, or with them corrected.
+
+    Swapped pairs are put back in place. What reads too much by a size that is known to KNOWN is corrected by it:
+    readings that are lost move a fit of a poor model as far as wrong ones. Within NEAR of a start readings go: when
+    exactly it was is not known. Else readings go from the start of a leap on, of an offset or a drift throughout its
+    run.
+    """
+    return [_without(run, k, [f for f in findings if k in f.runs]) for k, run in enumerate(runs)]
+
+
+def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
+    if run.temperatures is None or not found:
+        return run
+    time = run.temperatures.time
+    columns = dict(run.temperatures.columns)
+    for f in found:
+        if f.what == "swapped" and set(f.channels) <= set(columns):
+            columns |= _exchanged(columns, time, f, number == f.runs[0])
+            continue
+        if f.what in ("leap", "offset", "drift") and np.ptp(f.interval) <= 2.0 * KNOWN:
+            columns[f.channels[0]] = _corrected(columns[f.channels[0]], time, f, number == f.runs[0])
+            continue
+        wrong = np.ones(len(time), dtype=bool)
+        if f.what not in ("offset", "drift") and number == f.runs[0]:
+            wrong = time >= f.start
+        if f.what in ("noise", "rail", "stuck"):
+            wrong &= time <= f.end
+        for name in f.channels:
+            if name in columns:
+                columns[name] = np.where(wrong, np.nan, columns[name])
+    return replace(run, temperatures=replace(run.temperatures, columns=columns))
+
+
+def _corrected(values: np.ndarray, time: np.ndarray, f: Finding, begins: bool) -> np.ndarray:
+    """A channel less what it reads too much. begins: it is at fault from some time of this run on."""
+    since = time >= f.start if begins else np.ones(len(time), dtype=bool)
+    share = np.clip((time - f.start) / max(f.end - f.start, 1.0), 0.0, 1.0) if f.what == "drift" else 1.0
+    unsure = (f.what == "leap") & begins & (np.abs(time - f.start) <= NEAR)
+    return np.where(unsure, np.nan, values - f.size * share * since)
+
+
+def _exchanged(columns: Mapping[str, np.ndarray], time: np.ndarray, f: Finding, begins: bool) -> dict[str, np.ndarray]:
+    """The two columns of a swapped pair, each with its own readings. begins: it was swapped during this run."""
+    a, b = (columns[name] for name in f.channels)
+    swapped = time >= f.start if begins else np.ones(len(time), dtype=bool)
+    unsure = swapped.any() & ~swapped.all() & (np.abs(time - f.start) <= NEAR)
+    pair = np.where(swapped, b, a), np.where(swapped, a, b)
+    return {name: np.where(unsure, np.nan, values) for name, values in zip(f.channels, pair, strict=True)}
+
+
+def words(f: Finding, names: Sequence[str]) -> str:
+    """As "'PT05' reads 5.1 K (4.9 to 5.3) too much in monday from 2.00 h on, by all other channels".
+
+    names: of the runs.
+    """
+    where = ", ".join(names[k] for k in f.runs)
+    if f.what in ("leap", "swapped") and f.start > 0.0:
+        where += f" from {f.start / 3600.0:.2f} h on"
+    during = f"{where} from {f.start / 3600.0:.2f} to {f.end / 3600.0:.2f} h"
+    if f.what == "swapped":
+        return f"'{f.channels[0]}' and '{f.channels[1]}' have each other's names in {where}, by all other channels"
+    name = f"'{f.channels[0]}'"
+    if f.what == "noise":
+        return f"{name} is noise of {f.size:.3g} K in {during}"
+    if f.what == "rail":
+        return f"{name} rests at {f.size:.4g} degC in {during}"
+    if f.what == "stuck":
+        return f"{name} stands still while others go on in {during}"
+    low, high = (f"{abs(v):.3g}" for v in sorted(f.interval, key=abs))
+    much = f"{abs(f.size):.3g} K ({low} to {high}) too {'much' if f.size > 0.0 else 'little'}"
+    verb = f"drifts to {much} at the end of" if f.what == "drift" else f"reads {much} in"
+    return f"{name} {verb} {where}, by all other channels"
