@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.calibrate.members import planted
-from twin.calibrate.members import evidence
 from twin.calibrate.members.describe import Member, with_members
 from twin.calibrate.members.driver import Driver, drivers_of
 from twin.calibrate.members.evidence import Sums, explain, held_out, total, with_noise
@@ -88,7 +87,7 @@ def test_evidence_is_that_of_the_gaussian():
     k, c, n, scale, noise = 40, 3, 2, 0.7, 0.3
     F, J, y = rng.standard_normal((k, c)), rng.standard_normal((k, 1, n)), rng.standard_normal((k, 1))
     sums = Sums.of(y, J, F)
-    weight = evidence.EVERY / evidence.MEMORY
+    weight = sums.rows[0] / k
     found = explain(sums, range(c), scale, np.array([noise]))
     # rows of weight w are rows of variance noise^2 / w; of the normalisation only the share w of each row counts
     Y = np.eye(k) * noise**2 / weight + scale**2 * F @ F.T + J[:, 0] @ J[:, 0].T
@@ -101,9 +100,10 @@ def test_evidence_is_that_of_the_gaussian():
 def test_noise_is_found():
     """Rows as far apart as they remember: so many witnesses as rows."""
     rng = np.random.default_rng(2)
-    F = np.repeat(rng.standard_normal((400, 4)), 9, axis=0)
-    y = F @ rng.standard_normal(4) * 1e-6 + np.repeat(2e-6 * rng.standard_normal(400), 9)
-    sums = Sums.of(y[:, None], np.zeros((3600, 1, 0)), F)
+    n = round(1.0 / Sums.of(np.zeros((1, 1)), np.zeros((1, 1, 0)), np.zeros((1, 1))).rows[0])  # rows of a witness
+    F = np.repeat(rng.standard_normal((400, 4)), n, axis=0)
+    y = F @ rng.standard_normal(4) * 1e-6 + np.repeat(2e-6 * rng.standard_normal(400), n)
+    sums = Sums.of(y[:, None], np.zeros((400 * n, 1, 0)), F)
     assert with_noise(sums, range(4), 1e-6).noise[0] == pytest.approx(2e-6, rel=0.15)
 
 

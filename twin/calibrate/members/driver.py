@@ -64,23 +64,27 @@ def drivers_of(runs: Sequence[Run], loads: Sequence[str] | None = None) -> tuple
 
     A column that never changes drives nothing.
     """
-    found: list[Driver] = []
     first = runs[0]
     tables = [t for t in (first.loads, first.temperatures) if t is not None]
-    for name, unit in {name: table.units[name] for table in tables for name in table.columns}.items():
-        columns = [_column(run, name) for run in runs]
-        if any(c is None or not np.isfinite(c).any() for c in columns):
-            continue
-        values = np.concatenate([c[np.isfinite(c)] for c in columns if c is not None])
-        if np.ptp(values) == 0.0:
+    units = {name: table.units[name] for table in tables for name in table.columns}
+    heating = [n for n in first.loads.columns if units[n] in EXPONENTS and (loads is None or n in loads)]
+    found: list[Driver] = []
+    for name, unit in units.items():
+        values = _logged(runs, name) if unit == "degC" or name in heating else np.zeros(0)
+        if not len(values) or np.ptp(values) == 0.0:
             continue
         if unit == "degC":
             found.append(Driver(name, unit))
-        elif name in first.loads.columns and unit in EXPONENTS and (loads is None or name in loads):
-            largest = float(np.abs(values).max())
-            if unit != "W" or largest >= LEAST_POWER:
-                found += [Driver(name, unit, p, largest) for p in EXPONENTS[unit]]
+        elif unit != "W" or np.abs(values).max() >= LEAST_POWER:
+            found += [Driver(name, unit, p, float(np.abs(values).max())) for p in EXPONENTS[unit]]
     return tuple(found)
+
+
+def _logged(runs: Sequence[Run], name: str) -> np.ndarray:
+    """All readings of a column (n,); none where a run lacks it."""
+    columns = [_column(run, name) for run in runs]
+    readings = [c[np.isfinite(c)] for c in columns if c is not None]
+    return np.concatenate(readings) if len(readings) == len(runs) and all(map(len, readings)) else np.zeros(0)
 
 
 def _column(run: Run, name: str) -> np.ndarray | None:

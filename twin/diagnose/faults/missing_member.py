@@ -8,6 +8,7 @@ from __future__ import annotations
 from twin.diagnose.evidence.batch import Batch
 from twin.diagnose.faults.context import Context
 from twin.diagnose.faults.fault import Family, Fault
+from twin.diagnose.result.diagnosis import Cause
 
 FAULTS: tuple[Fault, ...] = ()
 
@@ -17,11 +18,16 @@ def batches(context: Context) -> list[Batch]:
     return []
 
 
+def written_elsewhere(cause: Cause) -> bool:
+    """No edit of its own: its nodes are written with those of all drivers."""
+    return False
+
+
 FAMILY = Family(
     20, "missing_member", "Missing member, or another air",
     "A probe holder, cover, column or foundation follows an air, a measured temperature or a heat, and moves the tool.",
     "w + sum_k a_k (tau_k-lag of a logged column)", "displacements that no heat in the machine explains",
     "3 in ln evidence", "either", "every logged temperature, speed and power, with lags of 1 min to 5.3 h", "machine",
     batches, what="a body that follows it, and that the description lacks,", kind_told=True, weighed=True,
-    editable=lambda cause: False,  # its node is written with those of all drivers
+    editable=written_elsewhere,
 )  # fmt: skip

@@ -28,7 +28,7 @@ class Piece:
     """A sensor where the model fits badly, and what would help."""
 
     sensor: str
-    rms: float  # K, left over all fitted runs
+    rms: float  # K, of what is left in all fitted runs
     run: str  # with the worst hour
     hour: float  # h, where that begins
     by: Candidate | None  # None where nothing was logged
