@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import platform
 import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from twin.errors import TwinError
@@ -53,7 +53,7 @@ def own_compiler() -> str | None:
 def _cross() -> tuple[str, ...]:
     if shutil.which("x86_64-w64-mingw32-gcc"):
         return ("x86_64-w64-mingw32-gcc", "-static-libgcc")
-    if importlib.util.find_spec("ziglang"):
+    if find_spec("ziglang"):
         return (sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu")
     return ()
 

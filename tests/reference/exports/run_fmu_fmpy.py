@@ -51,8 +51,10 @@ def simulate(fmu: Path, folder: Path, initial: float, step: float = 60.0) -> np.
     known = [v.name for v in description.modelVariables if v.causality == "input"]
     table = inputs(columns, [n for n in known if n in columns or n.removesuffix("_rate") in columns])
     steps = max(1, math.ceil((table["time"][-1] - 1e-9) / step))
-    return fmpy.simulate_fmu(str(fmu), stop_time=steps * step, output_interval=step, input=table,
-                             start_values={"T_initial": initial})  # fmt: skip
+    result = fmpy.simulate_fmu(str(fmu), stop_time=steps * step, output_interval=step, input=table,
+                               start_values={"T_initial": initial})  # fmt: skip
+    wanted = np.arange(steps + 1) * step  # FMPy also stops wherever an input changes
+    return result[np.searchsorted(result["time"], wanted - 1e-6 * step)]
 
 
 if __name__ == "__main__":

@@ -127,9 +127,7 @@ def _put_guides(out: Arrays, system: SpringSystem) -> None:
     out.integers("ground_first", [g.first for g in grounds])
 
 
-def _put_encoders(
-    out: Arrays, system: SpringSystem, encoders: Sequence[LinearEncoder], first: np.ndarray
-) -> None:
+def _put_encoders(out: Arrays, system: SpringSystem, encoders: Sequence[LinearEncoder], first: np.ndarray) -> None:
     strips = [e.strip for e in encoders]
     out.reals("encoder_along", [e.along for e in encoders])
     out.reals("encoder_lever", [system._lever(e) * e.sign for e in encoders])

@@ -98,9 +98,7 @@ def _lines(jaxpr: Any, consts: Any, given: list[str], lines: list[str], counter:
         kind, inner = equation.primitive.name, equation.params.get("jaxpr") or equation.params.get("call_jaxpr")
         if inner is not None and _INTERPOLATION in str(equation.params.get("name", "")):
             x, at, values = equation.invars[:3]
-            found = [
-                np.asarray(a.val) if hasattr(a, "val") else tables[a] for a in (at, values)
-            ]
+            found = [np.asarray(a.val) if hasattr(a, "val") else tables[a] for a in (at, values)]
             texts = ["{" + ", ".join(number(v) for v in row) + "}" for row in found]
             k = next(counter)
             tables_of = f"    static const real x{k}[] = {texts[0]};\n    static const real y{k}[] = {texts[1]};\n"
@@ -172,4 +170,3 @@ def _operation(kind: str, a: list[str], equation: Any, law: str) -> str:
 def _power(x: str, y: int) -> str:
     product = " * ".join([x] * abs(y)) or "R(1.0)"
     return product if y >= 0 else f"R(1.0) / ({product})"
-

@@ -163,9 +163,7 @@ def flags(load: LoadModel, shortest: float, step: float) -> tuple[dict[str, int]
     at["flag_stroke"] = len(names)
     names += [f"axes.{a.name} beyond its stroke" for a in load.axes]
     at["flag_rail"] = len(names)
-    names += [
-        f"contacts.{p.contact}: {load.ports[p.pad_port]} beyond the stations of its rail" for p in load.pairs
-    ]
+    names += [f"contacts.{p.contact}: {load.ports[p.pad_port]} beyond the stations of its rail" for p in load.pairs]
     for kind, entries in (("source", load.sources), ("film", load.films)):
         for k, entry in enumerate(entries):
             if validity := LAWS[entry.use.law].validity:

@@ -73,7 +73,15 @@ def compiled_example(source: Source, folder: Path) -> Path:
     for name, text in names.items():
         (folder / name).write_text(text, encoding="utf-8")
     program = folder / "example"
-    command = [compiler, *_FLAGS, "-o", str(program), str(folder / "example.c"), str(folder / f"{source.name}.c"), "-lm"]
+    command = [
+        compiler,
+        *_FLAGS,
+        "-o",
+        str(program),
+        str(folder / "example.c"),
+        str(folder / f"{source.name}.c"),
+        "-lm",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         raise TwinError(f"the compiler {compiler} failed: {done.stderr.strip()[-200:]}", "--run", "name another in CC")
