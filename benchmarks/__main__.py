@@ -14,8 +14,8 @@ for variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 NAMES = (
     "machines", "certificate", "case", "poses", "moved", "step", "laws", "replay", "load_pipeline",
-    "growth", "pymor", "steel_profile", "correction", "calibration", "update", "spindle_drift", "spindle_diagnosis",
-    "log_faults", "diagnosis", "recovery", "hidden_certify", "window",
+    "growth", "pymor", "steel_profile", "steel_profile_fit", "correction", "calibration", "update", "spindle_drift",
+    "spindle_diagnosis", "log_faults", "diagnosis", "recovery", "hidden_certify", "window",
 )  # fmt: skip
 
 
