@@ -2,9 +2,9 @@
 
     s z + (A0 + sum_k theta_k A_k) z = sum_k theta_k A_k 1,  y = C z,   A0 = N F0 F0^T N^T,  A_k = F_k F_k^T,  N^T 1 = 0
 
-All matrices are symmetric and positive semidefinite, hence stable for every theta >= 0; a uniform temperature is exact and
-the heat balance closes, as after a Galerkin projection. But they are no congruence of the full ones: F and C are free
-(as in Mlinaric and Gugercin, SIAM J. Sci. Comput. 45, 2023, whose models are not tied to a projection either).
+All matrices are symmetric and positive semidefinite, hence stable for every theta >= 0; a uniform temperature is exact
+and the heat balance closes, as after a Galerkin projection. But they are no congruence of the full ones: F and C are
+free (as in Mlinaric and Gugercin, SIAM J. Sci. Comput. 45, 2023, whose models are not tied to a projection either).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import twin.run.jax_setup  # noqa: F401  isort: skip  before numpy: JAX's LAPACK
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -33,13 +34,21 @@ def _root(A: np.ndarray) -> np.ndarray:
     return np.asarray(U * np.sqrt(np.maximum(value, 1e-14 * value[-1])))
 
 
+def _in_numpy(slope: Callable[..., tuple[jax.Array, jax.Array]]) -> Callable[[np.ndarray], tuple[float, np.ndarray]]:
+    def told(x: np.ndarray) -> tuple[float, np.ndarray]:
+        value, gradient = slope(x)
+        return float(value), np.asarray(gradient)
+
+    return told
+
+
 def fitted(
     start: AffineBody, films: list[np.ndarray], omega: np.ndarray, exact: list[np.ndarray], iterations: int
 ) -> AffineBody:
-    """The body `start` (dense, symmetric, E = 1) with matrices fitted to H = exact (n_omega, n_out, n_films), per theta.
+    """The body `start` (dense, symmetric, E = 1) with matrices fitted to transfer functions, one per theta.
 
-    films: one theta (n_films,) [W/(m^2 K)] per entry of exact; omega (n_omega,) rad/s. Errors count as shares of the
-    largest singular value of each H.
+    films: thetas (n_films,) [W/(m^2 K)]; exact: H (n_omega, n_out, n_films) at each; omega (n_omega,) rad/s. Errors
+    count as shares of the largest singular value of each H.
     """
     middle = np.exp(np.mean(np.log(films), axis=0))
     rate, U = np.linalg.eigh(start.A0 + np.tensordot(middle, np.array(start.A), axes=1))
@@ -71,14 +80,13 @@ def fitted(
         each = jax.lax.map(lambda case: miss(unravel(x), case), (theta, wanted, jnp.asarray(size)))
         return jnp.log(jnp.mean(each**power)) / power
 
-    slope = jax.jit(jax.value_and_grad(loss), static_argnums=1)
+    slope = jax.jit(jax.value_and_grad(loss), static_argnames="power")
     x = np.asarray(flat)
     for power in POWERS:
-        objective: Callable[[np.ndarray], tuple[float, np.ndarray]] = lambda x, p=power: tuple(
-            np.asarray(v, dtype=float) for v in slope(x, p)
-        )
         options = {"maxiter": iterations, "maxfun": 2 * iterations, "maxcor": MEMORY, "ftol": 0.0, "gtol": 0.0}
-        x = scipy.optimize.minimize(objective, x, jac=True, method="L-BFGS-B", options=options).x
+        x = scipy.optimize.minimize(
+            _in_numpy(partial(slope, power=power)), x, jac=True, method="L-BFGS-B", options=options
+        ).x
     found = {name: np.asarray(value) for name, value in unravel(x).items()}
     back = (U * np.sqrt(rate)).T  # xi = back z
     L = N @ found["A0"]
