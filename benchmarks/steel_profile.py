@@ -22,7 +22,7 @@ TIGHT = RichOptions(samples=24, shift_high=100.0, tolerance=3e-5)
 OMEGA = np.r_[0.0, np.logspace(-6, 2, 33)]  # rad/s
 UNIT = Tolerances(1.0, 1.0)
 STATES = (20, 28, 40, 56)
-TRAINING, HELD_OUT = 8, 20
+TRAINING, HELD_OUT = 24, 20
 
 
 def transfer(body: AffineBody, theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
@@ -72,7 +72,18 @@ def hankel(body: AffineBody, theta: np.ndarray) -> np.ndarray:
     return np.linalg.svd(roots[1].T @ roots[0], compute_uv=False)
 
 
-def errors(refinements: int) -> tuple[int, int, dict[tuple[str, int], float]]:
+def training(model: MachineModel) -> list[np.ndarray]:
+    """The films that snapshots are made at, and matrices fitted at."""
+    return drawn(*theta_bounds(model.load_model), TRAINING, 5)
+
+
+Method = Callable[..., MachineModel]  # (rich, snapshots, states, unit) -> reduced
+METHODS: dict[str, Method] = {"galerkin": galerkin, "balanced": balanced}
+
+
+def errors(
+    refinements: int, methods: dict[str, Method], states: tuple[int, ...]
+) -> tuple[int, int, dict[tuple[str, int], float]]:
     """Nodes, rich states, and the worst relative error over held-out films by (method, states).
 
     Beside the methods: ``rich``, and ``bound``: below which no linear model of so many states is at all of the films.
@@ -81,28 +92,31 @@ def errors(refinements: int) -> tuple[int, int, dict[tuple[str, int], float]]:
     full, (low, high) = machine.bodies[0], theta_bounds(machine.load_model)
     rich_body = project(full, rich_basis(full, low, high, TIGHT))
     rich: MachineModel = replace(machine, bodies=(rich_body,))
-    snapshots = [responses(rich_body, drawn(low, high, TRAINING, 5))]
-    films = drawn(low, high, HELD_OUT, 99)
+    snapshots = [responses(rich_body, training(rich))]
+    films = drawn(low, high, HELD_OUT, 101)
     exact = [transfer(full, theta, OMEGA) for theta in films]
 
     def worst(body: AffineBody) -> float:
         return max(largest(transfer(body, t, OMEGA) - H) / largest(H) for t, H in zip(films, exact, strict=True))
 
-    methods: dict[str, Callable[..., MachineModel]] = {"galerkin": galerkin, "balanced": balanced}
     found = {("rich", rich_body.n): worst(rich_body)}
     values = [hankel(rich_body, t) / largest(H) for t, H in zip(films, exact, strict=True)]
-    for states in STATES:
+    for count in states:
         for name, method in methods.items():
-            found[name, states] = worst(method(rich, snapshots, states, UNIT).bodies[0])
-        found["bound", states] = max(float(v[states]) for v in values)
+            found[name, count] = worst(method(rich, snapshots, count, UNIT).bodies[0])
+        found["bound", count] = max(float(v[count]) for v in values)
     return full.n, rich_body.n, found
 
 
-def main() -> None:
+def table(methods: dict[str, Method], states: tuple[int, ...]) -> None:
     for refinements in (2, 3):
-        n, rich, found = errors(refinements)
+        n, rich, found = errors(refinements, methods, states)
         print(f"   {n} nodes; {rich} rich states, off by {found['rich', rich]:.1e}")
-        print("   states   galerkin   balanced   no model below")
-        for states in STATES:
-            row = (found[name, states] for name in ("galerkin", "balanced", "bound"))
-            print(f"   {states:6d}   " + "   ".join(f"{value:8.1e}" for value in row))
+        print("   states   " + "   ".join(f"{name:>8}" for name in methods) + "   no model below")
+        for count in states:
+            row = (found[name, count] for name in (*methods, "bound"))
+            print(f"   {count:6d}   " + "   ".join(f"{value:8.1e}" for value in row), flush=True)
+
+
+def main() -> None:
+    table(METHODS, STATES)

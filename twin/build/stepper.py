@@ -28,9 +28,9 @@ from twin.build.fixed_point import fixed_point
 from twin.build.heat import Heat
 from twin.rom.contact_matrix import ContactPlaces, contact_entries, dense
 from twin.rom.drive import Drive
-from twin.rom.following import FOLLOW, FilmPlan
+from twin.rom.following import FOLLOW, FilmPlan, read_table, temperature_place
 from twin.rom.model import MachineModel
-from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, source_powers, step_loads
+from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, step_loads
 from twin.rom.tableau import SDIRK2_6, Feedback, Tableau, stages
 
 # States of all bodies up to which one product with the inverse of the whole machine takes less time than a solve per
@@ -87,6 +87,7 @@ class CoupledStepper:
         self._safe_area = np.where(self._area[:n_films] > 0, self._area[:n_films], 1.0)
         self._plan = FilmPlan.of(model.load_model, self._moment[:n_films] / self._safe_area)
         self._contacts = ContactPlaces.of(model.load_model)
+        self._feeds: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]] = {}
 
     def __reduce__(self) -> tuple:
         """A copy starts without factors: those of sparse solvers cannot be copied."""
@@ -137,14 +138,24 @@ class CoupledStepper:
         index = list(drive.losses.index)
         if not index:
             return None
-        told = self._told(drive, step).power
+        T_ref, table = self.model.reference_temperature, drive.losses.value[step]
+        B, rows = self._fed(drive.losses.index)
 
         def feedback(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            now = source_powers(np, told, self._following(drive, self._parts(x)))
-            more = now - power
-            return np.concatenate([body.B @ more[list(body.sources)] for body in self.model.bodies]), now[index]
+            now = read_table(np, table, temperature_place(np, T_ref + rows @ x))
+            return B @ (now - power[index]), now
 
         return feedback
+
+    def _fed(self, index: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """(N, k) where the heat of sources goes, and (k, N) what reads their temperatures, of all bodies. Kept."""
+        if index not in self._feeds:
+            N, n = self._rows[-1].stop, len(self.model.load_model.sources)
+            B, rows = np.zeros((N, n)), np.zeros((n, N))
+            for body, own in zip(self.model.bodies, self._rows, strict=True):
+                B[own, list(body.sources)], rows[list(body.sources), own] = body.B, body.source_rows
+            self._feeds[index] = B[:, list(index)], rows[list(index)]
+        return self._feeds[index]
 
     def _of_terms(self, films: np.ndarray) -> np.ndarray:
         """(n_theta,): numbers (n_films,) of films, and zero for joints."""
