@@ -86,8 +86,8 @@ def test_the_files_compile_without_a_warning_and_take_no_heap(slide_artefact, tm
 def test_valgrind_finds_nothing(slide_artefact, tmp_path):
     program = compiled_example(source_of(read_artefact(slide_artefact)), tmp_path)
     done = subprocess.run(
-        ["valgrind", "-q", "--error-exitcode=9", "--leak-check=full", str(program), str(SLIDE / "loads.csv"), "22", "60",
-         "poses"], capture_output=True, text=True, check=False)  # fmt: skip
+        ["valgrind", "-q", "--error-exitcode=9", "--leak-check=full", str(program), str(SLIDE / "loads.csv"), "22",
+         "60", "poses"], capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr[-2000:]
 
 

@@ -144,7 +144,7 @@ def test_a_state_is_saved_restored_and_stored_as_bytes(fmu, tmp_path):
     assert (go(middle, last) == once).all()
     for kept in (state, again):
         free(kept)
-    with pytest.raises(Exception, match="status 3|Error|error"):
+    with pytest.raises(Exception, match=r"status 3|Error|error"):
         slave.deserializeFMUState(b"x" * len(stored))
     slave.terminate()
     slave.freeInstance()

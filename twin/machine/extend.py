@@ -104,7 +104,7 @@ def free_name(text: str, prefix: str) -> str:
     return next(name for n in range(1, len(taken) + 2) if (name := f"{prefix}_{n}") not in taken)
 
 
-def _changed(text: str, keys: Keys, value: float | str | bool, mark: str) -> str:
+def _changed(text: str, keys: Keys, value: float | str | bool | Sequence[str], mark: str) -> str:
     found = spans(text)
     owner = keys[:-1]
     if keys not in found.values and not _owned(text, owner):

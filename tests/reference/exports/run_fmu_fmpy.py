@@ -15,7 +15,8 @@ import fmpy
 import numpy as np
 
 UNITS = {"mm": 1e-3, "um": 1e-6, "m/min": 1 / 60, "mm/min": 1e-3 / 60, "mm/s": 1e-3, "1/min": 1 / 60, "rpm": 1 / 60,
-         "deg": math.pi / 180, "min": 60.0, "h": 3600.0, "kW": 1e3, "kN": 1e3, "%": 0.01, "l/min": 1e-3 / 60}  # fmt: skip
+         "deg": math.pi / 180, "min": 60.0, "h": 3600.0, "kW": 1e3, "kN": 1e3, "%": 0.01,
+         "l/min": 1e-3 / 60}  # fmt: skip
 
 
 def loads(folder: Path) -> dict[str, np.ndarray]:

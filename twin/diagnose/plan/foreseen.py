@@ -150,7 +150,7 @@ def _compared(
     place = {c: i for i, c in enumerate(chosen)}
     raw = respond(study, nominal, elements.vectors, narrow.columns)
     wind = wind_columns(study, form)
-    described = described_forms(study, narrow, raw, form)
+    described = described_forms(study, narrow, nominal, raw, form)
     known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
     D = np.zeros((len(J), 2 * len(wanted)))
     for i, (now, new, reading, factor) in enumerate(wanted):

@@ -10,7 +10,7 @@ from twin.export.c.text import Arrays
 from twin.rom.elastic_structure import ElasticStructure
 from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.model import MachineModel
-from twin.rom.scales import AddedScale, LinearEncoder
+from twin.rom.scales import AddedScale, LinearEncoder, ScaleStrip
 from twin.rom.springs import SpringSystem
 from twin.rom.tcp import inputs, is_exact
 
@@ -93,8 +93,9 @@ def _put_meshed(out: Arrays, structure: ElasticStructure, first: np.ndarray) -> 
     out.reals("shifts", system.shifts)
     out.reals("stiffness", system.stiffness)
     directions = np.zeros((max(len(system.stiffness), 1), 3))
-    for entry in (*system.guides, *system.grounds):
-        directions[entry.first : entry.first + len(entry.directions)] = entry.directions
+    acting = [(g.first, g.directions) for g in system.guides] + [(g.first, g.directions) for g in system.grounds]
+    for at, own in acting:
+        directions[at : at + len(own)] = own
     out.reals("spring_direction", directions)
     _put_guides(out, system)
     tool, work = system.tool, system.work
@@ -128,7 +129,6 @@ def _put_guides(out: Arrays, system: SpringSystem) -> None:
 
 
 def _put_encoders(out: Arrays, system: SpringSystem, encoders: Sequence[LinearEncoder], first: np.ndarray) -> None:
-    strips = [e.strip for e in encoders]
     out.reals("encoder_along", [e.along for e in encoders])
     out.reals("encoder_lever", [system._lever(e) * e.sign for e in encoders])
     out.integers("encoder_reader_body", [e.reader.body for e in encoders])
@@ -138,6 +138,10 @@ def _put_encoders(out: Arrays, system: SpringSystem, encoders: Sequence[LinearEn
     out.reals("encoder_fixing_point", [e.fixing.point for e in encoders])
     out.reals("encoder_fixed_at", [e.fixed_at for e in encoders])
     out.reals("encoder_expansion", [e.expansion for e in encoders])
+    _put_strips(out, [e.strip for e in encoders], first)
+
+
+def _put_strips(out: Arrays, strips: Sequence[ScaleStrip], first: np.ndarray) -> None:
     out.integers("encoder_strip_body", [s.body for s in strips])
     out.integers("strip_slices", [len(s.centres) for s in strips])
     out.integers("strip_nodes", [len(s.nodes) for s in strips])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from twin.export.c.law_code import arguments_of, law_code
@@ -13,15 +15,22 @@ from twin.rom.load_model import Film, LawUse, LoadModel, Source
 
 
 def put_signals(out: Arrays, load: LoadModel) -> None:
-    names = [s.name for s in load.signals]
-    place = {name: k for k, name in enumerate(names)}
-    needed = {n for entry in (*load.sources, *load.films) for n in entry.use.signals.values()}
+    """Signals and what reads them: axes, environments, joints, films."""
+    place = {s.name: k for k, s in enumerate(load.signals)}
+    _put_log(out, load)
+    _put_axes(out, load, place)
+    _put_environments(out, load, place)
+    _put_films(out, load)
+
+
+def _put_log(out: Arrays, load: LoadModel) -> None:
+    uses = [*(s.use for s in load.sources), *(f.use for f in load.films)]
+    needed = {n for use in uses for n in use.signals.values()}
     needed |= {a.position for a in load.axes} | {e.signal for e in load.environments}
-    needed |= {e.switch for e in (*load.environments, *load.joints, *load.pairs)}
-    followed = {n for entry in (*load.sources, *load.films) if states_of(entry.use) for n in entry.use.signals.values()}
+    needed |= {e.switch for e in load.environments} | {j.switch for j in load.joints} | {p.switch for p in load.pairs}
+    followed = {n for use in uses if states_of(use) for n in use.signals.values()}
     out.names("twin_signal_name", [s.column for s in load.signals])
     out.names("twin_signal_unit", [s.unit for s in load.signals])
-    out.names("twin_axis_name", [a.name for a in load.axes])
     out.reals("signal_low", [s.low for s in load.signals])
     out.reals("signal_high", [s.high for s in load.signals])
     out.reals("signal_margin", [_margin(s.low, s.high) for s in load.signals])
@@ -30,12 +39,19 @@ def put_signals(out: Arrays, load: LoadModel) -> None:
     out.integers("signal_peak", [s.kind == "peak" for s in load.signals])
     out.integers("signal_needed", [s.name in needed for s in load.signals])
     out.integers("is_followed", [s.name in followed for s in load.signals])
+
+
+def _put_axes(out: Arrays, load: LoadModel, place: Mapping[str, int]) -> None:
+    out.names("twin_axis_name", [a.name for a in load.axes])
     out.integers("twin_axis_signal", [place[a.position] for a in load.axes], "const int")
     out.reals("axis_low", [a.low for a in load.axes])
     out.reals("axis_high", [a.high for a in load.axes])
     out.reals("axis_margin", [_margin(a.low, a.high) for a in load.axes])
     defaults = {s.name: s.default or 0.0 for s in load.signals}
     out.reals("axis_default", [defaults[a.position] for a in load.axes])
+
+
+def _put_environments(out: Arrays, load: LoadModel, place: Mapping[str, int]) -> None:
     environments = load.environments
     out.integers("environment_signal", [place[e.signal] if e.signal else -1 for e in environments])
     out.reals("environment_temperature", [e.temperature for e in environments])
@@ -45,7 +61,10 @@ def put_signals(out: Arrays, load: LoadModel) -> None:
     out.integers("joint_switch", [place[j.switch] if j.switch else -1 for j in load.joints])
     out.reals("joint_switched", [j.switched for j in load.joints])
     out.reals("joint_conductance", [j.conductance for j in load.joints])
-    air = [environments[f.environment] for f in load.films]
+
+
+def _put_films(out: Arrays, load: LoadModel) -> None:
+    air = [load.environments[f.environment] for f in load.films]
     out.integers("film_environment", [f.environment for f in load.films])
     out.integers("film_radiant", [f.radiant for f in load.films])
     out.reals("film_emissivity", [f.emissivity for f in load.films])
@@ -57,8 +76,7 @@ def put_signals(out: Arrays, load: LoadModel) -> None:
 
 def put_contacts(out: Arrays, load: LoadModel, ports: tuple[tuple[int, ...], ...]) -> tuple[int, int]:
     """Pairs and their rails; ports: per body. Returns the numbers of `facing` and `under` entries."""
-    place = {s.name: k for k, s in enumerate(load.signals)}
-    owner = {port: (b, i) for b, of_body in enumerate(ports) for i, port in enumerate(of_body)}
+    _put_pairs(out, load)
     rails = [load.rails[p.rail] for p in load.pairs]
     counts = [len(r.stations) for r in rails]
     starts = np.cumsum([0, *(len(r.stations) for r in load.rails)])
@@ -69,8 +87,21 @@ def put_contacts(out: Arrays, load: LoadModel, ports: tuple[tuple[int, ...], ...
     out.integers("pair_count", counts)
     out.integers("pair_facing", np.cumsum([0, *counts])[:-1])
     out.integers("pair_under", np.cumsum([0, *under])[:-1])
-    out.integers("pair_axis", [p.axis for p in load.pairs])
     out.integers("pair_port", [r.first_port for r in rails])
+    out.reals("pair_margin", [_margin(r.stations[0], r.stations[-1]) for r in rails])
+    out.integers("pair_sources", [len(s) for s in sources])
+    out.integers("pair_source_first", np.cumsum([0, *(len(s) for s in sources)])[:-1])
+    out.integers("pair_source", [j for s in sources for j in s])
+    out.reals("rail_share", [s.rail_share for s in load.sources])
+    if load.pairs:
+        _put_owners(out, load, ports)
+    return sum(counts), sum(under)
+
+
+def _put_pairs(out: Arrays, load: LoadModel) -> None:
+    place = {s.name: k for k, s in enumerate(load.signals)}
+    out.reals("pair_divisor", [sum(q.contact == p.contact for q in load.pairs) for p in load.pairs])
+    out.integers("pair_axis", [p.axis for p in load.pairs])
     out.integers("pair_pad", [p.pad_port for p in load.pairs])
     out.reals("pair_at", [p.station for p in load.pairs])
     out.reals("pair_sign", [-1.0 if p.rail_moves else 1.0 for p in load.pairs])
@@ -78,18 +109,16 @@ def put_contacts(out: Arrays, load: LoadModel, ports: tuple[tuple[int, ...], ...
     out.reals("pair_conductance", [p.conductance * p.area for p in load.pairs])
     out.integers("pair_switch", [place[p.switch] if p.switch else -1 for p in load.pairs])
     out.reals("pair_switched", [p.switched for p in load.pairs])
-    out.reals("pair_margin", [_margin(r.stations[0], r.stations[-1]) for r in rails])
-    out.integers("pair_sources", [len(s) for s in sources])
-    out.integers("pair_source_first", np.cumsum([0, *(len(s) for s in sources)])[:-1])
-    out.integers("pair_source", [j for s in sources for j in s])
-    out.reals("pair_divisor", [sum(q.contact == p.contact for q in load.pairs) for p in load.pairs])
-    out.reals("rail_share", [s.rail_share for s in load.sources])
-    if load.pairs:
-        out.integers("pair_rail_body", [owner[r.first_port][0] for r in rails])
-        out.integers("pair_rail_local", [owner[r.first_port][1] for r in rails])
-        out.integers("pair_pad_body", [owner[p.pad_port][0] for p in load.pairs])
-        out.integers("pair_pad_local", [owner[p.pad_port][1] for p in load.pairs])
-    return sum(counts), sum(under)
+
+
+def _put_owners(out: Arrays, load: LoadModel, ports: tuple[tuple[int, ...], ...]) -> None:
+    """On which body, and which of its ports, rails and pads are."""
+    owner = {port: (b, i) for b, of_body in enumerate(ports) for i, port in enumerate(of_body)}
+    rails = [load.rails[p.rail] for p in load.pairs]
+    out.integers("pair_rail_body", [owner[r.first_port][0] for r in rails])
+    out.integers("pair_rail_local", [owner[r.first_port][1] for r in rails])
+    out.integers("pair_pad_body", [owner[p.pad_port][0] for p in load.pairs])
+    out.integers("pair_pad_local", [owner[p.pad_port][1] for p in load.pairs])
 
 
 def put_laws(out: Arrays, load: LoadModel) -> None:
@@ -104,22 +133,23 @@ def put_laws(out: Arrays, load: LoadModel) -> None:
     out.integers("following_loss", losses)
     out.integers("follows", [bool(states_of(s.use)) for s in load.sources])
     of_log, holds = [], []
-    for kind, entries in (("source", load.sources), ("film", load.films)):
-        for k, entry in enumerate(entries):
-            out.add(law_code(f"{kind}_{k}", entry.use))
-            judged = LAWS[entry.use.law].validity
+    for kind, uses in (("source", [s.use for s in load.sources]), ("film", [f.use for f in load.films])):
+        for k, use in enumerate(uses):
+            out.add(law_code(f"{kind}_{k}", use))
+            judged = LAWS[use.law].validity
             if judged:
-                out.add(law_code(f"{kind}_{k}_holds", entry.use, holds=True))
-            if states_of(entry.use):
+                out.add(law_code(f"{kind}_{k}_holds", use, holds=True))
+            if states_of(use):
                 continue
             into = "power" if kind == "source" else "film"
-            call = _call(f"{kind}_{k}", entry.use, place, {})
+            call = _call(f"{kind}_{k}", use, place, {})
             of_log.append(f"    {into}[{k}] = m->{kind}_gain[{k}] * {call};\n")
             if judged:
-                test = _call(f"{kind}_{k}_holds", entry.use, place, {})
+                test = _call(f"{kind}_{k}_holds", use, place, {})
                 holds.append(f"    raised[flag_of_{kind}_{k}] |= (unsigned char)!{test};\n")
-    out.add("static void laws_of_log(const twin_machine *m, const real *v, real *power, real *film)\n{\n"
-                     "    (void)m;\n    (void)v;\n    (void)power;\n    (void)film;\n" + "".join(of_log) + "}\n")  # fmt: skip
+    unused = "    (void)m;\n    (void)v;\n    (void)power;\n    (void)film;\n"
+    head = "static void laws_of_log(const twin_machine *m, const real *v, real *power, real *film)\n{\n"
+    out.add(head + unused + "".join(of_log) + "}\n")
     out.add("static void laws_hold(const real *v, unsigned char *raised)\n{\n    (void)v;\n    (void)raised;\n"
                      + "".join(holds) + "}\n")  # fmt: skip
     _put_switch(out, "film", films, load.films, place, {"surface": "surface", "ambient": "ambient"})
@@ -164,11 +194,12 @@ def flags(load: LoadModel, shortest: float, step: float) -> tuple[dict[str, int]
     names += [f"axes.{a.name} beyond its stroke" for a in load.axes]
     at["flag_rail"] = len(names)
     names += [f"contacts.{p.contact}: {load.ports[p.pad_port]} beyond the stations of its rail" for p in load.pairs]
-    for kind, entries in (("source", load.sources), ("film", load.films)):
-        for k, entry in enumerate(entries):
-            if validity := LAWS[entry.use.law].validity:
-                at[f"flag_of_{kind}_{k}"] = len(names)
-                names.append(outside_flag(f"{kind}s", entry.name, validity.text))
+    used = [("source", k, s.name, s.use) for k, s in enumerate(load.sources)]
+    used += [("film", k, f.name, f.use) for k, f in enumerate(load.films)]
+    for kind, k, name, use in used:
+        if validity := LAWS[use.law].validity:
+            at[f"flag_of_{kind}_{k}"] = len(names)
+            names.append(outside_flag(f"{kind}s", name, validity.text))
     at["flag_film"] = len(names)
     for f in load.films:
         names += [f"films.{f.name} {side} {v:g} W/(m^2*K)" for side, v in (("below", f.low), ("above", f.high))]

@@ -74,10 +74,12 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
     told = f"/* {_told(artefact)}{note} */\n"
     guard = f"TWIN_{name.upper()}_H"
     header = (
-        f'{told}#ifndef {guard}\n#define {guard}\n\n#include <stddef.h>\n\n#ifdef __cplusplus\nextern "C" {{\n#endif\n\n'
+        f"{told}#ifndef {guard}\n#define {guard}\n\n#include <stddef.h>\n\n"
+        '#ifdef __cplusplus\nextern "C" {\n#endif\n\n'
         f"typedef {'float' if single else 'double'} twin_real;\n\n"
         + "".join(f"#define TWIN_{key} {value}\n" for key, value in sorted(sizes.items()))
-        + f"#define TWIN_STEP {step!r} /* s, certified */\n#define TWIN_SHORTEST {shortest!r} /* s, certified substep */\n"
+        + f"#define TWIN_STEP {step!r} /* s, certified */\n"
+        f"#define TWIN_SHORTEST {shortest!r} /* s, certified substep */\n"
         f"#define TWIN_REFERENCE {model.reference_temperature!r} /* degC */\n"
         "#define TWIN_MOST(n) ((n) > 0 ? (n) : 1)\n\n"
         + _core("runtime.h")

@@ -24,15 +24,7 @@ def put_thermal(out: Arrays, prepared: Prepared, sensor_bodies: tuple[int, ...])
     out.integers("term_matrix", _starts([len(a) for terms in A for a in terms]))
     out.reals("A_of_terms", np.concatenate([a for terms in A for a in terms] or [np.zeros(1)]))
     out.reals("nominal", system.nominal)
-    out.integers("port_count", [len(p) for p in layout.ports])
-    out.integers("port_first", _starts([len(p) for p in layout.ports]))
-    out.integers("port", [p for ports in layout.ports for p in ports])
-    out.integers("port_row", _starts([len(p) * n for p, n in zip(layout.ports, sizes, strict=True)]))
-    out.reals("P_in", np.concatenate([np.asarray(P).T.ravel() for P in system.P]))
-    if layout.symmetric:
-        out.parts.append("#define P_out P_in\n")
-    else:
-        out.reals("P_out", np.concatenate([np.asarray(P).ravel() for P in system.port_rows]))
+    _put_ports(out, prepared)
     _put_films(out, prepared)
     _put_sources(out, prepared)
     C = np.asarray(system.C)
@@ -42,6 +34,19 @@ def put_thermal(out: Arrays, prepared: Prepared, sensor_bodies: tuple[int, ...])
     out.reals("energy", system.energy)
     out.reals("one", system.one)
     out.reals("G_rows", system.G)
+
+
+def _put_ports(out: Arrays, prepared: Prepared) -> None:
+    layout, system = prepared.layout, prepared.system
+    out.integers("port_count", [len(p) for p in layout.ports])
+    out.integers("port_first", _starts([len(p) for p in layout.ports]))
+    out.integers("port", [p for ports in layout.ports for p in ports])
+    out.integers("port_row", _starts([len(p) * n for p, n in zip(layout.ports, layout.sizes, strict=True)]))
+    out.reals("P_in", np.concatenate([np.asarray(P).T.ravel() for P in system.P]))
+    if layout.symmetric:
+        out.parts.append("#define P_out P_in\n")
+    else:
+        out.reals("P_out", np.concatenate([np.asarray(P).ravel() for P in system.port_rows]))
 
 
 def _put_films(out: Arrays, prepared: Prepared) -> None:

@@ -10,17 +10,18 @@ from twin.export.fmu.variables import Variable
 Element = ET.Element
 # unit -> exponents of SI base units, factor and offset to them
 _BASE: dict[str, dict[str, str]] = {
-    "degC": {"K": "1", "offset": "273.15"}, "K": {"K": "1"}, "m": {"m": "1"}, "s": {"s": "1"}, "m/s": {"m": "1", "s": "-1"},
-    "1/s": {"s": "-1"}, "A": {"A": "1"}, "rad": {"rad": "1"}, "rad/s": {"rad": "1", "s": "-1"}, "1": {},
-    "W": {"kg": "1", "m": "2", "s": "-3"}, "N": {"kg": "1", "m": "1", "s": "-2"}, "N*m": {"kg": "1", "m": "2", "s": "-2"},
-    "m^3/s": {"m": "3", "s": "-1"}, "Pa": {"kg": "1", "m": "-1", "s": "-2"}, "V": {"kg": "1", "m": "2", "s": "-3", "A": "-1"},
+    "degC": {"K": "1", "offset": "273.15"}, "K": {"K": "1"}, "m": {"m": "1"}, "s": {"s": "1"}, "1": {},
+    "m/s": {"m": "1", "s": "-1"}, "1/s": {"s": "-1"}, "A": {"A": "1"}, "rad": {"rad": "1"},
+    "rad/s": {"rad": "1", "s": "-1"}, "W": {"kg": "1", "m": "2", "s": "-3"}, "N": {"kg": "1", "m": "1", "s": "-2"},
+    "N*m": {"kg": "1", "m": "2", "s": "-2"}, "m^3/s": {"m": "3", "s": "-1"}, "Pa": {"kg": "1", "m": "-1", "s": "-2"},
+    "V": {"kg": "1", "m": "2", "s": "-3", "A": "-1"},
 }  # fmt: skip
 
 
 def description2(name: str, token: str, variables: Sequence[Variable], about: dict[str, str]) -> bytes:
     """Of FMI 2.0; the independent variable is left out."""
-    root = ET.Element("fmiModelDescription", fmiVersion="2.0", modelName=name, guid=token,
-                      variableNamingConvention="flat", numberOfEventIndicators="0", **about)  # fmt: skip
+    own = {"fmiVersion": "2.0", "modelName": name, "guid": token, "variableNamingConvention": "flat"}
+    root = ET.Element("fmiModelDescription", {**own, "numberOfEventIndicators": "0", **about})
     simulation = ET.SubElement(
         root, "CoSimulation", modelIdentifier=name, canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUstate="true", canSerializeFMUstate="true", canBeInstantiatedOnlyOncePerProcess="false",
@@ -57,8 +58,8 @@ def description2(name: str, token: str, variables: Sequence[Variable], about: di
 
 def description3(name: str, token: str, variables: Sequence[Variable], about: dict[str, str]) -> bytes:
     """Of FMI 3.0."""
-    root = ET.Element("fmiModelDescription", fmiVersion="3.0", modelName=name, instantiationToken=token,
-                      variableNamingConvention="flat", **about)  # fmt: skip
+    own = {"fmiVersion": "3.0", "modelName": name, "instantiationToken": token, "variableNamingConvention": "flat"}
+    root = ET.Element("fmiModelDescription", {**own, **about})
     ET.SubElement(
         root, "CoSimulation", modelIdentifier=name, canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUState="true", canSerializeFMUState="true",
@@ -107,7 +108,7 @@ def _put_units(root: Element, variables: Sequence[Variable], group: str) -> None
     for unit in dict.fromkeys(v.unit for v in variables if v.listed):
         entry = ET.SubElement(units, "Unit", name=unit)
         if unit in _BASE:
-            ET.SubElement(entry, "BaseUnit", **_BASE[unit])
+            ET.SubElement(entry, "BaseUnit", _BASE[unit])
 
 
 def _bytes(root: Element) -> bytes:
