@@ -54,7 +54,7 @@ def test_a_lumped_machine_is_stepped_as_twin_run_does(lumped):
     same(read_artefact(lumped), ROOT / "tests" / "machines" / "spindle" / "runs" / "warm_up")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("machine", SHIPPED)
 def test_shipped_machines_over_their_scenarios(machine, tmp_path):
     folder = ROOT / "models" / machine

@@ -119,7 +119,7 @@ def test_one_axis(name, slide, tmp_path):
     assert found.uncorrectable[0] < 1e-12
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_three_axes(name, five_axis, tmp_path):
     """Tables over all positions leave less than a tenth; a line per axis cannot, and its file says how much."""

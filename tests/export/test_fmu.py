@@ -117,7 +117,8 @@ def slave_of(fmu, folder):
 def test_a_state_is_saved_restored_and_stored_as_bytes(fmu, tmp_path):
     slave, reference = slave_of(fmu, tmp_path)
     columns = loads(SLIDE)
-    table = inputs(columns, [n for n in reference if n in columns or n.removesuffix("_rate") in columns])
+    known = [n for n in reference if n != "time"]  # of FMI 3 the independent variable is listed
+    table = inputs(columns, [n for n in known if n in columns or n.removesuffix("_rate") in columns])
     names = table.dtype.names[1:]
     get, put = (slave.getReal, slave.setReal) if is_second(fmu) else (slave.getFloat64, slave.setFloat64)
     watched = [reference[n] for n in reference if n.startswith(("T_", "tcp_"))]
@@ -161,7 +162,9 @@ def test_gains_change_the_heat_and_reset_takes_it_back(fmu, expected):
     hot = fmpy.simulate_fmu(str(fmu), stop_time=expected.time[-1] - expected.time[0], output_interval=60.0, input=table,
                             start_values={"T_initial": initial} | dict.fromkeys(gains, 2.0))  # fmt: skip
     T = np.stack([hot[f"T_{name}"] for name in expected.sensors], axis=1)
-    assert (T[-1] - expected.temperature[-1]).max() > 0.3 * np.ptp(expected.temperature)
+    rise = expected.temperature[-1] - expected.temperature[0]
+    hottest = int(np.argmax(rise))  # nearly linear in the heat, films hardly change
+    assert T[-1, hottest] - expected.temperature[-1, hottest] == pytest.approx(rise[hottest], rel=0.1)
 
 
 def test_names_suit_every_tool(fmu):
@@ -176,7 +179,7 @@ def test_every_function_of_the_standard_is_exported(fmu, tmp_path):
     version = "2" if is_second(fmu) else "3"
     header = Path(fmpy.__file__).parent / "c-code" / f"fmi{version}Functions.h"
     wanted = set(
-        re.findall(rf"^FMI{version}_Export fmi{version}\w+TYPE\s+(fmi{version}\w+);", header.read_text(), re.M)
+        re.findall(rf"^\s*FMI{version}_Export fmi{version}\w+TYPE\s+(fmi{version}\w+);", header.read_text(), re.M)
     )
     exchange = re.compile(
         r"fmi2(EnterEvent|NewDiscrete|EnterContinuous|CompletedInt|SetTime|SetCont|GetDer|GetEvent|GetCont|GetNom)"
@@ -205,7 +208,7 @@ def test_equal_input_gives_equal_bytes(slide_artefact, tmp_path):
         assert set(same) >= {n for n in b.namelist() if not n.endswith(".dll")}  # a linker may write the time there
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("version", ["fmu2", "fmu3"])
 @pytest.mark.parametrize("machine", SHIPPED)
 def test_shipped_machines_over_their_scenarios(machine, version, tmp_path):
