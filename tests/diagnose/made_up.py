@@ -97,6 +97,7 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
         "sensor": (SENSOR,),
         "signal": (SIGNAL,),
         "nothing": (),
+        "too_poor": (),
     }
     t = 1800.0 * np.arange(20)
     power = 40.0 * np.sin(t / 9000) ** 2

@@ -115,6 +115,7 @@ SAID = {  # what the reader of each verdict must find
     "sensor": ("sensor x_nut is at fault: drift, 0.81 K/day (95 % interval 0.70 to 0.92 K/day)",
                "The model of the machine is left as it is"),
     "signal": ("signal x_current is at fault: factor, 0.500", "0.480 to 0.520"),
+    "too_poor": ("model is too poor",),
     "nothing": ("Nothing is missing that these data could show", "would have shown, in 95 of 100 cases:", "11.6 W",
                 "3.40 W/(m²·K)", "0.310 K/day", "2.30 µm", "No family of causes passes its threshold"),
 }  # fmt: skip

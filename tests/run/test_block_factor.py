@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from twin.run.block_factor import factorise, for_keeping, plan, solve
+from twin.run.block_factor import factorise, plan, solve
 
 GRAPHS = {
     "chain": (4, {(0, 1), (1, 2), (2, 3)}),
@@ -41,8 +41,10 @@ def test_solves_the_whole_system(graph, symmetric):
     }
     b = rng.standard_normal(len(A))
     elimination = plan(n, edges)
-    factor, right = factorise(blocks, elimination, symmetric), [jnp.asarray(p) for p in np.split(b, starts[1:-1])]
-    for kept in (False, True):
-        used = for_keeping(factor, symmetric) if kept else factor
-        x = np.concatenate(solve(used, elimination, right, symmetric, kept))
-        np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=1e-11, atol=1e-13)
+    x = solve(
+        factorise(blocks, elimination, symmetric),
+        elimination,
+        [jnp.asarray(p) for p in np.split(b, starts[1:-1])],
+        symmetric,
+    )
+    np.testing.assert_allclose(np.concatenate(x), np.linalg.solve(A, b), rtol=1e-11, atol=1e-13)

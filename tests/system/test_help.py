@@ -59,4 +59,12 @@ def test_every_command_on_the_page_exists(page, monkeypatch):
 
 def test_the_list_of_commands_is_complete():
     assert {name for name, *_ in calls_of("docs/commands.md")} == set(COMMANDS) - {"demo"}
-    assert {name for name, *_ in calls_of("README.md")} == {"check", "build", "run", "export", "calibrate", "diagnose"}
+    assert {name for name, *_ in calls_of("README.md")} == {
+        "new",
+        "check",
+        "build",
+        "run",
+        "export",
+        "calibrate",
+        "diagnose",
+    }

@@ -184,7 +184,7 @@ def diagnose(
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
-    poor = too_poor(shown, plans, usable, settings.temperature_sigma, settings.policy.poor)
+    poor = too_poor(shown, plans, usable, settings.temperature_sigma)
     if poor is not None:
         notes.insert(0, poor.note)
         verdict, causes, shown = "too_poor", (), _beside_sensors(found, {})

@@ -5,8 +5,8 @@ n_b^3 over the bodies instead of (sum n_b)^3, and a solve is a few products with
 Matrix Computations, 4th ed., sections 4.2.9 and 4.5; D_i are the pivot blocks left after elimination of earlier bodies.
 
 - symmetric positive definite: block Cholesky, D_i = G_i G_i^T. The factor holds G_i^-1 and L_ji = S_ji G_i^-T for
-  coupled later bodies j. Inverted triangles turn solves into products. D_i^-1 itself saves one of two per solve and
-  costs n_i^3 more: a factor that is kept for another step is turned into it (`for_keeping`), and holds L_ji of below.
+  coupled later bodies j. Inverted triangles turn the many solves of frozen steps into products; D_i^-1 itself would
+  save a product per solve and cost n_i^3 more per factorisation.
 - otherwise: block LU, pivoting inside the blocks only. The factor holds D_i^-1, L_ji = S_ji D_i^-1, R_ij = D_i^-1 S_ij.
 """
 
@@ -53,7 +53,7 @@ def plan(n_bodies: int, edges: set[tuple[int, int]]) -> Elimination:
 class BlockFactor:
     """Parallel to Elimination.order; inner tuples parallel to Elimination.later."""
 
-    pivot: tuple[jax.Array, ...]  # G_i^-1, or D_i^-1 for oblique matrices and kept factors (n_i, n_i)
+    pivot: tuple[jax.Array, ...]  # G_i^-1, or D_i^-1 for oblique matrices (n_i, n_i)
     left: tuple[tuple[jax.Array, ...], ...]  # L_ji (n_j, n_i)
     right: tuple[tuple[jax.Array, ...], ...]  # R_ij (n_i, n_j); empty for symmetric matrices
 
@@ -95,34 +95,22 @@ def factorise(blocks: Blocks, elimination: Elimination, symmetric: bool) -> Bloc
     return BlockFactor(tuple(pivots), tuple(lefts), tuple(rights))
 
 
-def for_keeping(factor: BlockFactor, symmetric: bool) -> BlockFactor:
-    """The same factor for `solve` with kept = True: D_i^-1 = G_i^-T G_i^-1, S_ji D_i^-1 = (S_ji G_i^-T) G_i^-1."""
-    if not symmetric:
-        return factor
-    left = tuple(tuple(L @ G for L in row) for row, G in zip(factor.left, factor.pivot, strict=True))
-    return BlockFactor(tuple(G.T @ G for G in factor.pivot), left, factor.right)
-
-
-def solve(
-    factor: BlockFactor, elimination: Elimination, right: list[jax.Array], symmetric: bool, kept: bool = False
-) -> list[jax.Array]:
-    """Solution per body for right-hand sides per body (n_b,). kept: the factor went through `for_keeping`."""
-    y, triangles = list(right), symmetric and not kept
+def solve(factor: BlockFactor, elimination: Elimination, right: list[jax.Array], symmetric: bool) -> list[jax.Array]:
+    """Solution per body for right-hand sides per body (n_b,)."""
+    y = list(right)
     for place, (i, later) in enumerate(zip(elimination.order, elimination.later, strict=True)):
-        if triangles:
+        if symmetric:
             y[i] = factor.pivot[place] @ y[i]
         for j, L in zip(later, factor.left[place], strict=True):
             y[j] = y[j] - L @ y[i]
     for place in reversed(range(len(elimination.order))):
         i, later = elimination.order[place], elimination.later[place]
-        if not triangles:
-            y[i] = factor.pivot[place] @ y[i]
         if symmetric:
             for j, L in zip(later, factor.left[place], strict=True):
                 y[i] = y[i] - y[j] @ L  # three times faster than L.T @ y[j] in XLA on a CPU
+            y[i] = y[i] @ factor.pivot[place]
         else:
+            y[i] = factor.pivot[place] @ y[i]
             for j, R in zip(later, factor.right[place], strict=True):
                 y[i] = y[i] - R @ y[j]
-        if triangles:
-            y[i] = y[i] @ factor.pivot[place]
     return y

@@ -72,18 +72,13 @@ def factor_of(layout: Layout, system: System, rate: Array, contacts: ContactEntr
 
 
 def by_factor(
-    layout: Layout,
-    factor: BlockFactor,
-    rest: Sequence[jax.Array],
-    right: jax.Array,
-    near: jax.Array,
-    kept: bool = False,
+    layout: Layout, factor: BlockFactor, rest: Sequence[jax.Array], right: jax.Array, near: jax.Array
 ) -> jax.Array:
     """S^-1 right (N,) by the factor of a matrix nearby: what it lacks, rest (n, n) per body, acts on the state `near`.
 
-    rest: () where the factor is exact. kept: the factor went through `for_keeping`.
+    rest: () where the factor is exact.
     """
     borders = layout.offsets[1:-1]
     if len(rest):
         right = right - jnp.concatenate([R @ zb for R, zb in zip(rest, jnp.split(near, borders), strict=True)])
-    return jnp.concatenate(solve(factor, layout.elimination, jnp.split(right, borders), layout.symmetric, kept))
+    return jnp.concatenate(solve(factor, layout.elimination, jnp.split(right, borders), layout.symmetric))

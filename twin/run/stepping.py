@@ -17,10 +17,8 @@ the deviation, stable as |theta - held| < held, and the balance counts what was 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TypeVar
 
 import twin.run.jax_setup  # noqa: F401  isort: skip
 
@@ -35,12 +33,10 @@ from twin.rom.following import FOLLOW
 from twin.rom.load_model import LoadModel
 from twin.rom.step_loads import StepDrive, StepLoads, Tabulated, source_powers, step_loads
 from twin.rom.tableau import SDIRK2_6, Feedback, Tableau
-from twin.run.block_factor import BlockFactor, for_keeping
+from twin.run.block_factor import BlockFactor
 from twin.run.integrator import Sums, integrate
 from twin.run.matrix import by_factor, factor_of, terms_of
 from twin.run.system import Array, Layout, System
-
-T = TypeVar("T")
 
 
 @jax.tree_util.register_dataclass
@@ -113,7 +109,6 @@ class State:
     z: jax.Array  # (N,)
     factor: BlockFactor
     held: jax.Array  # (n_theta,) coefficients in the factor
-    kept: jax.Array | bool = False  # () whether `step` has used the factor again, so that it is of `for_keeping`
 
 
 def loads_of(layout: Layout, system: System, z: jax.Array, inputs: Inputs) -> StepLoads:
@@ -155,31 +150,16 @@ def feedback_of(layout: Layout, system: System, inputs: Inputs, power: jax.Array
     return feedback
 
 
-def leaves(state: State, inputs: Inputs, theta: jax.Array) -> jax.Array:
-    """() whether a step with coefficients (n_theta,) needs another factor than the state's."""
-    return jnp.asarray(inputs.changed | jnp.any(jnp.abs(theta - state.held) > inputs.follow * state.held))
-
-
 def kept_or_new(
     layout: Layout, system: System, state: State, inputs: Inputs, theta: jax.Array
 ) -> tuple[BlockFactor, jax.Array]:
-    """The state's factor with the coefficients (n_theta,) in it, or a new one where these are not near enough.
-
-    The state's factor is as `factor_of` made it: `step` keeps others.
-    """
+    """The state's factor with the coefficients (n_theta,) in it, or a new one where these are not near enough."""
+    anew = inputs.changed | jnp.any(jnp.abs(theta - state.held) > inputs.follow * state.held)
     return lax.cond(
-        leaves(state, inputs, theta),
+        anew,
         lambda: (factor_of(layout, system, inputs.rate, inputs.contacts, theta), theta),
         lambda: (state.factor, state.held),
     )
-
-
-def _where(condition: jax.Array, change: Callable[[T], T], value: T) -> T:
-    """change(value) where the condition holds, else value, as a loop of one turn or none: unlike the result of a
-    `lax.cond`, which is copied, what a loop carries stays where it is.
-    """
-    turn = lambda carry: (jnp.asarray(False), change(carry[1]))  # noqa: E731
-    return lax.while_loop(lambda carry: carry[0], turn, (condition, value))[1]
 
 
 def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[State, tuple[jax.Array, StepHeat]]:
@@ -189,47 +169,38 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
     """
     start, n = state.z, layout.n_films
     loads = loads_of(layout, system, start, inputs)
+    factor, held = kept_or_new(layout, system, state, inputs, loads.theta)
+    more = loads.theta - held
+    far = jnp.any(jnp.abs(more) > inputs.follow / 2 * held)  # nearer, one pass is enough; certified with it
     forcing = forcing_of(layout, system, loads)
     feedback = feedback_of(layout, system, inputs, jnp.asarray(loads.power))
 
-    def substeps(factor: BlockFactor, kept: bool, rest: tuple[jax.Array, ...], far: jax.Array | bool) -> Sums:
+    def substeps(rest: tuple[jax.Array, ...]) -> Sums:
         def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
-            after = by_factor(layout, factor, rest, right, near, kept)
+            after = by_factor(layout, factor, rest, right, near)
             if not rest:
                 return after, near
-            again = lambda: (by_factor(layout, factor, rest, right, after, kept), after)  # noqa: E731
+            again = lambda: (by_factor(layout, factor, rest, right, after), after)  # noqa: E731
             return lax.cond(far, again, lambda: (after, near))
 
         capacity = lambda z: jnp.asarray(inputs.rate * z)  # noqa: E731
         return integrate(inputs.tableau, inputs.substeps, solve, capacity, start, forcing, feedback)
 
-    new = leaves(state, inputs, loads.theta)
-    makes = lambda _: (factor_of(layout, system, inputs.rate, inputs.contacts, loads.theta), loads.theta)  # noqa: E731
-    factor, held = _where(new, makes, (state.factor, state.held))
-    factor = _where(~new & ~state.kept, lambda f: for_keeping(f, layout.symmetric), factor)
-    more = loads.theta - held
-    far = jnp.any(jnp.abs(more) > inputs.follow / 2 * held)  # nearer, one pass is enough; certified with it
     # sum_k (theta_k - held_k) A_k costs a pass over all A_k: once per step, and not at all where theta is held exactly
-    z, own, seen, following = lax.cond(
-        new,
-        lambda: substeps(factor, False, (), far),
-        lambda: lax.cond(
-            jnp.any(more != 0.0),
-            lambda: substeps(
-                factor, True, tuple(terms_of(layout, system, b, more) for b in range(len(layout.sizes))), far
-            ),
-            lambda: substeps(factor, True, (), far),
-        ),
+    z, new, old, following = lax.cond(
+        jnp.any(more != 0.0),
+        lambda: substeps(tuple(terms_of(layout, system, b, more) for b in range(len(layout.sizes)))),
+        lambda: substeps(()),
     )
     film = loads.theta[:n] * system.film_area * loads.rise + system.film_moment * loads.lift
-    film = film - (held[:n] * (system.film_rows @ own) + more[:n] * (system.film_rows @ seen)) / inputs.substeps
+    film = film - (held[:n] * (system.film_rows @ new) + more[:n] * (system.film_rows @ old)) / inputs.substeps
     radiated = system.safe_area * loads.radiated
     gross = jnp.abs(film - radiated).sum() + jnp.abs(radiated).sum()
     power = jnp.asarray(loads.power)
     if feedback is not None:
         power = power.at[np.array(layout.following_losses, dtype=int)].set(following / inputs.substeps)
     heat = StepHeat(film, gross, system.energy @ (z - start), power, loads.theta, loads.surface, loads.winding)
-    return State(z, factor, held, ~new), (z, heat)
+    return State(z, factor, held), (z, heat)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -237,9 +208,7 @@ def without_factor(layout: Layout, system: System, z: jax.Array, first: Inputs) 
     """The state to begin with, before a step of these inputs: its factor is empty, and the step must make one."""
     theta = jnp.asarray(first.theta)
     shape = jax.eval_shape(partial(factor_of, layout), system, first.rate, first.contacts, theta)
-    return State(
-        z, jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), shape), jnp.zeros(theta.shape), jnp.asarray(False)
-    )
+    return State(z, jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), shape), jnp.zeros(theta.shape))
 
 
 @partial(jax.jit, static_argnums=0)

@@ -18,7 +18,6 @@ from twin.calibrate.members.driver import LAWS, RISE, Driver
 from twin.calibrate.members.responses import Candidate, short
 from twin.errors import DescriptionError
 from twin.logs.run import Run
-from twin.machine.extend import appended, changed
 
 AREA, COEFFICIENT = 0.01, 100.0  # m^2 and W/(m^2 K) of a member: 1 W/K in all
 WIDE = 10.0  # K beyond the logged temperatures that a new signal may reach
@@ -44,6 +43,8 @@ def with_members(text: str, members: Sequence[Member], scale: float, runs: Seque
 
     Raises DescriptionError for a machine of parts, and for a load that no law turns into heat.
     """
+    from twin.machine.extend import appended, changed  # the edge has no pydantic, and writes no descriptions
+
     data = tomllib.loads(text)
     if "parts" in data:
         remedy = "add the body as a part, or describe the machine as nodes"

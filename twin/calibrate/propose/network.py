@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from twin.calibrate.members.describe import with_members
 from twin.calibrate.members.find import Found
 from twin.logs.run import Run
-from twin.machine.extend import appended
 
 _HEAD = """\
 # Proposed by `twin new --from-log` from {runs}: a network without geometry. Each node follows a logged
@@ -24,6 +23,8 @@ reference_temperature = "20 degC"
 
 def description(name: str, found: Found, runs: Sequence[Run]) -> str:
     """machine.toml of a machine that consists of the members found, its logged temperatures as sensors."""
+    from twin.machine.extend import appended
+
     names = ", ".join(run.folder.name for run in runs)
     text = _HEAD.format(runs=names if len(names) < 60 else f"{len(runs)} runs", name=json.dumps(name))
     text = with_members(text, found.members, found.selected.explained.scale, runs, "proposed")

@@ -8,16 +8,13 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure as Canvas
 
 from twin.atomic import atomic_path
 from twin.calibrate.members.find import Found
 from twin.calibrate.members.responses import duration
 from twin.calibrate.propose.columns import Column
 from twin.calibrate.propose.judge import AXES, Figure, Follows, Predicted
-from twin.pictures.style import RC
 
 _STYLE = """body { font: 15px/1.5 system-ui, sans-serif; max-width: 1000px; margin: 2rem auto; padding: 0 1rem; }
 table { border-collapse: collapse; margin: .6rem 0 1.2rem; font-size: .9rem; } td, th { text-align: left;
@@ -107,6 +104,11 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _picture(made: Sequence[Predicted]) -> str:
+    import matplotlib
+    from matplotlib.figure import Figure as Canvas
+
+    from twin.pictures.style import RC
+
     runs = list(dict.fromkeys((p.run, p.part) for p in made))
     axes = list(dict.fromkeys(p.axis for p in made))
     with matplotlib.rc_context(RC):

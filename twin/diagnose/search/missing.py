@@ -28,8 +28,6 @@ from twin.machine.edit import edited
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 
-FEWEST = 24  # rows of displacements: four hours, one in ten minutes
-
 
 @dataclass(frozen=True)
 class Missing:
@@ -46,7 +44,7 @@ def missing_members(
     progress: Progress = silent,
 ) -> Missing | None:  # fmt: skip
     """None where there are no displacements, or no member earns its place. plans: measurements, of sealed runs last."""
-    if sum(len(m.tcp) for m in plans[: len(runs)]) < FEWEST:
+    if sum(len(m.tcp) for m in plans[: len(runs)]) < found.detector.policy.rows:
         return None
     try:
         members = beside_model(artefact, runs, progress)

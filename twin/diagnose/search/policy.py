@@ -42,6 +42,9 @@ class SearchPolicy:
     predicts: float = _rule(
         0.7, JUDGED, "of what the model alone leaves of stretches left out: missing members leave less of them"
     )
+    rows: int = _rule(24, JUDGED, "of displacements, four hours of one in ten minutes, that missing members need")
+    sensors: int = _rule(3, JUDGED, "of which a model may be too poor: of fewer nobody knows which is wrong")
+    worst: int = _rule(3, JUDGED, "sensors that are told where a model is too poor")
     causes: int = _rule(3, JUDGED, "at most that are named together")
     tries: int = _rule(3, FIVE_AXIS, "rounds of candidates that the exact model refuses")
     ahead: int = _rule(12, JUDGED, "of those that pass, how many get further windows before the best is chosen")

@@ -19,9 +19,6 @@ from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.look import Search
 from twin.logs.run import Run
 
-FEWEST = 3  # sensors: of one or two nobody knows whether the model or they are wrong
-WORST = 3  # sensors that are told
-
 
 @dataclass(frozen=True)
 class Piece:
@@ -52,20 +49,20 @@ class Poor:
         return f"the model is too poor to name a cause: {left}; fits worst: {'; '.join(told)}"
 
 
-def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float, most: float) -> Poor | None:
-    """Whether the fitted runs are left by more than `most` times sigma [K] at half of the sensors; None where not."""
-    errors = []
+def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float) -> Poor | None:
+    """Whether the fitted runs are left by more than policy.poor sigma [K] at half of the sensors; else None."""
+    policy, errors = found.detector.policy, []
     for k, m in enumerate(plans[: len(runs)]):
         T, _ = found.detector.study.runs[k].split(predicted(found, k).extended)
         errors.append(m.temperature - T)
     sensors = plans[0].sensors
-    if len(sensors) < FEWEST or any(m.sensors != sensors for m in plans[: len(runs)]):
+    if len(sensors) < policy.sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
         return None
     rms = np.sqrt(np.nanmean(np.concatenate(errors) ** 2, axis=0))
     median = float(np.nanmedian(rms)) / sigma
-    if not median > most:
+    if not median > policy.poor:
         return None
-    order = np.argsort(-np.nan_to_num(rms))[:WORST]
+    order = np.argsort(-np.nan_to_num(rms))[: policy.worst]
     return Poor(median, tuple(_piece(sensors[i], int(i), float(rms[i]), errors, plans, runs) for i in order))
 
 

@@ -24,11 +24,7 @@ def put_signals(out: Arrays, load: LoadModel) -> None:
 
 
 def _put_log(out: Arrays, load: LoadModel) -> None:
-    uses = [*(s.use for s in load.sources), *(f.use for f in load.films)]
-    needed = {n for use in uses for n in use.signals.values()}
-    needed |= {a.position for a in load.axes} | {e.signal for e in load.environments}
-    needed |= {e.switch for e in load.environments} | {j.switch for j in load.joints} | {p.switch for p in load.pairs}
-    followed = {n for use in uses if states_of(use) for n in use.signals.values()}
+    needed, followed = _needed(load)
     out.names("twin_signal_name", [s.column for s in load.signals])
     out.names("twin_signal_unit", [s.unit for s in load.signals])
     out.reals("signal_low", [s.low for s in load.signals])
@@ -39,6 +35,15 @@ def _put_log(out: Arrays, load: LoadModel) -> None:
     out.integers("signal_peak", [s.kind == "peak" for s in load.signals])
     out.integers("signal_needed", [s.name in needed for s in load.signals])
     out.integers("is_followed", [s.name in followed for s in load.signals])
+
+
+def _needed(load: LoadModel) -> tuple[set[str], set[str]]:
+    """Signals that anything reads, and those of laws that follow a temperature."""
+    uses = [*(s.use for s in load.sources), *(f.use for f in load.films)]
+    needed = {n for use in uses for n in use.signals.values()}
+    needed |= {a.position for a in load.axes} | {e.signal for e in load.environments}
+    needed |= {e.switch for e in load.environments} | {j.switch for j in load.joints} | {p.switch for p in load.pairs}
+    return needed, {n for use in uses if states_of(use) for n in use.signals.values()}
 
 
 def _put_axes(out: Arrays, load: LoadModel, place: Mapping[str, int]) -> None:
