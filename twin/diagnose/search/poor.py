@@ -51,7 +51,8 @@ class Poor:
 
 def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float) -> Poor | None:
     """Whether the fitted runs are left by more than policy.poor sigma [K] at half of the sensors; else None."""
-    policy, errors = found.detector.policy, []
+    policy = found.detector.policy
+    errors: list[np.ndarray] = []
     for k, m in enumerate(plans[: len(runs)]):
         T, _ = found.detector.study.runs[k].split(predicted(found, k).extended)
         errors.append(m.temperature - T)
