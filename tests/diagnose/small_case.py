@@ -12,6 +12,7 @@ import numpy as np
 
 from tests.calibrate import lumped_case
 from twin.calibrate.fit.measured import measured
+from twin.diagnose.evidence.nulls import Form, form_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.elements import Elements, elements_of
 from twin.diagnose.model.bank import Nominal, nominal_run, respond
@@ -125,4 +126,6 @@ def responses(linear: bool = False) -> np.ndarray:
 @cache
 def made_detector() -> Detector:
     """From few synthetic measurements: thresholds are rough."""
-    return make_detector(study(), FAMILIES, instruments_of(study(), NOISE, TCP_NOISE), POLICY, counts=(24, 40))
+    instruments = instruments_of(study(), NOISE, TCP_NOISE)
+    form = Form(steep=form_of(machine()).steep)  # a lumped machine, with contacts as uncertain as a mesh's
+    return make_detector(study(), FAMILIES, instruments, POLICY, form, counts=(24, 40))

@@ -210,7 +210,6 @@ def test_a_joint_that_conducts_nothing_any_more_keeps_its_evidence():
     assert 0.0 < found.covariance[0, 0] < 0.1
 
 
-@pytest.mark.slow
 def test_sizes_scored_together_are_scored_as_each_alone():
     detector, study = small_case.made_detector(), small_case.study()
     k, x = study.fitted[0], np.zeros(len(study.probed.parameters))

@@ -79,7 +79,6 @@ def test_heat_that_goes_down_by_steps_is_no_window(watts, leave, monkeypatch):
     assert (verdict_of(found, FAMILIES)[0] == "unknown") != leave
 
 
-@pytest.mark.slow
 def test_a_second_cause_explains_more_than_the_first_ones_misfits(monkeypatch):
     study, y = small_case.study(), measured("heat", "housing", 400.0, seed=3)
     first = 0

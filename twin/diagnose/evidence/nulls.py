@@ -56,8 +56,9 @@ class Form:
 
 
 def form_of(machine: Machine) -> Form:
-    """That of a machine: a lumped one has no mesh at the patch of a contact."""
-    return Form(contact=LUMPED) if machine.lumped else Form()
+    """That of a machine: a lumped one has no mesh at the patch of a contact, and a film of a node is no face's:
+    with its exponent as another nuisance the lumped machine of the tests lost faults that it had found."""
+    return Form(contact=LUMPED, steep=0.0) if machine.lumped else Form()
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,8 @@ def described_forms(
     for environment in load.environments:
         for c in elements.block_of.get(("air", environment.name), ()):
             columns.append(form.air * raw[:, c].astype(float))
-    columns += _steeper(study, elements, nominal, raw, form)
+    if form.steep > 0.0:
+        columns += _steeper(study, elements, nominal, raw, form)
     slow = tuple(own for (kind, _), own in elements.block_of.items() if kind == "group")
     made = np.stack(columns, axis=1) if columns else np.zeros((len(raw), 0))
     return Described(made, slow, elements.histories.blocks)

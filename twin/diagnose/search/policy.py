@@ -34,6 +34,11 @@ class SearchPolicy:
     poor: float = _rule(
         5.0, JUDGED, "of the rms left at half of the sensors, above which no cause is named", "sigma of a reading"
     )
+    relieves: float = _rule(
+        0.5,
+        JUDGED,
+        "of what the recalibrated model leaves at half of the sensors: causes that leave less stand",
+    )
     halves: float = _rule(
         0.5,
         JUDGED,

@@ -50,21 +50,29 @@ class Poor:
 
 
 def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float) -> Poor | None:
-    """Whether the fitted runs are left by more than policy.poor sigma [K] at half of the sensors; else None."""
+    """None where half of the sensors are left with less than policy.poor sigma [K], or causes explain most of it."""
     policy = found.detector.policy
-    errors: list[np.ndarray] = []
-    for k, m in enumerate(plans[: len(runs)]):
-        T, _ = found.detector.study.runs[k].split(predicted(found, k).extended)
-        errors.append(m.temperature - T)
     sensors = plans[0].sensors
     if len(sensors) < policy.sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
         return None
-    rms = np.sqrt(np.nanmean(np.concatenate(errors) ** 2, axis=0))
+    before: list[np.ndarray] = []
+    errors: list[np.ndarray] = []
+    for k, m in enumerate(plans[: len(runs)]):
+        models = predicted(found, k)
+        for into, flat in ((before, models.recalibrated), (errors, models.extended)):
+            into.append(m.temperature - found.detector.study.runs[k].split(flat)[0])
+    rms = _rms(errors)
     median = float(np.nanmedian(rms)) / sigma
-    if not median > policy.poor:
+    explained = bool(np.nanmedian(rms) < policy.relieves * np.nanmedian(_rms(before)))
+    if explained or not median > policy.poor:
         return None
     order = np.argsort(-np.nan_to_num(rms))[: policy.worst]
     return Poor(median, tuple(_piece(sensors[i], int(i), float(rms[i]), errors, plans, runs) for i in order))
+
+
+def _rms(errors: Sequence[np.ndarray]) -> np.ndarray:
+    """(s,) K over all runs."""
+    return np.asarray(np.sqrt(np.nanmean(np.concatenate(errors) ** 2, axis=0)))
 
 
 def _piece(
