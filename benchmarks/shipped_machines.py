@@ -51,7 +51,7 @@ TOGETHER = {  # signals of one motion that their names do not tell
     "transfer_unit": {"spindle_speed": "spindle", "spindle_power": "spindle", "table_torque": "table",
                       "table_motor_speed": "table"},
 }  # fmt: skip
-LESS = {"ram_borer": {"spindle_power": 0.45}}  # of a drawn signal: hardly any machine cuts at full power for hours
+LESS = {"ram_borer": {"spindle_power": 0.45}}  # of a drawn signal: few machines cut at full power for hours
 FACTORS = {"loss_law": 1.6, "joint": 0.3, "film_gain": 2.0, "expansion": 1.15}
 PARAMETERS = {"loss_law": "gain", "joint": "conductance", "film_gain": "gain", "expansion": "expansion"}
 TIMES = 2.0  # of what is just visible: hidden heat

@@ -163,7 +163,7 @@ def test_gains_change_the_heat_and_reset_takes_it_back(fmu, expected):
                             start_values={"T_initial": initial} | dict.fromkeys(gains, 2.0))  # fmt: skip
     T = np.stack([hot[f"T_{name}"] for name in expected.sensors], axis=1)
     rise = expected.temperature[-1] - expected.temperature[0]
-    hottest = int(np.argmax(rise))  # nearly linear in the heat, films hardly change
+    hottest = int(np.argmax(rise))  # nearly linear in the heat: films change little
     assert T[-1, hottest] - expected.temperature[-1, hottest] == pytest.approx(rise[hottest], rel=0.1)
 
 

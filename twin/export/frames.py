@@ -12,16 +12,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from twin.errors import TwinError
 from twin.export.options import ExportOptions
-from twin.ordinary import ordinary
+from twin.export.run_result import named_result
 from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
 from twin.rom.tcp import by_body
-from twin.run.results import FORMAT
 
 
 @dataclass(frozen=True)
@@ -68,22 +66,10 @@ def frames_of(artefact: Artefact, options: ExportOptions) -> Frames:
 
 
 def _stored(artefact: Artefact, options: ExportOptions) -> _Stored:
-    remedy = "name the folder of `twin run -o`, made with this artefact"
-    if options.result is None:
-        raise TwinError("this format is of a result", "--result", remedy)
-    path = Path(options.result)
-    path = path / "result.h5" if path.is_dir() else path
-    try:
-        with h5py.File(ordinary(path), "r") as f:
-            if f.attrs.get("format") != FORMAT:
-                raise TwinError("not a result of `twin run`", str(path), remedy)
-            if f.attrs["artefact"] != artefact.digest:
-                raise TwinError("a result of another artefact", str(path), remedy)
-            time = f["time"][...]
-            chosen = np.unique(np.linspace(0, len(time) - 1, min(options.frames, len(time))).round().astype(int))
-            return _Stored(time, f["states"][...], strings(f["axis"]), f["position"][...], chosen, path.parent)
-    except (OSError, KeyError) as e:
-        raise TwinError("not a result of `twin run`", str(path), remedy) from e
+    with named_result(artefact, options) as f:
+        time = f["time"][...]
+        chosen = np.unique(np.linspace(0, len(time) - 1, min(options.frames, len(time))).round().astype(int))
+        return _Stored(time, f["states"][...], strings(f["axis"]), f["position"][...], chosen, Path(f.filename).parent)
 
 
 def _surface(artefact: Artefact, stored: _Stored) -> Frames:

@@ -11,17 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from twin.errors import TwinError
 from twin.export.options import ExportOptions
 from twin.nearest import did_you_mean
-from twin.ordinary import ordinary
 from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
 from twin.rom.load_model import Film, LoadModel
-from twin.run.results import FORMAT
+from twin.run.results import result_file
 from twin.units import to_si
 
 
@@ -73,24 +71,15 @@ def of_result(path: Path, artefact: str, load: LoadModel, time: float | None = N
     artefact: sha256 of the model that the result must be of. Raises TwinError for other files and results of other
     artefacts, and for times outside the run.
     """
-    path = Path(path)
-    path = path / "result.h5" if path.is_dir() else path
     remedy = "give the folder of `twin run -o`, made with this artefact"
-    try:
-        with h5py.File(ordinary(path), "r") as f:
-            if f.attrs.get("format") != FORMAT:
-                raise TwinError("not a result of `twin run`", str(path), remedy)
-            if f.attrs["artefact"] != artefact:
-                raise TwinError("a result of another artefact", str(path), remedy)
-            ends = f["time"][1:] - f["time"][0]
-            if time is not None and not 0.0 <= time <= ends[-1]:
-                what = f"the run lasts {ends[-1] / 3600:g} h"
-                raise TwinError(what, "--time", f"write a time within, for example --time '{ends[-1] / 7200:g} h'")
-            step = len(ends) - 1 if time is None else int(np.abs(ends - time).argmin())
-            films = dict(zip(strings(f["film"]), f["film_coefficient"][step], strict=True))
-            axes = dict(zip(strings(f["axis"]), f["position"][step + 1], strict=True))
-    except (OSError, KeyError) as e:
-        raise TwinError("not a result of `twin run`", str(path), remedy) from e
+    with result_file(path, artefact, remedy) as f:
+        ends = f["time"][1:] - f["time"][0]
+        if time is not None and not 0.0 <= time <= ends[-1]:
+            what = f"the run lasts {ends[-1] / 3600:g} h"
+            raise TwinError(what, "--time", f"write a time within, for example --time '{ends[-1] / 7200:g} h'")
+        step = len(ends) - 1 if time is None else int(np.abs(ends - time).argmin())
+        films = dict(zip(strings(f["film"]), f["film_coefficient"][step], strict=True))
+        axes = dict(zip(strings(f["axis"]), f["position"][step + 1], strict=True))
     return OperatingPoint(
         np.array([axes[a.name] for a in load.axes], dtype=float),
         np.array([films[f.name] for f in load.films], dtype=float),

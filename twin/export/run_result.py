@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,11 +11,10 @@ import numpy as np
 
 from twin.errors import TwinError
 from twin.export.options import ExportOptions
-from twin.ordinary import ordinary
 from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
 from twin.run.correction_axes import axis_jacobian, offset_matrix
-from twin.run.results import FORMAT
+from twin.run.results import result_file
 
 
 @dataclass(frozen=True)
@@ -37,26 +37,22 @@ class RunResult:
     tables: dict[str, Quantities]
 
 
+def named_result(artefact: Artefact, options: ExportOptions) -> AbstractContextManager[h5py.File]:
+    """The open result that the options name. Raises TwinError where none is named, and as `result_file`."""
+    remedy = "name the folder of `twin run -o`, made with this artefact"
+    if options.result is None:
+        raise TwinError("this format is of a result", "--result", remedy)
+    return result_file(Path(options.result), artefact.digest, remedy)
+
+
 def result_of(artefact: Artefact, options: ExportOptions) -> RunResult:
     """The result that the options name, all times. `offset` is what to add to the axes at every pose: -J^-1 w.
 
     Without the offsets where no axis moves the tool. Raises TwinError where no result is named, for other files and
     results of other artefacts.
     """
-    remedy = "name the folder of `twin run -o`, made with this artefact"
-    if options.result is None:
-        raise TwinError("this format is of a result", "--result", remedy)
-    path = Path(options.result)
-    path = path / "result.h5" if path.is_dir() else path
-    try:
-        with h5py.File(ordinary(path), "r") as f:
-            if f.attrs.get("format") != FORMAT:
-                raise TwinError("not a result of `twin run`", str(path), remedy)
-            if f.attrs["artefact"] != artefact.digest:
-                raise TwinError("a result of another artefact", str(path), remedy)
-            return _read(f, artefact)
-    except (OSError, KeyError) as e:
-        raise TwinError("not a result of `twin run`", str(path), remedy) from e
+    with named_result(artefact, options) as f:
+        return _read(f, artefact)
 
 
 def _read(f: h5py.File, artefact: Artefact) -> RunResult:

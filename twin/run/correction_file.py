@@ -8,7 +8,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from twin.atomic import atomic_path
@@ -18,7 +17,7 @@ from twin.rom.hdf5_file import strings
 from twin.run.correction import Correction, PoseErrors, Quality
 from twin.run.correction_polynomial import NormalisedAxis, Polynomial
 from twin.run.correction_rotary import RotaryCorrection
-from twin.run.results import FORMAT as RESULT_FORMAT
+from twin.run.results import result_file
 
 FORMAT, VERSION = "twin correction", 1
 HOW = (
@@ -33,27 +32,18 @@ def read_pose_errors(path: Path, artefact: str, time: float | None = None) -> tu
     artefact: sha256 of the model that the result must be of. time [s] since the start of the run: the nearest end of a
     step is taken; by default the last. Raises TwinError for other files, other artefacts, and times outside the run.
     """
-    path = Path(path)
-    path = path / "result.h5" if path.is_dir() else path
     remedy = "give the folder of `twin run -o`, made with this artefact"
-    try:
-        with h5py.File(ordinary(path), "r") as f:
-            if f.attrs.get("format") != RESULT_FORMAT:
-                raise TwinError("not a result of `twin run`", str(path), remedy)
-            if f.attrs["artefact"] != artefact:
-                raise TwinError("a result of another artefact", str(path), remedy)
-            times = f["time"][...]
-            row = len(times) - 1 if time is None else int(np.argmin(np.abs(times - times[0] - time)))
-            last = float(times[-1] - times[0])
-            if time is not None and not 0.0 <= time <= last:
-                what = f"the run lasts {last / 3600:g} h"
-                raise TwinError(what, "--time", f"write a time within, for example --time '{last / 7200:g} h'")
-            axes, poses = strings(f["pose_axis"]), f["pose_position"][...]
-            grid = tuple(np.unique(p) for p in poses.T)
-            errors = PoseErrors(axes, grid, poses, f["tcp"][row], state=f["states"][row])
-            return errors, float(times[row] - times[0])
-    except (OSError, KeyError) as e:
-        raise TwinError("not a result of `twin run`", str(path), remedy) from e
+    with result_file(path, artefact, remedy) as f:
+        times = f["time"][...]
+        row = len(times) - 1 if time is None else int(np.argmin(np.abs(times - times[0] - time)))
+        last = float(times[-1] - times[0])
+        if time is not None and not 0.0 <= time <= last:
+            what = f"the run lasts {last / 3600:g} h"
+            raise TwinError(what, "--time", f"write a time within, for example --time '{last / 7200:g} h'")
+        axes, poses = strings(f["pose_axis"]), f["pose_position"][...]
+        grid = tuple(np.unique(p) for p in poses.T)
+        errors = PoseErrors(axes, grid, poses, f["tcp"][row], state=f["states"][row])
+        return errors, float(times[row] - times[0])
 
 
 def write_correction(

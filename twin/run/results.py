@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -159,18 +160,30 @@ def _write_hdf5(path: Path, result: Result) -> None:
         put(f, "states", result.states, "K", ("time", "state"), "modal coordinates of the artefact")
 
 
-def read_final_state(path: Path, artefact: str) -> np.ndarray:
-    """The state (N,) at the end of a result.h5 of the model with this sha256, to go on from.
+@contextmanager
+def result_file(path: Path, artefact: str, remedy: str) -> Iterator[h5py.File]:
+    """An open result.h5 of the model with this sha256; path: the file, or the folder of `twin run -o`.
 
-    Raises TwinError for other files and results of other artefacts.
+    Raises TwinError for other files, for results of other artefacts, and for what is missing while it is read.
     """
-    remedy = "give a temperature in degC or the result.h5 of a run of this artefact"
+    path = Path(path)
+    path = path / "result.h5" if path.is_dir() else path
     try:
         with h5py.File(ordinary(path), "r") as f:
             if f.attrs.get("format") != FORMAT:
                 raise TwinError("not a result of `twin run`", str(path), remedy)
             if f.attrs["artefact"] != artefact:
                 raise TwinError("a result of another artefact", str(path), remedy)
-            return np.asarray(f["states"][-1])
+            yield f
     except (OSError, KeyError) as e:
         raise TwinError("not a result of `twin run`", str(path), remedy) from e
+
+
+def read_final_state(path: Path, artefact: str) -> np.ndarray:
+    """The state (N,) at the end of a result.h5 of the model with this sha256, to go on from.
+
+    Raises TwinError for other files and results of other artefacts.
+    """
+    remedy = "give a temperature in degC or the result.h5 of a run of this artefact"
+    with result_file(path, artefact, remedy) as f:
+        return np.asarray(f["states"][-1])

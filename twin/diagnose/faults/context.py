@@ -45,7 +45,7 @@ def single(context: Context, fault: Fault) -> list[Batch]:
 
 
 def called(context: Context, fault: Fault, history: str) -> list[Batch]:
-    """Likewise of a kind of one history, under another name; none where there is no column."""
+    """Hypotheses of a kind of one history, under another name; none where there is no column."""
     rows = [(p, [c]) for p, _, c in context.named(fault.kind)]
     return [fault.batch(rows, (History(history, np.ones((1, 1))),))] if rows else []
 

@@ -21,7 +21,7 @@ from twin.diagnose.result.numbers import size_words
 from twin.machine.effects.effect import Effect
 
 WET = 60.0  # W/(m^2 K), the film of a coolant, and how far it may be from that
-HARDLY = 35.0  # W/(m^2 K), likewise: less than the discrepancy in 95 of 100 cases is no film of a warm liquid
+DRY = 35.0  # W/(m^2 K), of its film: less than the discrepancy in 95 of 100 cases is no film of a warm liquid
 FROZEN = 0.0  # degC, below which no medium flows over a machine
 WARMER = 0.3  # standard deviation of what its heat changes by from the middle of a window to its end
 MEDIUM = 0.15  # relative standard deviation of its film where its temperature is told, which follows from the heat
@@ -38,7 +38,7 @@ class Wetted(Fault):
 
 @dataclass(frozen=True)
 class Coolant(Fault):
-    """A film and its heat; the film of a brief one is told hardly, its heat well."""
+    """A film and its heat; of a brief one the data determine the heat well and the film badly."""
 
     def units(self, h: Hypothesis, shapes: Callable[[int], tuple[np.ndarray, ...]]) -> tuple[Unit, ...]:
         columns, weights = h.combination()
@@ -63,8 +63,8 @@ class Coolant(Fault):
         return np.array([max(a[0], -a[1] / (area * above)) if above > 0.0 else a[0], a[1]])
 
     def vanished(self, a: np.ndarray) -> bool:
-        """Warm and hardly a film: that is heat."""
-        return bool(a[0] <= HARDLY and a[1] > 0.0)
+        """Warm, and no film worth the name: that is heat."""
+        return bool(a[0] <= DRY and a[1] > 0.0)
 
     def left_open(self, units: Sequence[Unit], a: np.ndarray) -> list[Unit]:
         """A coolant that becomes warmer: its film shows in how its heat declines, and so would this."""

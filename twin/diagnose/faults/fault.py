@@ -82,7 +82,7 @@ class Fault:
     grows: bool = True  # in windows, of which the data may ask for more
     several: bool = False  # comes part by part: one of them explains a share
     leaves: float = 0.005  # of its statistic: heat that it may leave in windows because the model is not the machine
-    faint: bool = False  # scores hardly anything by its derivative when it is many times as large
+    faint: bool = False  # its score by the derivative is small when it is many times as large
     read: bool = False  # acts on what is read, not in the machine
     curved: bool = False  # on what is read, and not in proportion to its size
     sizes: tuple[float, ...] = ()  # at which such a one is scored beside its column's

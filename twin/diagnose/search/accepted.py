@@ -132,7 +132,7 @@ def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.
 
 
 def curved_change(detector: Detector, h: Hypothesis, size: float, x: np.ndarray | None) -> np.ndarray:
-    """(m,) likewise of what is curved, in what is measured; x None: of the nominal machine, which costs no step."""
+    """(m,) change of what is measured by what is curved; x None: of the nominal machine, which costs no step."""
     study, nominal = detector.study, detector.nominal
 
     def states(k: int) -> np.ndarray:

@@ -77,7 +77,7 @@ class SearchPolicy:
     entrants: int = _rule(5, FIVE_AXIS, "candidates of a kind that are refitted")
     behind: float = _rule(0.15, FIVE_AXIS, "of the leader: who scores less cannot overtake it by being refitted")
     saturates: float = _rule(
-        0.4, FIVE_AXIS, "likewise of capacities and of coolants' films: the larger they are, the worse is linearity"
+        0.4, FIVE_AXIS, "of the leader, for capacities and coolants' films: the larger they are, the worse is linearity"
     )
     edge: float = _rule(4.0, FIVE_AXIS, "that an edge gains where nothing is hidden", "likelihood-ratio units")
     amplitude: float = _rule(
@@ -97,7 +97,7 @@ class SearchPolicy:
     closely: int = _rule(
         3,
         FIVE_AXIS,
-        "factors that are looked at again where their parameters are; likewise of a signal, fitted exactly",
+        "factors that are looked at again where their parameters are; those of a signal too, fitted exactly",
     )
     signals: int = _rule(2, FIVE_AXIS, "of which any factor is fitted exactly")
     pulled: float = _rule(
@@ -125,7 +125,7 @@ class SearchPolicy:
         "of what a signal's factor and a declared number do, from which the one may be the other",
         "cosine",
     )
-    same: float = _rule(0.998, FIVE_AXIS, "likewise of what is read nowhere else", "cosine")
+    same: float = _rule(0.998, FIVE_AXIS, "the same for a signal that nothing else reads", "cosine")
     distant: float = _rule(
         1.0,
         FIVE_AXIS,
@@ -171,7 +171,7 @@ class SearchPolicy:
     trial: int = _rule(4, SOLVER, "by which coolants are compared before the best of them are refitted")
     enough: float = _rule(0.02, SOLVER, "that a pass moves it by when it has arrived", "of a size")
     less: float = _rule(1.0, SOLVER, "a pass that changes less is the last", "likelihood-ratio units")
-    less_share: float = _rule(1e-3, SOLVER, "of a statistic, likewise")
+    less_share: float = _rule(1e-3, SOLVER, "of a statistic, a pass that changes less is the last")
     near: float = _rule(1.0, SOLVER, "longest step of parameters in an exact refit", "prior standard deviations")
     lowest_change: float = _rule(
         -0.97, SOLVER, "from -0.98 on the integration holds a conductance, and no derivative is left", "relative change"

@@ -27,7 +27,7 @@ def write_fmu2(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[
 
 
 def write_fmu3(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str, ...]:
-    """FMI 3.0, likewise."""
+    """FMI 3.0. Raises TwinError where there is no compiler, and where the file cannot be written."""
     return _write(artefact, path, options, "3")
 
 
