@@ -8,6 +8,7 @@ import h5py
 import pytest
 
 from tests.calibrate import lumped_case
+from twin.cli.calibrate_text import _channels as channel_lines
 from twin.cli.main import run as twin
 from twin.logs.write import write_run
 from twin.machine.load import load_machine
@@ -154,3 +155,11 @@ def test_an_old_artefact_without_parameters_says_what_to_do(folder, tmp_path, ca
         stamp(f)
     assert twin(["calibrate", str(old), str(folder / "truth"), "-o", str(tmp_path / "B.h5")]) == 2
     assert "build it again" in capsys.readouterr().err
+
+
+def test_channels_of_a_machine_without_sensors_are_its_displacements():
+    row = {"run": "monday", "channel": "dx", "unit": "m", "rms": 2e-6, "kept": 1.0}
+    (_, head, line) = channel_lines([row], 5)
+    assert head.startswith("channel")
+    assert line.split()[:4] == ["dx", "monday", "2.00", "um"]
+    assert channel_lines([row | {"rms": None}], 5) == []

@@ -69,8 +69,11 @@ def _channels(rows: Sequence[Mapping[str, Any]], most: int) -> list[str]:
     if not rows:
         return []
     marked = sorted((r for r in rows if r["kept"] < 0.9 or r.get("leaps") or r.get("wrong")), key=lambda r: r["kept"])
-    worst = sorted((r for r in rows if r["unit"] == "K" and r["rms"] and r not in marked), key=lambda r: -r["rms"])
+    others = [r for r in rows if r["rms"] and r not in marked]
+    worst = sorted(others, key=lambda r: (r["unit"] != "K", -r["rms"]))
     shown = [*marked[:most], *worst[: max(0, most - len(marked))]]
+    if not shown:
+        return []
     width = max(len(r["channel"]) for r in shown)
     long = max(len(r["run"]) for r in shown)
     lines = [
