@@ -13,7 +13,7 @@ PYTEST_ARGS ?=
 .PHONY: help
 help: ## this list
 	@echo "usage: make TARGET"; echo
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-17s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 # The stamp follows the lock, so a changed pin reaches an existing .venv with the next command.
 $(READY): requirements.lock pyproject.toml
@@ -60,10 +60,16 @@ bench: $(READY) ## what is claimed about speed, memory and accuracy, measured he
 	$(BIN)/python -m benchmarks
 
 .PHONY: campaign
-campaign: $(READY) ## hide effects in data by the hundred and look for them; MINUTES=60 stops earlier, and goes on next time; FIRST=4400 are other trials
+campaign: $(READY) ## hide effects in the five-axis machine and look for them (MINUTES=60 stops earlier, FIRST=4400 are other trials)
 	@$(BIN)/python -c 'import gmsh' 2>/dev/null || { echo "installing gmsh, for the other mesh of the trials"; \
 	    $(BIN)/python -m pip install -qq --disable-pip-version-check --no-build-isolation -e '.[mesh]'; }
 	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign $(or $(MINUTES),inf) $(FIRST)
+
+.PHONY: campaign-machines
+campaign-machines: $(READY) ## the same in drawn and in other shipped machines (KINDS="lumped nodes"; SCHEDULER=tcp://HOST:PORT)
+	@$(BIN)/python -c 'import gmsh' 2>/dev/null || { echo "installing gmsh, for the other mesh of the trials"; \
+	    $(BIN)/python -m pip install -qq --disable-pip-version-check --no-build-isolation -e '.[mesh]'; }
+	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.machines_campaign $(or $(MINUTES),inf) $(or $(FIRST),300) $(KINDS)
 
 .PHONY: demo
 demo: $(READY) ## build, verify and run the shipped five-axis machine; leaves out/ with pictures
@@ -76,7 +82,7 @@ notebooks: $(READY) ## execute the notebooks and check the numbers they assert
 .PHONY: lock
 lock: ## resolve requirements.lock anew (keeps pins that still hold; UPGRADE=1 moves them)
 	@[ -x .cache/lock/bin/uv ] || { "$(PYTHON)" -m venv .cache/lock && .cache/lock/bin/pip install --quiet uv; }
-	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --universal \
+	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --extra cluster --universal \
 	    --python-version 3.11 --generate-hashes --no-config --no-emit-index-url --quiet \
 	    --custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o requirements.lock
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.five_axis import EXPERIMENT, machine
+from benchmarks.spread import spread
 from twin.atomic import atomic_path
-from twin.build.workers import each
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES
@@ -151,18 +151,24 @@ def _variance(detector: Detector, flat: np.ndarray, temperature: np.ndarray, tcp
     return float(np.nanmean(np.concatenate(parts) ** 2))
 
 
-def _several(deadline: float, trials: Sequence[Item]) -> None:
-    """deadline: as `time.time` counts; what comes later is left for the next time."""
+def _several(deadline: float, trials: Sequence[Item]) -> list[dict[str, Any]]:
+    """A row per trial. deadline: as `time.time` counts; what comes later is left for the next time."""
+    rows = []
     for family, factor, seed in trials:
         if time.time() > deadline:
-            return
+            break
         try:
             result = judged(made_detector(), draw(EXPERIMENT, family, factor, seed))
         except Exception as e:  # a trial that fails is a result, too
             result = {"family": family, "factor": factor, "seed": seed, "error": f"{type(e).__name__}: {e}"}
-        OUT.mkdir(parents=True, exist_ok=True)
-        with (OUT / f"trials-{os.getpid()}.jsonl").open("a", encoding="utf-8") as f:
-            f.write(json.dumps(result) + "\n")
+        rows.append(result)
+    return rows
+
+
+def _kept(rows: Sequence[dict[str, Any]]) -> None:
+    OUT.mkdir(parents=True, exist_ok=True)
+    with (OUT / f"trials-{os.getpid()}.jsonl").open("a", encoding="utf-8") as f:
+        f.writelines(json.dumps(row) + "\n" for row in rows)
 
 
 def results(first: int = FIRST) -> list[dict[str, Any]]:
@@ -179,7 +185,12 @@ def main(minutes: float = float("inf"), first: int = FIRST) -> None:
     deadline = time.time() + 60.0 * minutes
     pieces = [list(sizes) for _, sizes in groupby(todo, key=lambda item: (item[0], item[2]))]
     with bar("campaign", len(pieces)) as advance:
-        each(_several, deadline, pieces, lambda p: advance(f"{p[0][0]} of seed {p[0][2]}"), long=0.0)
+
+        def done(piece: list[Item], rows: list[dict[str, Any]]) -> None:
+            _kept(rows)
+            advance(f"{piece[0][0]} of seed {piece[0][2]}")
+
+        spread(_several, deadline, pieces, done)
     text = page(results(first), limits_of(detector), KNOWN, EXPERIMENT.folder.name)
     print(text, flush=True)
     with atomic_path(OUT / "tables.md") as temporary:

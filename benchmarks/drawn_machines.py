@@ -1,4 +1,7 @@
-"""Faults hidden in drawn machines, and what is said: `python -m benchmarks.drawn_machines FIRST N [boxes|lumped]`.
+"""Faults hidden in drawn machines, and what is said: `python -m benchmarks.drawn_machines FIRST N [KIND]`.
+
+KIND: boxes or lumped, drawn as well by default; nodes is the shipped network of the ball-screw axis, of which loads,
+noise and real machines are drawn.
 
 Truth is the full model of the real machine (`twin.inject.machines.other`): another mesh, other film laws, values off.
 Every machine is looked at with nothing hidden and with one fault of each of IN_MACHINE and IN_LOG; a row per trial goes
@@ -30,13 +33,18 @@ from twin.diagnose.search.forward import search
 from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.sealed import judged as on_sealed
 from twin.diagnose.search.verdict import verdict_of, with_faults
-from twin.inject.machines.drawn import RUNS, DrawnMachine, draw_machine
+from twin.inject.machines.drawn import HOURS, NOISE, RUNS, SAMPLINGS, DrawnMachine, draw_machine
+from twin.inject.machines.draws import between, one_of
+from twin.inject.machines.loads import loads_of_run
 from twin.inject.machines.other import other
 from twin.logs.read import read_run
 from twin.logs.run import Run
 from twin.machine.description import Machine
+from twin.machine.load import load_machine
 
 OUT = Path("out/drawn")
+NODES = Path(__file__).parents[1] / "models" / "ball_screw_axis" / "nodes.toml"
+SCREW = {"screw_speed": "x"}  # its drive, which the name does not tell
 TRUTHS = 2  # real machines with nothing hidden, per description
 # family -> size; places are drawn among those that the machine has
 IN_MACHINE = {"heat_source": "", "loss_law": "1.6", "joint": "0.3", "film_gain": "2", "expansion": "1.3"}
@@ -127,7 +135,7 @@ def main(first: int, count: int, kind: str = "") -> None:
         path = OUT / f"{kind or 'any'}_{seed}.jsonl"
         if not path.exists():
             with tempfile.TemporaryDirectory() as folder:
-                made = judged(draw_machine(seed, kind or None), Path(folder))  # type: ignore[arg-type]
+                made = judged(drawn_of(kind, seed), Path(folder))
             path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
         rows += [json.loads(line) | {"seed": seed} for line in path.read_text(encoding="utf-8").splitlines()]
     counted(rows)
@@ -146,6 +154,19 @@ def counted(rows: Sequence[Row]) -> None:
         for (hidden, seen), of_kind in answers.items():
             if seen == only:
                 print(f"   {hidden:<12} {', '.join(f'{n} {told}' for told, n in of_kind.most_common())}")
+
+
+def drawn_of(kind: str, seed: int) -> DrawnMachine:
+    """The machine of a seed: of boxes or a lumped one, of either kind by default; or the shipped network."""
+    if kind != "nodes":
+        return draw_machine(seed, kind or None)  # type: ignore[arg-type]
+    text = NODES.read_text(encoding="utf-8")
+    machine = load_machine(NODES, text)
+    rng = np.random.default_rng([seed, 9])
+    hours, sampling = int(rng.integers(HOURS[0], HOURS[1] + 1)), one_of(rng, SAMPLINGS)
+    noise = (between(rng, *NOISE[0], 2), between(rng, *NOISE[1], 2))
+    runs = tuple(loads_of_run(machine, 1000 * seed + k, n, hours, sampling, SCREW) for k, n in enumerate(RUNS))
+    return DrawnMachine(seed, "lumped", text, runs, hours, sampling, noise, len(machine.sensors), len(machine.nodes))
 
 
 Measured = tuple[tuple[str, str, str], list[Path]]  # what was hidden, and the measured runs
@@ -172,11 +193,12 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
             made = _in_log(measured_runs[1][1], out, hidden)
         if made:
             measured_runs.append((hidden, made))
-    healthy = [read_run(p) for p in measured_runs[0][1]]
+    healthy = [[read_run(p) for p in made] for _, made in measured_runs[:TRUTHS]]
     rows = []
     for hidden, paths in measured_runs:
         own = [read_run(p) for p in paths]
-        by = moved(own, healthy) if hidden[0] in IN_MACHINE else (np.inf, np.inf)
+        beside = healthy[0] if hidden[0] in IN_MACHINE else healthy[1] if hidden[0] == "factor" else None
+        by = (np.inf, np.inf) if beside is None else moved(own, beside)
         rows.append(said(detector, hidden, own) | {"moved": by})
     return rows
 

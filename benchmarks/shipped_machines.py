@@ -13,7 +13,7 @@ import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -131,7 +131,8 @@ def trials(shipped: Shipped, study: Study, seed: int) -> Iterator[tuple[str, str
     for family, names in places(shipped.machine).items():
         order = [names[i] for i in rng.permutation(len(names))]
         if family == "heat_source":
-            for place in order:
+            known_places = {p.name for p in study.probed.places}  # a film's surface of no area is none
+            for place in (name for name in order if name in known_places):
                 size = TIMES / _visible_heat(study, nominal, place)
                 if size < SHARE * power:
                     yield family, place, f"{size:.3g} W"
@@ -244,22 +245,30 @@ def certify(name: str) -> None:
         print(f"   structure {structure}: {1e3 * kelvin[worst]:.1f} mK ({worst}), {1e6 * metres:.3f} um", flush=True)
 
 
-def main(name: str, first: int, count: int) -> None:
+@cache
+def _ready(name: str) -> tuple[Shipped, Detector]:
     shipped = Shipped(name)
+    return shipped, detector_of(shipped)
+
+
+def judged(name: str, seed: int) -> list[Row]:
+    """A row per trial of one real machine."""
+    shipped, detector = _ready(name)
+    rows: list[Row] = []
+    with TemporaryDirectory() as scratch:
+        for hidden, runs, by in measured_runs(shipped, detector, seed, Path(scratch)):
+            rows.append(said(detector, hidden, runs) | {"moved": by})
+            print(seed, hidden, rows[-1]["verdict"], rows[-1]["causes"], rows[-1]["moved"], file=sys.stderr, flush=True)
+    return rows
+
+
+def main(name: str, first: int, count: int) -> None:
     OUT.mkdir(parents=True, exist_ok=True)
     rows: list[Row] = []
-    detector: Detector | None = None
     for seed in range(first, first + count):
         path = OUT / f"{name}_{seed}.jsonl"
         if not path.exists():
-            if detector is None:
-                detector = detector_of(shipped)
-            with TemporaryDirectory() as scratch:
-                own: list[Row] = []
-                for hidden, runs, by in measured_runs(shipped, detector, seed, Path(scratch)):
-                    own.append(said(detector, hidden, runs) | {"moved": by})
-                    print(seed, hidden, own[-1]["verdict"], own[-1]["causes"], own[-1]["moved"], flush=True)
-            path.write_text("".join(json.dumps(row) + "\n" for row in own), encoding="utf-8")
+            path.write_text("".join(json.dumps(row) + "\n" for row in judged(name, seed)), encoding="utf-8")
         rows += [json.loads(line) | {"seed": seed} for line in path.read_text("utf-8").splitlines()]
     counted(rows)
 

@@ -247,7 +247,7 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
         return replace(h, statistic=0.95 * h.statistic)
 
     monkeypatch.setattr(contest, "exact", exact)
-    monkeypatch.setattr(contest, "_bent", lambda detector, h: h.batch.kind == "moved")
+    monkeypatch.setattr(contest, "bent", lambda detector, h: h.batch.kind == "moved")
     nothing = np.zeros(0)
     order = contest._fair(SEARCHED, nothing, None, [far, bent, straight])
     assert [h.statistic for h in order] == [97.0, 95.0, 50.0]

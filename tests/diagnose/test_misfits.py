@@ -16,11 +16,12 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.contest import bent
 from twin.diagnose.search.declared import declared_candidates
 from twin.diagnose.search.forward import _leaking, _restless, refit, search
 from twin.diagnose.search.look import look
 from twin.diagnose.search.settled_beside import settled
-from twin.diagnose.search.strained import _weak, closed, loose_ones, strained
+from twin.diagnose.search.strained import _untied, _weak, closed, loose_ones, strained
 from twin.diagnose.search.verdict import verdict_of
 
 pytestmark = pytest.mark.long
@@ -127,7 +128,7 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
     x0, _ = settled(detector, y, ())
     declared = declared_candidates(detector, y, fitted)
     seen, ranked, step = look(detector, fitted, declared)
-    loose = loose_ones(detector, y, fitted.x, x0)
+    loose = loose_ones(detector, y, fitted, x0)
     relaxed = strained(detector, y, fitted, loose, look(detector, fitted))
     assert relaxed is not None
     module = sys.modules[closed.__module__]
@@ -139,3 +140,47 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
     assert (ended is not None) == stays
     quiet = replace(other, statistic=0.5 * detector.thresholds[other.family])
     assert closed(detector, y, fitted, declared, (seen, [quiet], step), relaxed, x0, loose) is not None
+
+
+def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
+    """A joint in windows scores by its derivative, and removes next to nothing when it is refitted."""
+    detector = small_case.made_detector()
+    study = detector.study
+    x = np.zeros(len(study.probed.parameters))
+    x[next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")] = 4.5
+    y = np.concatenate([study.outputs(k, x) for k in study.fitted])
+    fitted = detector.fitter(y)
+    x0, _ = settled(detector, y, ())
+    loose = loose_ones(detector, y, fitted, x0)
+    seen, ranked, step = look(detector, fitted)
+    relaxed = strained(detector, y, fitted, loose, (seen, ranked, step))
+    assert relaxed is not None
+    module = sys.modules[closed.__module__]
+    monkeypatch.setattr(module, "_stays", lambda *_: False)
+    monkeypatch.setattr(module, "exact", lambda d, y, f, h: replace(h, statistic=0.0))
+    joint = next(h for h in ranked if bent(detector, h))
+    straight = next(h for h in ranked if not bent(detector, h) and h.family not in ("loss_law", "signal"))
+    many = 1e9
+    scored = replace(joint, statistic=many)
+    assert closed(detector, y, fitted, (), (seen, [scored], step), relaxed, x0, loose) is not None
+    scored = replace(straight, statistic=many)
+    assert closed(detector, y, fitted, (), (seen, [scored], step), relaxed, x0, loose) is None
+
+
+def test_without_its_tolerance_a_number_is_what_the_data_alone_say():
+    """Of the fit that finds causes: as with a prior a hundred times as wide, but for its bounds."""
+    detector = small_case.made_detector()
+    study = detector.study
+    n = len(study.probed.parameters)
+    j = next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")
+    x = np.zeros(n)
+    x[j] = 0.3
+    y = np.concatenate([study.outputs(k, x) for k in study.fitted])
+    fitted = detector.fitter(y)
+    value, sigma = _untied(fitted, j)
+    N, white = fitted.projector.N, detector.whiten(fitted.residual)
+    precision = np.ones(N.shape[1])
+    precision[j] = 1e-4
+    covariance = np.linalg.inv(np.diag(precision) + N.T @ N)
+    assert value == pytest.approx((covariance @ (N.T @ white))[j], rel=1e-3)
+    assert sigma == pytest.approx(np.sqrt(covariance[j, j]), rel=1e-3)

@@ -110,7 +110,7 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     x[j] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
     fitted = detector.fitter(y)
-    loose = loose_ones(detector, y, fitted.x, x)
+    loose = loose_ones(detector, y, fitted, x)
     glance = look(detector, fitted)
     freed = strained(detector, y, fitted, loose, glance)
     assert freed is not None

@@ -45,27 +45,34 @@ def each(
     items: Sequence[T],
     progress: Callable[[T], None] = lambda _: None,
     long: float = LONG,
+    done: Callable[[T, R], None] = lambda _, __: None,
 ) -> list[R]:
     """[function(shared, item) for item in items], by several processes where that takes long.
 
     function: of a module's top level; it must not depend on anything but its arguments, nor change `shared`. shared:
-    sent to every helper once. Everything is pickled. progress: called here, in the order of completion. long: s of work
-    left that are worth a helper (0: at once). Exceptions of a piece are raised here; helpers are gone in any case.
+    sent to every helper once. Everything is pickled. progress, done: called here, in the order of completion, the
+    latter with the result. long: s of work left that are worth a helper (0: at once). Exceptions of a piece are raised
+    here; helpers are gone in any case.
     """
     work = _Work(function, shared, items)
+
+    def told(i: int) -> None:
+        progress(items[i])
+        done(items[i], work.results[i])
+
     began = time.perf_counter()
     try:
         if long <= 0.0:
             work.call_helpers(len(items))
         while (i := work.take()) is not None:
             work.results[i] = function(shared, items[i])
-            progress(items[i])
+            told(i)
             ahead = len(items) - i - 1
             if not work.helpers and ahead > 1 and (time.perf_counter() - began) / (i + 1) * ahead > long:
                 work.call_helpers(ahead)
-            work.report(progress)
+            work.report(told)
         work.wait()
-        work.report(progress)
+        work.report(told)
     finally:
         for helper in work.helpers:
             helper.close()
@@ -109,10 +116,10 @@ class _Work(Generic[T, R]):
         except BaseException as e:
             self.failed.append(e)
 
-    def report(self, progress: Callable[[T], None]) -> None:
+    def report(self, told: Callable[[int], None]) -> None:
         """What helpers have finished since the last report, in this thread."""
         while self._finished:
-            progress(self._items[self._finished.pop(0)])
+            told(self._finished.pop(0))
 
     def wait(self) -> None:
         """Until the helpers have finished."""

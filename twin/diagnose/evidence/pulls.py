@@ -67,6 +67,7 @@ class Loose:
     sigma: float  # prior standard deviations, of x
     strain: float  # times the limit
     rivals: tuple[tuple[Hypothesis, float], ...] = ()  # what does the same, with its cosine
+    settled: bool = True  # x and sigma are those of the settled calibration
 
 
 def tail(values: np.ndarray, share: float) -> float:

@@ -69,18 +69,18 @@ def judged(
     for h in waiting:
         behind = detector.policy.saturates if fault_of(h).saturates else detector.policy.behind
         led = worthy(h) < (1.0 - behind) * leads_by
-        bent = _bent(detector, h)
-        if (led and not _saturated(detector, h)) or (bent and count[h.batch.kind] >= detector.policy.entrants):
+        bends = bent(detector, h)
+        if (led and not _saturated(detector, h)) or (bends and count[h.batch.kind] >= detector.policy.entrants):
             left.append(h)
             continue
-        count[h.batch.kind] += bent
-        now = max((exact(detector, y, fitted, s) for s in starts[id(h)]), key=worthy) if bent else h
+        count[h.batch.kind] += bends
+        now = max((exact(detector, y, fitted, s) for s in starts[id(h)]), key=worthy) if bends else h
         if worthy(now) > lead:
             lead = worthy(now)
             leads_by = min(lead, max(worthy(h), (1.0 - detector.policy.saturates) * lead))
         done.append(now)
-    straight = [h for h in left if not _bent(detector, h)]
-    return _fair(detector, y, fitted, [*done, *straight]), [h for h in left if _bent(detector, h)]
+    straight = [h for h in left if not bent(detector, h)]
+    return _fair(detector, y, fitted, [*done, *straight]), [h for h in left if bent(detector, h)]
 
 
 def tried(
@@ -109,8 +109,8 @@ def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequenc
     while True:
         lead = order[0]
         near = [h for h in order[1:] if worthy(h) > (1.0 - detector.policy.behind) * worthy(lead)]
-        settled = _bent(detector, lead) or id(lead) in exactly or fault_of(lead).read or lead.batch.fixed
-        if settled or not any(_bent(detector, h) or id(h) in exactly for h in near):
+        settled = bent(detector, lead) or id(lead) in exactly or fault_of(lead).read or lead.batch.fixed
+        if settled or not any(bent(detector, h) or id(h) in exactly for h in near):
             break
         order[0] = exact(detector, y, fitted, lead)
         exactly.add(id(order[0]))
@@ -123,7 +123,7 @@ def _saturated(detector: Detector, h: Hypothesis) -> bool:
     return fault_of(h).conducts and h.amplitude[0] < detector.policy.gone
 
 
-def _bent(detector: Detector, h: Hypothesis) -> bool:
+def bent(detector: Detector, h: Hypothesis) -> bool:
     fault = fault_of(h)
     return fault.bent or fault.curved or (not fault.read and bool(edges_of(detector.study, h)))
 

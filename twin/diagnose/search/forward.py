@@ -108,7 +108,7 @@ def _start(described: Detector, y: np.ndarray) -> _Start:
     declared = declared_candidates(detector, y, fitted)
     known = scored(detector, fitted)
     glance = look(detector, fitted, declared, known)
-    loose = loose_ones(detector, y, fitted.x, x0)
+    loose = loose_ones(detector, y, fitted, x0)
     relaxed = strained(detector, y, fitted, loose, glance)
     if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
         exact = {

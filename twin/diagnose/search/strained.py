@@ -20,7 +20,7 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.loss_law import is_source
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns
-from twin.diagnose.search.contest import beginning, misfit
+from twin.diagnose.search.contest import beginning, bent, exact, misfit
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search, Step, look
 from twin.diagnose.search.refit import refit
@@ -43,6 +43,8 @@ def closed(
         return None
     removed = misfit(detector, before) - misfit(detector, fitted)
     more = [h for h in ranked if h.statistic - detector.policy.rival * any(h is d for d in declared) > removed]
+    # what bends scores more than it removes: of those that lead, only what is left of them when they are refitted
+    more = [h for h in more if not bent(detector, h) or exact(detector, y, before, h).statistic > removed]
     if any(h.statistic > detector.thresholds[h.family] for h in more) and not _stays(
         detector, before, one, more[: detector.policy.others]
     ):
@@ -65,22 +67,42 @@ def closed(
     return Search(detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance, loose)
 
 
-def loose_ones(detector: Detector, y: np.ndarray, fitted: np.ndarray, settled: np.ndarray) -> tuple[Loose, ...]:
-    """The FAR declared numbers farthest out of their tolerance, by parameters (n,) of two calibrations.
+def loose_ones(detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.ndarray) -> tuple[Loose, ...]:
+    """The FAR declared numbers farthest out of their tolerance, by two calibrations; settled (n,).
 
-    Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared.
+    Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
+    by the settled calibration, or by the fit that finds causes. The former takes a channel of a run for one number and
+    knows next to nothing of films of heavy bodies; the latter knows how they warm up and cool down.
     """
-    strain = detector.pulls.strain(fitted, settled)
+    strain = detector.pulls.strain(fitted.x, settled)
     found = []
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
         x, covariance = settled_alone(detector.fitter, y, (j,))
-        sigma = float(np.sqrt(covariance[j, j]))
-        if np.sign(fitted[j]) * x[j] > max(detector.policy.outside, detector.policy.sure * sigma):
-            rivals = _signals(detector, j, float(x[j]), sigma, float(strain[j]) ** 2)
-            found.append(Loose(j, float(x[j]), sigma, float(strain[j]), rivals))
+        estimates = ((float(x[j]), float(np.sqrt(covariance[j, j])), True), (*_untied(fitted, j), False))
+        for value, sigma, by_settled in estimates:
+            if np.sign(fitted.x[j]) * value > max(detector.policy.outside, detector.policy.sure * sigma):
+                rivals = _signals(detector, j, value, sigma, float(strain[j]) ** 2)
+                found.append(Loose(j, value, sigma, float(strain[j]), rivals, by_settled))
+                break
         if len(found) == detector.policy.far:
             break
     return tuple(found)
+
+
+def _untied(fitted: Fitted, j: int) -> tuple[float, float]:
+    """A parameter as the fit has it without its tolerance, to first order, and its standard deviation.
+
+    Of a posterior N(x, v) under the prior N(0, 1), the data alone say N(x / (1 - v), v / (1 - v)).
+    """
+    variance = _variance(fitted, j)
+    return float(fitted.x[j]) / (1.0 - variance), float(np.sqrt(variance / (1.0 - variance)))
+
+
+def _variance(fitted: Fitted, j: int) -> float:
+    """Of a parameter beside all nuisances, in prior variances: below 1."""
+    unit = np.zeros(fitted.projector.N.shape[1])
+    unit[j] = 1.0
+    return min(float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j]), 1.0 - 1e-12)
 
 
 def _signals(
@@ -113,12 +135,13 @@ def _size(one: Accepted, loose: Loose, detector: Detector) -> tuple[float, float
     """The amplitude of a number out of its tolerance as the settled calibration has it without one, and its variance.
 
     The fit that finds causes leaves to model discrepancy what looks like it, and frees the number to make up for that.
-    But it knows sizes beyond the parameter's bounds, where the settled one ends, and steps the exact model there.
+    But it knows sizes beyond the parameter's bounds, where the settled one ends, and steps the exact model there; and
+    it alone knows those of which the settled one is not sure.
     """
     study = detector.study
     scale = float(study.scale[loose.index])
     low, high = (detector.policy.nearly * float(ends[loose.index]) for ends in bounds(study))
-    if not low < loose.x < high:
+    if not loose.settled or not low < loose.x < high:
         return float(one.amplitude[0]), float(one.covariance[0, 0])
     change, sigma = scale * loose.x, scale * loose.sigma
     if not fault_of(one.hypothesis).conducts:
@@ -224,10 +247,7 @@ def _scored(detector: Detector, fitted: Fitted, seen: Sight, h: Hypothesis) -> f
 def _told_alone(detector: Detector, fitted: Fitted, h: Hypothesis) -> float:
     """Likelihood-ratio units by which data without its tolerance tell a fitted number from the declared one."""
     (j,) = freed(detector.study, h)
-    unit = np.zeros(fitted.projector.N.shape[1])
-    unit[j] = 1.0
-    variance = float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j])
-    return float(fitted.x[j]) ** 2 * (1.0 / variance - 1.0)
+    return float(fitted.x[j]) ** 2 * (1.0 / _variance(fitted, j) - 1.0)
 
 
 def _freed(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
