@@ -30,13 +30,6 @@ SHIPPED = {"five_axis": "experiment_a", "ram_borer": "test_5", "transfer_unit": 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 
 
-@pytest.fixture(scope="module")
-def lumped(tmp_path_factory):
-    path = tmp_path_factory.mktemp("lumped") / "a.h5"
-    twin.build(ROOT / "tests" / "machines" / "spindle", options=twin.BuildOptions(held_out=1)).save(path)
-    return path
-
-
 def same(artefact, run):
     d = difference(artefact, run)
     assert d.temperature < SAME

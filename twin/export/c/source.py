@@ -35,6 +35,7 @@ class Source:
     name: str  # prefix of all public names
     header: str
     code: str
+    weights: bytes  # the numbers of its large tables once more, for compilers that take them as bytes (TWIN_WEIGHTS)
     example: str  # a main program that reads loads.csv
     sensors: tuple[str, ...]  # structural ones, then those in the air
     flags: tuple[str, ...]
@@ -88,7 +89,7 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
     head = told + f'#include "{name}.h"\n' + _HEAD + _functions(single) + _numbers(artefact, prepared)
     core = "".join(_core(part) for part in _CORE)
     code = named(head, name) + out.text() + named(core, name)
-    return Source(name, named(header, name), code, _example(name), sensors, tuple(names))
+    return Source(name, named(header, name), code, out.weights_as_bytes(), _example(name), sensors, tuple(names))
 
 
 def _core(name: str) -> str:
