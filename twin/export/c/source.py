@@ -7,6 +7,7 @@ from importlib import resources
 
 import numpy as np
 
+from twin.export.c.correction import put_correction
 from twin.export.c.elastic import MESHED, put_elastic
 from twin.export.c.loads import flags, put_contacts, put_laws, put_signals
 from twin.export.c.text import Arrays, identifier, named, quoted
@@ -18,7 +19,7 @@ from twin.rom.tableau import SDIRK2_6
 from twin.run.system import Prepared, prepare
 from twin.units import _TABLE
 
-_CORE = ("algebra.c", "drive.c", "step.c", "tcp.c")
+_CORE = ("algebra.c", "drive.c", "step.c", "tcp.c", "correction.c")
 _HEAD = """#include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -63,7 +64,7 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
     bodies = _sensor_bodies(model)
     out.integers("sensor_body", [*bodies, *(e for _, e in model.ambient_sensors)])
     put_thermal(out, prepared, bodies)
-    sizes = put_elastic(out, model, prepared.back)
+    sizes = put_elastic(out, model, prepared.back) | put_correction(out, artefact)
     sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
     out.names("twin_sensor_name", sensors)
     out.names("twin_flag_name", names)
