@@ -51,8 +51,8 @@ def steps(source: Source, folder: Path) -> None:
     for name, moved in (("axes move, a new factor in every step", 1), ("axes rest, films that follow", 0)):
         of = 1e3 * table[table[:, 3] == moved]
         loads, step = np.median(of[:, 1]), np.median(of[:, 2])
-        print(f"   {len(of)} steps of experiment A, {name}: {step:.2f} ms with the last load, the actual position and all "
-              f"poses, besides {loads:.2f} ms for the other loads of the minute")  # fmt: skip
+        print(f"   {len(of)} steps of experiment A, {name}: {step:.2f} ms with the last load of the minute, the actual "
+              f"position and all poses; the other loads {loads:.2f} ms (processor time)")  # fmt: skip
     correction, memory = (float(c) for c in done.stderr.split())
     print(f"   resident memory at most {memory / 1e3:.1f} MB (limit {MEMORY:g} MB); offsets of the axes at a position: "
           f"{1e6 * correction:.2f} us (limit {CORRECTION:g} us)")  # fmt: skip

@@ -79,7 +79,8 @@ def load_of(machine: Machine, settings: Mapping[str, str], run: Run | None = Non
     """The load of a run, or of the upper bounds; `settings` (signal or state -> text with a unit) win over both.
 
     A bare number is in the signal's own unit, in degC for a state. "signals.ambient" and "model.ambient" are the signal
-    and the state of that name; "ambient" alone is refused where there are both. Amplitudes of "peak" signals are turned into rms.
+    and the state of that name; "ambient" alone is refused where there are both. Amplitudes of "peak" signals are turned
+    into rms.
     Raises TwinError for unknown names and units; LogError for a run without a signal that a law reads.
     """
     known = {name: wiring.signal(name, entry) for name, entry in machine.signals.items()}

@@ -1,4 +1,4 @@
-"""Writes shift.twb: the first hour of experiment A as a control would send it, one block lost, two in the wrong order."""
+"""Writes shift.twb: an hour of experiment A as a control would send it, one block lost, two in the wrong order."""
 
 from __future__ import annotations
 
