@@ -55,6 +55,15 @@ def atomic_path(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
+def telling(target: Path) -> Iterator[None]:
+    """What the disk refuses in this block is an error of `target`, whatever file was written. Raises TwinError."""
+    try:
+        yield
+    except OSError as e:
+        raise _cannot_write(e, target) from e
+
+
+@contextmanager
 def atomic_folder(target: Path) -> Iterator[Path]:
     """The same for a folder: yield a new temporary folder, rename it to `target` on success, an older one removed.
 

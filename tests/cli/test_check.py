@@ -50,16 +50,25 @@ def test_three_typos_in_one_go(tmp_path, capsys):
     assert all("did you mean" in p["remedy"] for p in found["problems"])
 
 
+def test_what_does_not_fit_a_mesh_is_told_with_its_line(tmp_path, capsys):
+    path = edited(tmp_path, ("position = [0.07, 0.05, 0.2]", "position = [0.07, 0.05, 2]"))
+    status, found = check(capsys, path)
+    assert status == 2
+    (problem,) = found["problems"]
+    line = path.read_text().split("position = [0.07, 0.05, 2]")[0].count("\n") + 1
+    place, _, told = problem["where"].rpartition(" (line ")
+    assert place.startswith(f"{path}: sensors.")
+    assert line - 5 < int(told.rstrip(")")) <= line  # of the sensor's table, or of the key
+
+
 def test_materials_and_meshes_are_both_reported(tmp_path, capsys):
     path = edited(
         tmp_path, ('"45 W/(m*K)"', '"45 W/(mm*K)"'), ("position = [0.07, 0.05, 0.2]", "position = [0.07, 0.05, 2]")
     )
     status, found = check(capsys, path)
     assert status == 2
-    assert ["materials.steel.conductivity" in found["problems"][0]["where"], found["problems"][1]["where"]] == [
-        True,
-        "sensors.slide.position",
-    ]
+    assert "materials.steel.conductivity (line " in found["problems"][0]["where"]
+    assert "sensors.slide.position (line " in found["problems"][1]["where"]
     status, found = check(capsys, "--no-meshes", path)
     assert len(found["problems"]) == 1
 

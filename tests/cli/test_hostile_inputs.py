@@ -70,9 +70,11 @@ def test_a_description_that_cannot_be_meant_is_one_clear_error(tmp_path, capsys,
 
 
 def test_what_is_large_is_asked_about(tmp_path, capsys):
-    assert run(["check", "--no-meshes", str(edited(tmp_path, ("x = 5", "x = 3000000")))]) == 0
+    path = edited(tmp_path, ("x = 5", "x = 3000000"))
+    assert run(["check", "--no-meshes", str(path)]) == 0
     told = capsys.readouterr().out
-    assert "warning: machine.toml: poses.x: 3,000,000 poses: some 36 GB of memory and 1.0 h" in told
+    line = path.read_text().split("x = 3000000")[0].count("\n") + 1
+    assert f"warning: {path}: poses.x (line {line}): 3,000,000 poses: some 36 GB of memory and 1.0 h" in told
     assert "leave it if it is meant" in told
 
 

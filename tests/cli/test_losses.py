@@ -244,3 +244,16 @@ def test_wrong_settings(capsys, setting, told):
 
 def test_a_machine_that_does_not_exist(tmp_path, capsys):
     assert "no such file" in refused(capsys, tmp_path / "nothing")
+
+
+def test_a_name_that_is_a_signal_and_a_temperature_of_the_model_says_which(tmp_path, capsys):
+    path = natural(tmp_path, "emissivity = 0")
+    path.write_text(path.read_text(encoding="utf-8").replace("shop_air", "ambient"), encoding="utf-8")
+    film = ("--explain", "films.structure", "--set", "surface=40 degC")
+    told = refused(capsys, path, *film, "--set", "ambient=22 degC")
+    assert "'ambient' is a signal and a temperature of the model" in told
+    assert "write signals.ambient=22 degC, or model.ambient=22 degC" in told
+    of_signal = losses(capsys, path, *film, "--set", "signals.ambient=22 degC")
+    of_model = losses(capsys, path, *film, "--set", "model.ambient=26 degC")
+    assert (values(of_signal)["ambient"], values(of_model)["ambient"]) == (22.0, 26.0)
+    assert "nothing called 'signals.surface'" in refused(capsys, path, "--set", "signals.surface=22 degC")

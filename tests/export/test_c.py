@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import shutil
 import subprocess
 from pathlib import Path
@@ -15,10 +16,12 @@ from twin.errors import TwinError
 from twin.export.c.law_code import arguments_of, law_code
 from twin.export.c.measure import compiled_example, difference, table
 from twin.export.c.source import source_of
-from twin.export.c.text import identifier
+from twin.export.c.text import identifier, named
 from twin.physics.laws import LAWS
 from twin.rom.artefact import read_artefact
 from twin.rom.load_model import LawUse
+from twin.run.correction import PoseErrors, fit_correction
+from twin.run.correction_axes import axis_jacobian
 
 ROOT = Path(__file__).parents[2]
 SLIDE = ROOT / "tests" / "machines" / "slide" / "runs" / "short"
@@ -28,13 +31,6 @@ SHIPPED = {"five_axis": "experiment_a", "ram_borer": "test_5", "transfer_unit": 
            "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up"}  # fmt: skip
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
-
-
-@pytest.fixture(scope="module")
-def lumped(tmp_path_factory):
-    path = tmp_path_factory.mktemp("lumped") / "a.h5"
-    twin.build(ROOT / "tests" / "machines" / "spindle", options=twin.BuildOptions(held_out=1)).save(path)
-    return path
 
 
 def same(artefact, run):
@@ -52,6 +48,44 @@ def test_a_meshed_machine_is_stepped_as_twin_run_does(slide_artefact):
 
 def test_a_lumped_machine_is_stepped_as_twin_run_does(lumped):
     same(read_artefact(lumped), ROOT / "tests" / "machines" / "spindle" / "runs" / "warm_up")
+
+
+OFFSETS = """#include "NAME.h"
+#include <stdio.h>
+int main(void)
+{
+    static twin_machine m;
+    twin_real coefficient[TWIN_POSE_AXES * TWIN_TERMS], at[TWIN_AXES], offset[TWIN_AXES];
+    twin_start(&m, 31.0, 60.0);
+    twin_correction(&m, coefficient);
+    for (;;) {
+        for (int a = 0; a < TWIN_AXES; a++)
+            if (scanf("%lf", &at[a]) != 1)
+                return 0;
+        twin_offsets(coefficient, at, offset);
+        for (int a = 0; a < TWIN_AXES; a++)
+            printf("%.17g\\n", offset[a]);
+    }
+}
+"""
+
+
+def test_the_offsets_of_the_axes_are_those_of_the_correction(lumped, tmp_path):
+    artefact = read_artefact(lumped)
+    model, source = artefact.model, source_of(artefact)
+    main = named(OFFSETS.replace("NAME", source.name), source.name)
+    program = compiled_example(dataclasses.replace(source, example=main), tmp_path)
+    states = [(31.0 - model.reference_temperature) * body.one for body in model.bodies]
+    tcp = np.asarray(sum(body.G @ x for body, x in zip(model.bodies, states, strict=True)))
+    errors = PoseErrors(model.pose_axes, model.pose_grid, model.poses, tcp)
+    correction = fit_correction(errors, axis_jacobian(artefact, model.pose_axes))
+    low, high = (np.array([edge(g) for g in model.pose_grid]) for edge in (np.min, np.max))
+    places = low + np.random.default_rng(3).uniform(-0.2, 1.2, (40, len(low))) * (high - low)  # beyond the poses, too
+    told = subprocess.run([program], input=" ".join(map(repr, places.ravel().tolist())), capture_output=True, text=True,
+                          check=True)  # fmt: skip
+    found = np.array([float(line) for line in told.stdout.split()]).reshape(places.shape)
+    assert np.abs(found).max() > 1e-6
+    assert np.abs(found - correction.offsets(places)).max() < SAME_PLACE
 
 
 @pytest.mark.slow

@@ -27,11 +27,12 @@ from tests.reference.exports.run_fmu_fmpy import inputs, loads, simulate  # noqa
 
 ROOT = Path(__file__).parents[2]
 SLIDE = ROOT / "tests" / "machines" / "slide" / "runs" / "short"
+SPINDLE = ROOT / "tests" / "machines" / "spindle"
 SAME, SAME_PLACE = 1e-9, 1e-15  # K, m
 SHIPPED = {"five_axis": "experiment_a", "ram_borer": "test_5", "transfer_unit": "working_day",
            "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up"}  # fmt: skip
 
-pytestmark = [pytest.mark.long, pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")]
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 
 
 @pytest.fixture(scope="module", params=["fmu2", "fmu3"])
@@ -44,6 +45,14 @@ def fmu(request, slide_artefact, tmp_path_factory):
 @pytest.fixture(scope="module")
 def expected(slide_artefact):
     return replay(read_artefact(slide_artefact), read_run(SLIDE))
+
+
+@pytest.mark.parametrize("version", ["fmu2", "fmu3"])
+def test_a_lumped_machine_is_valid_and_gives_what_twin_run_gives(lumped, version, tmp_path):
+    fmu, run = tmp_path / f"spindle.{version}.fmu", SPINDLE / "runs" / "warm_up"
+    twin.export(lumped, version, fmu)
+    assert validate_fmu(str(fmu)) == []
+    agrees(simulate(fmu, run, read_run(run).initial_temperature), replay(read_artefact(lumped), read_run(run)))
 
 
 def is_second(fmu):
@@ -61,10 +70,12 @@ def agrees(result, expected):
     assert np.abs(w - expected.tcp_actual).max() < SAME_PLACE
 
 
+@pytest.mark.long
 def test_fmpy_finds_no_problem(fmu):
     assert validate_fmu(str(fmu)) == []
 
 
+@pytest.mark.long
 def test_the_toolbox_finds_no_problem(fmu):
     tool = Path(sys.executable).with_name("fmutool")
     if not tool.exists():
@@ -76,6 +87,7 @@ def test_the_toolbox_finds_no_problem(fmu):
     assert not re.search(r"\b(ERROR|WARNING)\b", told)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step", [60.0, 20.0])
 def test_fmpy_over_a_run_gives_what_twin_run_gives(fmu, expected, step):
     initial = read_run(SLIDE).initial_temperature
@@ -87,6 +99,7 @@ def test_fmpy_over_a_run_gives_what_twin_run_gives(fmu, expected, step):
     assert ((at_steps["flags"][1:] > 0) == expected.flags.any(axis=1)).all()
 
 
+@pytest.mark.long
 def test_libcosim_over_a_run_gives_what_twin_run_gives(fmu, expected):
     pytest.importorskip("libcosimpy")
     if not is_second(fmu):
@@ -114,6 +127,7 @@ def slave_of(fmu, folder):
     return slave, {v.name: v.valueReference for v in description.modelVariables}
 
 
+@pytest.mark.long
 def test_a_state_is_saved_restored_and_stored_as_bytes(fmu, tmp_path):
     slave, reference = slave_of(fmu, tmp_path)
     columns = loads(SLIDE)
@@ -151,6 +165,7 @@ def test_a_state_is_saved_restored_and_stored_as_bytes(fmu, tmp_path):
     slave.freeInstance()
 
 
+@pytest.mark.long
 def test_gains_change_the_heat_and_reset_takes_it_back(fmu, expected):
     initial = read_run(SLIDE).initial_temperature
     description = fmpy.read_model_description(str(fmu))
@@ -167,6 +182,7 @@ def test_gains_change_the_heat_and_reset_takes_it_back(fmu, expected):
     assert T[-1, hottest] - expected.temperature[-1, hottest] == pytest.approx(rise[hottest], rel=0.1)
 
 
+@pytest.mark.long
 def test_names_suit_every_tool(fmu):
     variables = fmpy.read_model_description(str(fmu)).modelVariables
     names = [v.name for v in variables]
@@ -175,6 +191,7 @@ def test_names_suit_every_tool(fmu):
     assert ("independent" in {v.causality for v in variables}) == (not is_second(fmu))
 
 
+@pytest.mark.long
 def test_every_function_of_the_standard_is_exported(fmu, tmp_path):
     version = "2" if is_second(fmu) else "3"
     header = Path(fmpy.__file__).parent / "c-code" / f"fmi{version}Functions.h"
@@ -200,6 +217,7 @@ def test_every_function_of_the_standard_is_exported(fmu, tmp_path):
             assert not {w for w in wanted if w.encode() not in content}
 
 
+@pytest.mark.long
 def test_equal_input_gives_equal_bytes(slide_artefact, tmp_path):
     for name in ("a", "b"):
         twin.export(slide_artefact, "fmu3", tmp_path / f"{name}.fmu")

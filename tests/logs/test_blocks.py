@@ -433,3 +433,32 @@ def test_unpack_refuses_a_run_in_the_way_before_reading(tmp_path: Path, capsys):
     folder = write(tmp_path / "run", "time [s],x [m]\n0,1\n1,1\n")
     assert run(["unpack", str(tmp_path / "none.twb"), "-o", str(folder)]) == 2
     assert "measured data" in capsys.readouterr().err
+
+
+SHIFT = Path(__file__).parents[2] / "models" / "five_axis" / "blocks" / "shift.twb"
+
+
+def test_the_shipped_blocks_are_unpacked(tmp_path: Path, capsys):
+    assert run(["unpack", str(SHIFT), "-o", str(tmp_path / "run")]) == 0
+    told = capsys.readouterr().out
+    assert "59 delivered, 1 lost, 1 reordered" in told
+    assert "warning: 1 gap" in told
+
+
+def test_means_take_the_heat_within_a_gap_as_that_of_the_rest_of_its_interval(tmp_path: Path):
+    """A block of a minute is missing from 30 min on: half of an interval of 2 min, all of one of 1 min."""
+    whole, _, _ = unpack(SHIFT)
+    time, current = whole.loads.time, whole.loads.columns["x_current"]
+    for mean, first, last in ((120.0, 1860.0, 1920.0), (60.0, 1800.0, 1800.0)):
+        loads = unpack(SHIFT, mean)[0].loads
+        (row,) = np.flatnonzero(loads.time == 1800.0)
+        there = (time >= first) & (time < last)
+        if there.any():
+            heat = np.mean(current[there] ** 2)
+            assert loads.columns["x_current"][row] ** 2 == pytest.approx(heat, rel=1e-12)
+        else:  # runs hold the interval before, and flag this one
+            assert np.isnan(loads.columns["x_current"][row])
+        others = np.delete(np.arange(len(loads.time) - 1), row)
+        inside = [(time >= t) & (time < t + mean) for t in loads.time[others]]
+        expected = [np.mean(current[rows] ** 2) for rows in inside]
+        assert loads.columns["x_current"][others] ** 2 == pytest.approx(np.array(expected), rel=1e-12)

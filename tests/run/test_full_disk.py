@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import hashlib
+import json
 
 import pytest
 import synthetic
@@ -50,8 +52,25 @@ def test_a_disk_that_fills_between_two_files_names_the_one_that_is_lacking(input
     def lacking(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
+    assert run(["run", *inputs, "-o", str(tmp_path / "out")]) == 0
+    before = files(tmp_path / "out")
+    capsys.readouterr()
     monkeypatch.setattr(twin.run.results, "write_tcp", lacking)
-    assert run(["run", *inputs, "-o", str(tmp_path / "out")]) == 2
+    assert run(["run", *inputs, "-o", str(tmp_path / "out"), "--dt", "30 s"]) == 2
     told = capsys.readouterr().err
     assert "tcp.csv: cannot write: No space left on device" in told
-    assert sorted(p.name for p in (tmp_path / "out").iterdir() if p.is_file()) == ["result.h5", "temperatures.csv"]
+    assert files(tmp_path / "out") == before  # no file of one result beside one of another
+
+
+def test_the_summary_names_the_files_that_it_is_of(inputs, tmp_path):
+    out = tmp_path / "out"
+    assert run(["run", *inputs, "-o", str(out)]) == 0
+    once = named(out)
+    assert set(once) == {"result.h5", "temperatures.csv", "tcp.csv"}
+    assert once == {name: hashlib.sha256((out / name).read_bytes()).hexdigest() for name in once}
+    assert run(["run", *inputs, "-o", str(out), "--dt", "30 s"]) == 0
+    assert all(named(out)[name] != once[name] for name in once)
+
+
+def named(folder):
+    return json.loads((folder / "summary.json").read_text())["files"]

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 @click.option("--explain", "path", help="one of them, for example sources.x_motor, films.bed or contacts.x_guide")
 @click.option("--run", "run_folder", type=click.Path(), help="evaluate at every sample of this run folder")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE",
-              help="a signal, or temperature, surface or ambient of the model; repeatable")  # fmt: skip
+              help="a signal, or temperature, surface or ambient of the model (signals.ambient, model.ambient where "
+                   "there are both); repeatable")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="machine-readable")
 def command(machine: str, path: str | None, run_folder: str | None, settings: tuple[str, ...], as_json: bool) -> None:
     """Show the heat of the sources and the films of MACHINE, or explain one of them: formula, inputs, source, result.

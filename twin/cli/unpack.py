@@ -7,7 +7,7 @@ import click
 from twin.cli.quantity import Quantity
 
 
-@click.command(epilog="Example: twin unpack shift.twb -o out/shift --mean '10 s'")
+@click.command(epilog="Example: twin unpack models/five_axis/blocks/shift.twb -o out/shift --mean '1 min'")
 @click.argument("file", type=click.Path())
 @click.option("-o", "--output", required=True, type=click.Path(), help="run folder to write")
 @click.option(

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
+from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -58,15 +59,35 @@ def _cross() -> tuple[str, ...]:
     return ()
 
 
-def compiled(target: Target, source: Path, output: Path) -> None:
-    """Compile one file to a shared library. Raises TwinError with the compiler's words where it fails."""
+def compiled(target: Target, source: Path, output: Path, name: str, weights: Path) -> None:
+    """Compile a machine of this name to a shared library; weights: a file with the numbers of its tables as bytes.
+
+    Raises TwinError with the compiler's words where it fails.
+    """
     output.parent.mkdir(parents=True, exist_ok=True)
-    command = [*target.command, "-o", str(output), str(source)]
+    command = [*target.command, taking(name, weights), "-o", str(output.resolve()), str(source.resolve())]
     command += [] if target.suffix == ".dll" else ["-lm"]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST, check=False)
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=_LONGEST, check=False, cwd=weights.parent
+        )
     except (OSError, subprocess.TimeoutExpired) as e:
         raise TwinError(f"the compiler {target.command[0]} failed: {e}", "export", "name another in CC") from e
     if done.returncode:
         last = done.stderr.strip().splitlines()[-1:] or ["no message"]
         raise TwinError(f"the compiler {target.command[0]} failed: {last[0]}", "export", "name another one in CC")
+
+
+def taking(name: str, weights: Path) -> str:
+    """What makes a compiler, called in the folder of this file, take a machine's weights from it.
+
+    They are read as text otherwise, which takes compilers most of their time.
+    """
+    return f'-D{name.upper()}_WEIGHTS="{weights.name}"'
+
+
+def put_weights(folder: Path, weights: bytes) -> Path:
+    """A file of them, named after its content: compilers that cache do not know that they read it."""
+    path = folder / f"weights-{sha256(weights).hexdigest()[:32]}.bin"
+    path.write_bytes(weights)
+    return path

@@ -109,7 +109,7 @@ def _is_run(path: Path) -> bool:
 
 def _check_machine(path: Path, meshes: bool) -> Findings:
     from twin.machine.check import check_machine
-    from twin.machine.load import load_machine
+    from twin.machine.load import load_machine, located
 
     try:
         machine = load_machine(path)
@@ -131,7 +131,7 @@ def _check_machine(path: Path, meshes: bool) -> Findings:
             facts |= {"states": report.nodes, "kJ/K": round(report.capacity / 1e3, 3)}
         else:
             facts |= {"nodes": report.nodes, "kg": round(report.mass, 1)}
-    return Findings("machine", path, tuple(problems), facts)
+    return Findings("machine", path, tuple(located(path, problems)), facts)
 
 
 def _check_run(path: Path, machine: Path | None) -> Findings:

@@ -78,21 +78,13 @@ class Explanation:
 def load_of(machine: Machine, settings: Mapping[str, str], run: Run | None = None) -> Load:
     """The load of a run, or of the upper bounds; `settings` (signal or state -> text with a unit) win over both.
 
-    A bare number is in the signal's own unit, in degC for a state. Amplitudes of "peak" signals are turned into rms.
+    A bare number is in the signal's own unit, in degC for a state. "signals.ambient" and "model.ambient" are the signal
+    and the state of that name; "ambient" alone is refused where there are both. Amplitudes of "peak" signals are turned
+    into rms.
     Raises TwinError for unknown names and units; LogError for a run without a signal that a law reads.
     """
     known = {name: wiring.signal(name, entry) for name, entry in machine.signals.items()}
-    states, fixed = {}, {}
-    for name, text in settings.items():
-        if name in known:
-            entry = machine.signals[name]
-            rms = math.sqrt(2.0) if entry.kind == "peak" else 1.0
-            fixed[name] = _setting(name, text, entry.unit) / rms
-        elif name in STATES:
-            states[name] = _setting(name, text, "degC")
-        else:
-            remedy = did_you_mean(name, [*known, *STATES], "signals and temperatures of the model")
-            raise TwinError(f"nothing called '{name}' to set", "--set", remedy)
+    fixed, states = _settings(machine, settings)
     if run is None:
         time = np.zeros(1)
         values = {name: np.array([s.high]) for name, s in known.items()}
@@ -115,6 +107,28 @@ def load_of(machine: Machine, settings: Mapping[str, str], run: Run | None = Non
         if entry.kind == "peak" and name in told:
             told[name] += ", peak turned into rms"
     return Load(time, values, told, states)
+
+
+def _settings(machine: Machine, settings: Mapping[str, str]) -> tuple[dict[str, float], dict[str, float]]:
+    """Signals (rms, SI) and states of the model that are set. Raises TwinError for unknown names and units."""
+    states: dict[str, float] = {}
+    fixed: dict[str, float] = {}
+    for given, text in settings.items():
+        kind, _, rest = given.partition(".")
+        name = rest if kind in ("signals", "model") else given
+        if given in machine.signals and given in STATES:
+            what = f"'{given}' is a signal and a temperature of the model"
+            raise TwinError(what, "--set", f"write signals.{given}={text}, or model.{given}={text}")
+        if name in machine.signals and kind != "model":
+            entry = machine.signals[name]
+            rms = math.sqrt(2.0) if entry.kind == "peak" else 1.0
+            fixed[name] = _setting(name, text, entry.unit) / rms
+        elif name in STATES and kind != "signals":
+            states[name] = _setting(name, text, "degC")
+        else:
+            remedy = did_you_mean(name, [*machine.signals, *STATES], "signals and temperatures of the model")
+            raise TwinError(f"nothing called '{given}' to set", "--set", remedy)
+    return fixed, states
 
 
 def _setting(name: str, text: str, unit: str) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Iterable
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -32,8 +33,7 @@ def load_machine(path: Path, text: str | None = None) -> Machine:
     Raises DescriptionError with one problem per mistake, each with file, key, line and remedy: TOML syntax, unknown or
     missing keys, units, names that mean nothing, laws with wrong parameters or signals, values out of range.
     """
-    path = Path(path)
-    path = path / "machine.toml" if path.is_dir() else path
+    path = _file_of(path)
     text = read_text(path) if text is None else text
     try:
         data = tomllib.loads(text)
@@ -57,6 +57,25 @@ def load_machine(path: Path, text: str | None = None) -> Machine:
     if any(not p.warning for p in problems):
         raise DescriptionError.collect(sorted(problems, key=problems.__getitem__))
     return Machine.model_validate({**data, "folder": path.parent})
+
+
+def located(path: Path, problems: Iterable[Problem]) -> list[Problem]:
+    """Problems of a description that say where by key alone, with its file and line; others as they are.
+
+    path: of machine.toml, or its folder.
+    """
+    path = _file_of(path)
+    lines = key_lines(read_text(path))
+    found = []
+    for problem in problems:
+        keys = tuple(problem.where.removeprefix("machine.toml: ").split("."))
+        found.append(_placed(path, lines, keys, problem) if line_of(lines, keys) else problem)
+    return found
+
+
+def _file_of(path: Path) -> Path:
+    path = Path(path)
+    return path / "machine.toml" if path.is_dir() else path
 
 
 def _placed(path: Path, lines: dict[Keys, int], keys: Keys, problem: Problem) -> Problem:

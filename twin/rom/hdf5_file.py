@@ -26,12 +26,18 @@ def writing(path: Path, finish: Callable[[bytes], bytes] = bytes) -> Iterator[h5
 
     Raises TwinError if the disk is full or the folder cannot be written.
     """
+    with atomic_path(path) as temporary, image_of(temporary, finish) as f:
+        yield f
+
+
+@contextmanager
+def image_of(path: Path, finish: Callable[[bytes], bytes] = bytes) -> Iterator[h5py.File]:
+    """The same straight to `path`, a temporary name of the caller's. Raises OSError if it cannot be written."""
     with h5py.File(path.name, "w", driver="core", backing_store=False) as f:
         yield f
         f.flush()
         image = f.id.get_file_image()
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(finish(image))
+    path.write_bytes(finish(image))
 
 
 def put(

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from twin.atomic import atomic_path
+from twin.atomic import atomic_path, telling
 from twin.errors import TwinError
 from twin.logs.run import Table, Tcp
 from twin.logs.write import write_table, write_tcp
 from twin.ordinary import ordinary
-from twin.rom.hdf5_file import put, put_attributes, scale, writing
+from twin.rom.hdf5_file import image_of, put, put_attributes, scale
 
 FORMAT = "twin result"
 
@@ -111,30 +112,40 @@ def refuse_run_folder(folder: Path) -> None:
 
 
 def write_results(folder: Path, result: Result, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Write all files of a result, each whole or not at all; returns the summary, led by `facts`.
+    """Write all files of a result; returns the summary, led by `facts`. Where nothing moves the TCP, no tcp.csv.
 
-    Where nothing moves the TCP, no tcp.csv.
-    Raises TwinError if a file cannot be written, and for run folders.
+    All are written before the first of an earlier result is replaced, summary.json last: it names the SHA-256 of the
+    others ("files"), by which a reader knows that they belong together, whenever it reads them.
+    Raises TwinError if a file cannot be written, and for run folders; files then are as they were.
     """
     folder = Path(folder)
     refuse_run_folder(folder)
     told = {**facts, **summary(result)}
-    _write_hdf5(folder / "result.h5", result)
     columns = dict(zip(result.sensors, result.temperature.T, strict=True))
-    with atomic_path(folder / "temperatures.csv") as path:
-        write_table(path, Table(result.time, columns, dict.fromkeys(columns, "degC")))
+    temperatures = Table(result.time, columns, dict.fromkeys(columns, "degC"))
+    writers: dict[str, Callable[[Path], object]] = {
+        "result.h5": lambda path: _write_hdf5(path, result),
+        "temperatures.csv": lambda path: write_table(path, temperatures),
+    }
     if result.moves:
-        with atomic_path(folder / "tcp.csv") as path:
-            write_tcp(path, Tcp(result.time, result.axes, result.position, result.tcp_actual))
-    else:
-        (folder / "tcp.csv").unlink(missing_ok=True)  # of an earlier result
-    with atomic_path(folder / "summary.json") as path:
-        path.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        tcp = Tcp(result.time, result.axes, result.position, result.tcp_actual)
+        writers["tcp.csv"] = lambda path: write_tcp(path, tcp)
+    with ExitStack() as stack:  # the last one entered is renamed first
+        last = stack.enter_context(atomic_path(folder / "summary.json"))
+        paths = {name: stack.enter_context(atomic_path(folder / name)) for name in reversed(writers)}
+        for name, write in writers.items():
+            with telling(folder / name):
+                write(paths[name])
+        told["files"] = {name: sha256(paths[name].read_bytes()).hexdigest() for name in writers}
+        with telling(folder / "summary.json"):
+            last.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        if not result.moves:
+            (folder / "tcp.csv").unlink(missing_ok=True)  # of an earlier result
     return told
 
 
 def _write_hdf5(path: Path, result: Result) -> None:
-    with writing(path) as f:
+    with image_of(path) as f:
         put_attributes(f, {"format": FORMAT, "artefact": result.artefact, "substeps": result.substeps})
         scale(f, "time", result.time, "s", "step edges")
         scale(f, "step", np.arange(len(result.time) - 1), "", "from time[step] to time[step + 1]")

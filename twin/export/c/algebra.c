@@ -2,11 +2,13 @@
 
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__gnu_linux__) && !defined(TWIN_PLAIN)
 #define QUICK __attribute__((target_clones("avx512f", "avx2", "default"))) /* the processor's own, chosen at start */
+#define INSIDE __attribute__((always_inline)) /* compiled once for each of them */
 #else
 #define QUICK
+#define INSIDE
 #endif
 
-static real dot(int n, const real *a, const real *b)
+INSIDE static inline real dot(int n, const real *a, const real *b)
 {
     real s[16] = {0}, t = 0;
     int i = 0;
@@ -20,7 +22,7 @@ static real dot(int n, const real *a, const real *b)
     return t;
 }
 
-static void add(int n, real factor, const real *a, real *y)
+INSIDE static inline void add(int n, real factor, const real *a, real *y)
 {
     for (int i = 0; i < n; i++)
         y[i] += factor * a[i];

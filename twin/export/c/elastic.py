@@ -42,7 +42,7 @@ def put_elastic(out: Arrays, model: MachineModel, back: Sequence[np.ndarray]) ->
     out.integers("input_count", [len(w) for w in W])
     out.integers("input_first", first[:-1])
     out.integers("input_row", np.cumsum([0, *(w.size for w in W)])[:-1])
-    out.reals("W_rows", np.concatenate([w.ravel() for w in W]))
+    out.weights("W_rows", np.concatenate([w.ravel() for w in W]))
     sizes |= {"INPUTS": max(int(first[-1]), 1), "GRID": 1}
     structure = model.structure
     if isinstance(structure, LumpedStructure):
@@ -88,7 +88,7 @@ def _put_meshed(out: Arrays, structure: ElasticStructure, first: np.ndarray) -> 
     out.integers("port_offset", system.offsets[:-1])
     out.integers("port_input", [first[b] + c - system.offsets[b] for c, b in enumerate(body_of)])
     out.integers("flexibility_first", np.cumsum([0, *(n * n for n in ports)])[:-1])
-    out.reals("F", np.concatenate([b.F.ravel() for b in structure.bodies]))
+    out.weights("F", np.concatenate([b.F.ravel() for b in structure.bodies]))
     out.reals("motion", [structure._motions[c, 6 * b : 6 * b + 6] for c, b in enumerate(body_of)])
     out.reals("shifts", system.shifts)
     out.reals("stiffness", system.stiffness)

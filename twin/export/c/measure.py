@@ -14,7 +14,7 @@ import numpy as np
 
 from twin.errors import TwinError
 from twin.export.c.source import Source, source_of
-from twin.export.compiler import own_compiler
+from twin.export.compiler import own_compiler, put_weights, taking
 from twin.logs.read import read_run
 from twin.rom.artefact import Artefact
 from twin.run.replay import replay
@@ -73,16 +73,10 @@ def compiled_example(source: Source, folder: Path) -> Path:
     for name, text in names.items():
         (folder / name).write_text(text, encoding="utf-8")
     program = folder / "example"
-    command = [
-        compiler,
-        *_FLAGS,
-        "-o",
-        str(program),
-        str(folder / "example.c"),
-        str(folder / f"{source.name}.c"),
-        "-lm",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    weights = put_weights(folder, source.weights)
+    files = ["example.c", f"{source.name}.c"]
+    command = [compiler, *_FLAGS, taking(source.name, weights), "-o", str(program.resolve()), *files, "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
     if done.returncode:
         raise TwinError(f"the compiler {compiler} failed: {done.stderr.strip()[-200:]}", "--run", "name another in CC")
     return program

@@ -88,3 +88,12 @@ int twin_tcp(twin_machine *m, twin_real displacement[3]);
 
 /* The same at all poses of the artefact: displacement[3 * pose + component]. */
 void twin_poses(const twin_machine *m, twin_real *displacement);
+
+#if TWIN_TERMS > 0
+/* What cancels that displacement, added to the axes: once per step its coefficients[TWIN_POSE_AXES * TWIN_TERMS], */
+void twin_correction(const twin_machine *m, twin_real *coefficient);
+
+/* then in every cycle of the control: offset[m] of each axis at its nominal position[m], in the order of twin_axis_name;
+   beyond the poses those of their border, 0 for axes that have none. */
+void twin_offsets(const twin_real *coefficient, const twin_real *position, twin_real *offset);
+#endif

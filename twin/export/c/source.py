@@ -7,6 +7,7 @@ from importlib import resources
 
 import numpy as np
 
+from twin.export.c.correction import put_correction
 from twin.export.c.elastic import MESHED, put_elastic
 from twin.export.c.loads import flags, put_contacts, put_laws, put_signals
 from twin.export.c.text import Arrays, identifier, named, quoted
@@ -18,7 +19,7 @@ from twin.rom.tableau import SDIRK2_6
 from twin.run.system import Prepared, prepare
 from twin.units import _TABLE
 
-_CORE = ("algebra.c", "drive.c", "step.c", "tcp.c")
+_CORE = ("algebra.c", "drive.c", "step.c", "tcp.c", "correction.c")
 _HEAD = """#include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -35,6 +36,7 @@ class Source:
     name: str  # prefix of all public names
     header: str
     code: str
+    weights: bytes  # the numbers of its large tables once more, for compilers that take them as bytes (TWIN_WEIGHTS)
     example: str  # a main program that reads loads.csv
     sensors: tuple[str, ...]  # structural ones, then those in the air
     flags: tuple[str, ...]
@@ -62,7 +64,7 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
     bodies = _sensor_bodies(model)
     out.integers("sensor_body", [*bodies, *(e for _, e in model.ambient_sensors)])
     put_thermal(out, prepared, bodies)
-    sizes = put_elastic(out, model, prepared.back)
+    sizes = put_elastic(out, model, prepared.back) | put_correction(out, artefact)
     sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
     out.names("twin_sensor_name", sensors)
     out.names("twin_flag_name", names)
@@ -88,7 +90,7 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
     head = told + f'#include "{name}.h"\n' + _HEAD + _functions(single) + _numbers(artefact, prepared)
     core = "".join(_core(part) for part in _CORE)
     code = named(head, name) + out.text() + named(core, name)
-    return Source(name, named(header, name), code, _example(name), sensors, tuple(names))
+    return Source(name, named(header, name), code, out.weights_as_bytes(), _example(name), sensors, tuple(names))
 
 
 def _core(name: str) -> str:

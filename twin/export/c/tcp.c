@@ -193,7 +193,7 @@ static int rows_of(twin_machine *m, const real *at, real *Z)
             for (int c = 0; c < 6; c++)
                 B[(6 * port_body[J[i].column[j]] + c) * S + i] += J[i].value[j] * motion[6 * J[i].column[j] + c];
     }
-    if (S && !cholesky(S, K, pivot))
+    if (S > 0 && !cholesky(S, K, pivot))
         return 0;
     for (int c = 0; c < A; c++)
         lower(S, K, pivot, B + c * S);

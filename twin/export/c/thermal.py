@@ -17,12 +17,12 @@ def put_thermal(out: Arrays, prepared: Prepared, sensor_bodies: tuple[int, ...])
     out.integers("size", sizes)
     out.integers("first", offsets[:-1])
     out.integers("factor_first", _starts([len(a) for a in A0]))
-    out.reals("A0", np.concatenate(A0))
+    out.weights("A0", np.concatenate(A0))
     out.integers("term_count", [len(t) for t in layout.terms])
     out.integers("term_first", _starts([len(t) for t in layout.terms]))
     out.integers("term", [k for terms in layout.terms for k in terms])
     out.integers("term_matrix", _starts([len(a) for terms in A for a in terms]))
-    out.reals("A_of_terms", np.concatenate([a for terms in A for a in terms] or [np.zeros(1)]))
+    out.weights("A_of_terms", np.concatenate([a for terms in A for a in terms] or [np.zeros(1)]))
     out.reals("nominal", system.nominal)
     _put_ports(out, prepared)
     _put_films(out, prepared)
@@ -30,10 +30,10 @@ def put_thermal(out: Arrays, prepared: Prepared, sensor_bodies: tuple[int, ...])
     C = np.asarray(system.C)
     rows = [C[s, offsets[b] : offsets[b + 1]] for s, b in enumerate(sensor_bodies)]
     out.integers("sensor_row", _starts([len(r) for r in rows]))
-    out.reals("C_rows", np.concatenate(rows or [np.zeros(1)]))
+    out.weights("C_rows", np.concatenate(rows or [np.zeros(1)]))
     out.reals("energy", system.energy)
     out.reals("one", system.one)
-    out.reals("G_rows", system.G)
+    out.weights("G_rows", system.G)
 
 
 def _put_ports(out: Arrays, prepared: Prepared) -> None:
@@ -42,11 +42,11 @@ def _put_ports(out: Arrays, prepared: Prepared) -> None:
     out.integers("port_first", _starts([len(p) for p in layout.ports]))
     out.integers("port", [p for ports in layout.ports for p in ports])
     out.integers("port_row", _starts([len(p) * n for p, n in zip(layout.ports, layout.sizes, strict=True)]))
-    out.reals("P_in", np.concatenate([np.asarray(P).T.ravel() for P in system.P]))
+    out.weights("P_in", np.concatenate([np.asarray(P).T.ravel() for P in system.P]))
     if layout.symmetric:
         out.parts.append("#define P_out P_in\n")
     else:
-        out.reals("P_out", np.concatenate([np.asarray(P).ravel() for P in system.port_rows]))
+        out.weights("P_out", np.concatenate([np.asarray(P).ravel() for P in system.port_rows]))
 
 
 def _put_films(out: Arrays, prepared: Prepared) -> None:
@@ -65,7 +65,7 @@ def _put_films(out: Arrays, prepared: Prepared) -> None:
         where.append(line)
     out.table("film_row", where, len(layout.sizes))
     for k, name in enumerate(("film_rows", "M_columns", "H_columns")):
-        out.reals(name, np.concatenate([p[k] for p in parts] or [np.zeros(1)]))
+        out.weights(name, np.concatenate([p[k] for p in parts] or [np.zeros(1)]))
     area = np.asarray(system.film_area)
     out.reals("film_total_area", area)
     out.reals("film_area", np.where(area > 0.0, area, 1.0))
@@ -88,7 +88,7 @@ def _put_sources(out: Arrays, prepared: Prepared) -> None:
                     at += n
             where.append(line)
         out.table(name, where, len(layout.sizes))
-        out.reals(table, np.concatenate(parts or [np.zeros(1)]))
+        out.weights(table, np.concatenate(parts or [np.zeros(1)]))
 
 
 def _stored(A: np.ndarray, symmetric: bool) -> np.ndarray:

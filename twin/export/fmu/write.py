@@ -12,7 +12,7 @@ from uuid import NAMESPACE_URL, uuid5
 from twin.atomic import atomic_path
 from twin.export.c.source import Source, source_of
 from twin.export.c.text import named
-from twin.export.compiler import compiled, targets
+from twin.export.compiler import compiled, put_weights, targets
 from twin.export.fmu.description import build_description3, description2, description3
 from twin.export.fmu.variables import Variable, variables_of
 from twin.export.options import ExportOptions
@@ -56,7 +56,8 @@ def _write(artefact: Artefact, path: Path, options: ExportOptions, version: str)
         built = [folder / "binaries" / p.folders[version] / f"{source.name}{p.suffix}" for p in platforms]
         main = folder / "sources" / f"fmi{version}.c"
         with ThreadPoolExecutor() as pool:
-            list(pool.map(compiled, platforms, [main] * len(built), built))
+            weights, n = put_weights(folder, source.weights), len(built)
+            list(pool.map(compiled, platforms, [main] * n, built, [source.name] * n, [weights] * n))
         names = [*files, *(str(f.relative_to(folder)) for f in built)]
         with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             for name in names:
