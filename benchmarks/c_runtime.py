@@ -64,7 +64,7 @@ def steps(source: Source, folder: Path) -> None:
 def beside_jax(artefact: Artefact) -> None:
     clocks = (("processor time", time.process_time), ("by the clock", time.perf_counter))
     for name, clock in clocks:
-        moving, still = (milliseconds(artefact.model, rests, clock) for rests in (False, True))
+        moving, still = (milliseconds(artefact.model, rests, clock)[0] for rests in (False, True))
         print(f"   JAX, {name}, loads evaluated beforehand: {moving:.2f} ms with a new factor, {still:.2f} ms at rest")
 
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.five_axis import EXPERIMENT, machine
-from benchmarks.spread import spread
 from twin.atomic import atomic_path
+from twin.build.spread import spread
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES

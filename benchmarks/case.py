@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.five_axis import FOLDER, compact, full
+from benchmarks.five_axis import FOLDER, compact, full, machine, rich
+from twin.build.certificate import Certificate
+from twin.build.pipeline import VERIFY_SEED, BuildOptions, certificate
 from twin.build.stepper import CoupledStepper, sensor_temperatures, tcp_at_poses
 from twin.build.volumetric import volumetric_shares
 from twin.logs.read import read_run
@@ -18,11 +20,14 @@ FINER = 4
 
 
 def main() -> None:
+    known = certificate(
+        machine(), rich(), compact(), full().thermal, BuildOptions(), VERIFY_SEED, progress=bar
+    )  # as `twin verify` makes it
     for name in ("experiment_a", "experiment_b"):
-        _case(name)
+        _case(name, known)
 
 
-def _case(name: str) -> None:
+def _case(name: str, known: Certificate) -> None:
     reference, candidate = full().thermal, compact()
     run = read_run(FOLDER / "runs" / name)
     load = reference.load_model
@@ -42,7 +47,11 @@ def _case(name: str) -> None:
             advance("")
     rise, tcp = np.ptp(np.array(T), axis=0).max(), 1e6 * np.abs(u).max(axis=(0, 1))
     print(f"   {name}: largest rise {rise:.1f} K, TCP error {tcp[0]:.1f}, {tcp[1]:.1f}, {tcp[2]:.1f} um in X, Y, Z")
-    print(f"   largest error against it: {max(T_error):.4f} K at a sensor, {1e6 * max(u_error):.3f} um at a pose")
+    print(f"   largest error against it: {max(T_error):.5f} K at a sensor, {1e6 * max(u_error):.4f} um at a pose")
+    # the certificate's case, scaled to this run as its scenarios were to the case
+    T_certified = known.max_temperature_error * rise / known.case_temperature
+    u_certified = known.max_displacement_error * max(tcp) / (1e6 * known.case_displacement)
+    print(f"   certified for {rise:.1f} K and {max(tcp):.1f} um: {T_certified:.4f} K, {1e6 * u_certified:.3f} um")
     print(f"   heat balance of the full model closes to {balance:.1e} of the throughput in every step")
     for hour in (1, 4, 5, 8, 12):
         s = volumetric_shares(reference.poses, u[60 * hour - 1])

@@ -5,7 +5,7 @@ KINDS: drawn networks (lumped) and machines of boxes, the ball-screw axis as nod
 piece is one real machine, with nothing hidden twice and with one fault of each kind (benchmarks.drawn_machines,
 benchmarks.shipped_machines); its rows go to out/machines/KIND_SEED.jsonl, and what is there is not made again. Seeds
 below FIRST were looked at while the search was made. With SCHEDULER=tcp://host:port pieces go to the workers of a Dask
-scheduler (benchmarks.spread).
+scheduler (twin.build.spread).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from tempfile import TemporaryDirectory
 
 from benchmarks import drawn_machines, shipped_machines
 from benchmarks.drawn_machines import VISIBLE, Row, answer
-from benchmarks.spread import spread
 from twin.atomic import atomic_path
+from twin.build.spread import spread
 from twin.inject.judge.figures import Share
 from twin.progress import bar
 

@@ -22,11 +22,14 @@ from twin.logs.read import read_run
 from twin.logs.signals import signal_values
 from twin.rom.drive import evaluate
 from twin.rom.model import MachineModel
+from twin.rom.tableau import IMPLICIT_EULER, SDIRK2_6, Tableau
 from twin.run.stepping import advance, inputs_of, observe
 from twin.run.system import prepare
 
 STEPS = 64
 SUBSTEPS = 1  # with which `twin build` certifies the machine
+EULER_STEPS = 4  # of implicit Euler in a minute: how steps were made before they were of second order
+REPEAT = 25
 
 
 def median(function: Callable[[], object], repeat: int, clock: Callable[[], float] = time.perf_counter) -> float:
@@ -38,34 +41,51 @@ def median(function: Callable[[], object], repeat: int, clock: Callable[[], floa
     return float(np.median(times))
 
 
-def milliseconds(model: MachineModel, still: bool, clock: Callable[[], float] = time.perf_counter) -> float:
-    """Of a step with all outputs; still: every axis rests, so that the factor is kept while films allow."""
+def milliseconds(
+    model: MachineModel, still: bool, clock: Callable[[], float] = time.perf_counter
+) -> tuple[float, float]:
+    """Of a step with all outputs, and of one by EULER_STEPS of implicit Euler: medians of turns one after the other.
+
+    still: every axis rests, so that the factor is kept while films allow.
+    """
     run = read_run(FOLDER / "runs" / "experiment_a")
     signals = signal_values(run, model.load_model.signals)
     if still:
         signals = {name: np.full_like(values, values[0]) for name, values in signals.items()}
     drive = evaluate(model.load_model, run.loads.time, signals, 60.0, STEPS)
     reduced = prepare(model)
-    inputs = inputs_of(model.load_model, drive, SUBSTEPS)
-    if not still:
-        inputs = replace(inputs, changed=np.ones(STEPS, dtype=bool))
     start = reduced.uniform(24.0)
 
-    def go() -> object:
-        states, heat = advance(reduced.layout, reduced.system, start, inputs)
-        return jax.block_until_ready((observe(reduced.system, states), heat))
+    def steps(tableau: Tableau, substeps: int) -> Callable[[], object]:
+        inputs = inputs_of(model.load_model, drive, substeps, tableau=tableau)
+        if not still:
+            inputs = replace(inputs, changed=np.ones(STEPS, dtype=bool))
 
-    go()  # compile
-    return 1e3 * median(go, 15, clock) / STEPS
+        def go() -> object:
+            states, heat = advance(reduced.layout, reduced.system, start, inputs)
+            return jax.block_until_ready((observe(reduced.system, states), heat))
+
+        go()  # compile
+        return go
+
+    both = steps(SDIRK2_6, SUBSTEPS), steps(IMPLICIT_EULER, EULER_STEPS)
+    times = np.array(
+        [[median(go, 1, clock) for go in both] for _ in range(REPEAT)]
+    )  # by turns: both see the same machine
+    now, before = 1e3 * np.median(times, axis=0) / STEPS
+    return float(now), float(before)
 
 
 def main() -> None:
     model = compact()
     plain = replace(model, load_model=constant(model.load_model))
-    frozen, following, moving = milliseconds(plain, True), milliseconds(model, True), milliseconds(model, False)
+    timed = [milliseconds(plain, True), milliseconds(model, True), milliseconds(model, False)]
+    frozen, following, moving = (now for now, _ in timed)
     print(f"   runtime, {model.n} states, {SUBSTEPS} substeps, {len(model.poses)} poses: {frozen:.3f} ms with a kept "
           f"factor and constant films, {following:.3f} ms with films that follow, "
           f"{moving:.3f} ms with a new factor")  # fmt: skip
+    print(f"   beside {EULER_STEPS} steps of implicit Euler, by turns: "
+          + ", ".join(f"{now / before - 1.0:+.0%} ({before:.3f} ms)" for now, before in timed))  # fmt: skip
 
     stepper = CoupledStepper(full().thermal)
     x = stepper.uniform(20.0)

@@ -25,6 +25,7 @@ from twin.build.pipeline import (
     held_out,
     rich_model,
 )
+from twin.build.same_model import same_model
 from twin.errors import ArtefactError
 from twin.machine.description import Machine
 from twin.machine.load import load_machine
@@ -136,9 +137,9 @@ def verified(
     stored = artefact.certificate.get("substeps")
     if stored is not None:  # it runs with these
         options = replace(options, substeps=int(stored))
-    result = certificate(
-        machine, rich, artefact.model, of_full, options, VERIFY_SEED, full_scenarios, progress=progress
-    )
+    # a machine of few states is kept whole: its artefact holds the rich model, which then is stepped once, not twice
+    compact = rich if same_model(rich, artefact.model) else artefact.model
+    result = certificate(machine, rich, compact, of_full, options, VERIFY_SEED, full_scenarios, progress=progress)
     if not mesh:  # the mesh is what it was when it was asked for
         return replace(result, parts=(*result.parts, *known_parts(artefact.certificate, MESH)))
     chosen = chosen_for_full(rich.load_model, held_out(rich, options, VERIFY_SEED), SCENARIOS)

@@ -18,7 +18,6 @@ from twin.errors import ModelError
 T = TypeVar("T")
 R = TypeVar("R")
 RETRIES = 3  # a judgement: workers that die one after the other on one piece die of it
-CONNECTED = "30s"  # in which a scheduler must answer
 
 
 def scheduler() -> str:
@@ -29,7 +28,8 @@ def scheduler() -> str:
 def spread(function: Callable[[Any, T], R], shared: Any, items: Sequence[T], done: Callable[[T, R], None]) -> None:
     """`done(item, function(shared, item))` for every item, in the order of completion.
 
-    function: of a module's top level, without any state. done: called here. Raises what a piece raises, ModelError
+    function: of a module's top level, without any state. done: called here. patience: s, within which a scheduler must
+    answer. Raises what a piece raises, ModelError
     where no scheduler answers, or `distributed` is not installed.
     """
     if not scheduler():
@@ -40,7 +40,7 @@ def spread(function: Callable[[Any, T], R], shared: Any, items: Sequence[T], don
     except ImportError as e:
         raise ModelError("Dask is not installed", "SCHEDULER", "pip install 'twin[cluster]'") from e
     try:
-        client = Client(scheduler(), timeout=CONNECTED)
+        client = Client(scheduler(), timeout=patience)
     except (OSError, TimeoutError, ValueError) as e:
         raise ModelError(f"no scheduler answers: {e}", f"SCHEDULER={scheduler()}", "start `dask scheduler`") from e
     with client:
