@@ -25,12 +25,17 @@ def scheduler() -> str:
     return os.environ.get("SCHEDULER", "")
 
 
-def spread(function: Callable[[Any, T], R], shared: Any, items: Sequence[T], done: Callable[[T, R], None]) -> None:
+def spread(
+    function: Callable[[Any, T], R],
+    shared: Any,
+    items: Sequence[T],
+    done: Callable[[T, R], None],
+    patience: float = 30.0,
+) -> None:
     """`done(item, function(shared, item))` for every item, in the order of completion.
 
     function: of a module's top level, without any state. done: called here. patience: s, within which a scheduler must
-    answer. Raises what a piece raises, ModelError
-    where no scheduler answers, or `distributed` is not installed.
+    answer. Raises what a piece raises, ModelError where no scheduler answers, or `distributed` is not installed.
     """
     if not scheduler():
         each(function, shared, items, long=0.0, done=done)
