@@ -10,8 +10,11 @@ import numpy as np
 
 from twin import __version__
 from twin.build.cache import arrays_hash, cached, machine_hash
+from twin.calibrate.channels.judge import Judgement, judge
+from twin.calibrate.channels.table import channel_rows, with_findings
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
+from twin.calibrate.fit.traces import traces_of_run
 from twin.diagnose.evidence.coarse import too_coarse
 from twin.diagnose.evidence.discretisation import Difference, differences
 from twin.diagnose.evidence.nulls import form_of
@@ -31,6 +34,7 @@ from twin.diagnose.result.place import Scene
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.leftovers import with_leftovers
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -44,6 +48,7 @@ from twin.logs.run import Run
 from twin.machine.description import Machine
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
+from twin.pictures.trace import Trace
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 
@@ -169,25 +174,28 @@ def diagnose(
     names = run_names([*runs, *sealed])
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
-    usable, refuted = refuted_sensors(usable, sensors, names[: len(runs)])
+    judgement = judge(usable, sensors)
+    usable, refuted = refuted_sensors(usable, judgement, names[: len(runs)])
     faults += [*broken_sensors(usable, sensors, names[: len(runs)]), *refuted]
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     asked = named(settings.plan, detector) if settings.plan else []
-    found = search(detector, measured_of(study))
-    verdict, causes = verdict_of(found, settings.families)
-    shown = found
     groups = {f.name: f.group for f in settings.families}
-    if verdict == "unknown":  # told and judged is the calibration beside faulty channels then, not what was tried
-        shown = _beside_sensors(found, groups)
+    found = search(detector, measured_of(study))
+    verdict, causes, shown = _judged(found, settings.families, groups)
+    poor = too_poor(shown, plans, usable, settings.temperature_sigma)
+    if poor is not None:  # what it leaves is no noise: thresholds grow with it, and the search begins anew
+        detector = with_leftovers(detector, found, measured_of(study), progress)
+        found = search(detector, measured_of(study))
+        verdict, causes, shown = _judged(found, settings.families, groups)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
-    poor = too_poor(shown, plans, usable, settings.temperature_sigma)
-    if poor is not None:
-        notes.insert(0, poor.note)
+    if poor is not None and verdict in ("nothing", "unknown"):
         verdict, causes, shown = "too_poor", (), _beside_sensors(found, {})
+    if poor is not None:
+        notes.insert(0, poor.note(bool(causes)))
     searched = causes  # what was seen before any search has no statistic that channels could share
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [
@@ -207,6 +215,7 @@ def diagnose(
             verdict, causes, described = "named", (*kept, *missing.causes), missing.description
             gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
             notes.insert(0, missing.note)
+    traces = _traces(shown, plans, [*runs, *sealed], judgement)
     first = found.steps[0]
     heat = unknown_of(found) if verdict == "unknown" else None
     planned = None
@@ -247,8 +256,19 @@ def diagnose(
         support=support_of(found) if searched and heat is None else None,
         scene=_scene(machine, study.probed, searched or causes, heat),
         plan=planned,
+        traces=traces,
+        channels=tuple(channel_rows(traces, judgement, names[: len(runs)])),
     )
     return Result(diagnosis, found, extension, settings.families, described)
+
+
+def _judged(
+    found: Search, families: Sequence[Family], groups: Mapping[str, str]
+) -> tuple[Verdict, tuple[Cause, ...], Search]:
+    """Verdict and causes, and the search as it is told: of an unknown, the calibration beside faulty channels, not what
+    was tried."""
+    verdict, causes = verdict_of(found, families)
+    return verdict, causes, _beside_sensors(found, groups) if verdict == "unknown" else found
 
 
 def _beside_sensors(found: Search, groups: Mapping[str, str]) -> Search:
@@ -296,6 +316,15 @@ def _whiteness(found: Search, plans: Sequence[Measured]) -> tuple[tuple[str, flo
                     a, b = r[1:][pair], r[:-1][pair]
                     table.setdefault(name, []).append(float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-30)))
     return tuple((name, float(np.mean(before[name])), float(np.mean(after[name]))) for name in before)
+
+
+def _traces(found: Search, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement) -> tuple[Trace, ...]:
+    """Every channel of every run beside the extended model, or the recalibrated one where there is no extension."""
+    traces = []
+    for k, (m, run) in enumerate(zip(plans, runs, strict=True)):
+        T, w = found.detector.study.runs[k].split(predicted(found, k).extended)
+        traces += traces_of_run(m, run, T, w)
+    return with_findings(traces, judgement, [m.name for m in plans[: len(found.detector.study.fitted)]])
 
 
 def _series(found: Search, plans: Sequence[Measured], fitted: int) -> tuple[Series, ...]:

@@ -39,14 +39,17 @@ class Poor:
     median: float  # over sensors: rms that is left, in standard deviations of one reading
     pieces: tuple[Piece, ...]
 
-    @property
-    def note(self) -> str:
+    def note(self, named: bool = False) -> str:
+        """In words; named: whether a cause stands out all the same."""
         told = []
         for p in self.pieces:
             help_ = "" if p.by is None else f": a body that {p.by.words} would explain {p.share:.0%} of it"
             told.append(f"{p.sensor} {p.rms:.2g} K (worst from {p.hour:.0f} h of {p.run}){help_}")
         left = f"at half of its sensors it leaves {self.median:.0f} times the noise of a reading, or more"
-        return f"the model is too poor to name a cause: {left}; fits worst: {'; '.join(told)}"
+        head = "the model is poor, thresholds have grown with what it leaves" if named else (
+            "the model is too poor to name a cause"
+        )
+        return f"{head}: {left}; fits worst: {'; '.join(told)}"
 
 
 def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float) -> Poor | None:
