@@ -1,11 +1,11 @@
-"""A real lathe's rough twin calibrated: what weights of hours are worth on sealed days, and how far a damaged channel
-moves its parameters.
+"""A rough twin of a real lathe calibrated: what weights are worth, and how far a damaged channel moves parameters.
 
-Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. First the six days of models/lathe/README.md
-are fitted with and without weights (docs/calibration.md), as measured and with a channel that is wrong by less than what
-the judgement of channels sees; eight other days are predicted. Then pairs of days are fitted as measured and with one
-sensor of the twin damaged as in `benchmarks.lathe_channels`; told is by how many standard deviations of its own value the
-parameter moves that moves farthest. `python -m benchmarks.lathe_calibration TRIALS`; 12 by default.
+Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. First the six days of
+models/lathe/README.md are fitted with and without weights (docs/calibration.md), as measured and with a channel that
+is wrong by less than the judgement of channels sees; eight other days are predicted. Then pairs of days are fitted as
+measured and with one sensor of the twin damaged as in `benchmarks.lathe_channels`; told is by how many standard
+deviations of its own the parameter moves that moves farthest. `python -m benchmarks.lathe_calibration TRIALS`; 12 by
+default.
 """
 
 from __future__ import annotations
@@ -67,13 +67,19 @@ def weights(artefact: Artefact) -> None:
     print(f"   rms of {len(sealed)} sealed days{'':34}all sensors [K]   dx, dz [um]")
     for name, runs in (
         ("days as measured", training),
-        (f"one sensor {HIDDEN.size:g} K off in two of the days", [damaged(r, HIDDEN) for r in training[:2]] + training[2:]),
+        (
+            f"one sensor {HIDDEN.size:g} K off in two of the days",
+            [damaged(r, HIDDEN) for r in training[:2]] + training[2:],
+        ),
     ):
         for weighted in (True, False):
             fit = fitted(artefact, runs, weighted)
             left = np.array([left_by(artefact, fit, run) for run in sealed])
             T, x, z = np.sqrt(np.mean(left**2, axis=0))
-            print(f"   {name + (', weights' if weighted else ', no weights'):58}{T:8.3f}{1e6 * x:14.2f}{1e6 * z:8.2f}", flush=True)
+            print(
+                f"   {name + (', weights' if weighted else ', no weights'):58}{T:8.3f}{1e6 * x:14.2f}{1e6 * z:8.2f}",
+                flush=True,
+            )
 
 
 def moves(artefact: Artefact, trials: int) -> None:

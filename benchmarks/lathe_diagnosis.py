@@ -1,10 +1,10 @@
-"""A real lathe with a twin that misses by 1 K, through the whole of `twin diagnose`: is anything named that is not there,
-and is a fault of the machine named at twice its stated limit?
+"""A real lathe with a twin that misses by 1 K, through all of `twin diagnose`: false alarms, and faults of the machine.
 
 Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. The twin is models/lathe, calibrated as
-its README does. Every pair of days is looked at as measured; then faults are planted into it: what the twin's full model
-computes with the fault less what it computes without is added to the readings, so that what the twin leaves of the real
-days stays as noise. Sizes are twice the limit that the diagnosis of the pair as measured states for that place.
+its README does. Every pair of days is looked at as measured; then faults are planted into it: what the twin's full
+model computes with the fault less what it computes without is added to the readings, so that what the twin leaves of
+the real days stays as noise. Sizes are twice the limit that the diagnosis of the pair as measured states for that
+place.
 
 `python -m benchmarks.lathe_diagnosis HALF PAIRS FAULTS`: pairs of days 1, 3, 5 ... (0) or 2, 4, 6 ... (1), and faults
 in each. A row per diagnosis goes to out/lathe_diagnosis/HALF_PAIR.jsonl; those that are there are not made again.
@@ -44,6 +44,7 @@ ROOT = Path(__file__).parents[1]
 MODEL, OUT = ROOT / "models" / "lathe", ROOT / "out" / "lathe_diagnosis"
 TRAINING = ("20200701", "20200616", "20200710", "20200723", "20200730", "20200814")  # of models/lathe/README.md
 PAIRS, FAULTS = 12, 3  # per half
+FORM, NULLS = 32, 60  # synthetic measurements: what the twin leaves decides anyway
 UNITS = {"heat_source": "W", "loss_law": "1", "joint": "1", "film_gain": "1"}
 TWICE = 2.0
 
@@ -102,9 +103,12 @@ def rows_of(path: Path, days: Sequence[str], faults: int, rng: np.random.Generat
     for i in rng.permutation(len(known))[:faults]:
         family, place, size = known[int(i)]
         faulty = load_machine(
-            machine.folder, extended_description(artefact.description, [Effect(family, place, size, UNITS[family])]).text
+            machine.folder,
+            extended_description(artefact.description, [Effect(family, place, size, UNITS[family])]).text,
         )
-        planted = [with_difference(run, simulate_run(faulty, run)[0], own) for run, own in zip(runs, plain, strict=True)]
+        planted = [
+            with_difference(run, simulate_run(faulty, run)[0], own) for run, own in zip(runs, plain, strict=True)
+        ]
         rows.append(_row(artefact, machine, planted, days, (family, place, size))[0])
     return rows
 
@@ -148,7 +152,7 @@ def _row(
     hidden: tuple[str, str, float] | None,
 ) -> tuple[Row, Result]:  # fmt: skip
     began = time.perf_counter()
-    result = diagnose(artefact, machine, list(runs), (), Settings())
+    result = diagnose(artefact, machine, list(runs), (), Settings(form=FORM, nulls=NULLS))
     d = result.diagnosis
     causes = [(c.family, c.place, c.amplitude, c.unit) for c in d.causes]
     rivals = [(r.family, r.place) for c in d.causes[:1] for r in c.rivals]
@@ -179,7 +183,7 @@ def told(rows: Sequence[Row]) -> None:
         own = [r for r in rows if (r["hidden"] is None) == clean]
         answers = [answer(r) for r in own]
         for r, a in zip(own, answers, strict=True):
-            hidden = "" if clean else " {0} {1} {2:.3g}".format(*r["hidden"])
+            hidden = "" if clean else " {} {} {:.3g}".format(*r["hidden"])
             print(f"      {' '.join(r['days'])}{hidden}: {a}, {r['verdict']} {r['causes']} {r['seconds']} s")
         counts = ", ".join(f"{answers.count(a)} {a}" for a in dict.fromkeys(answers))
         print(f"   {'as measured' if clean else 'a fault at twice its limit'}: {len(own)} diagnoses: {counts}")

@@ -17,9 +17,9 @@
 # A logger has recorded some days of a lathe: a dozen temperatures, the spindle speed, the displacement X and Z of the
 # tool. Nobody described the machine, one sensor broke, and one file was put together from two. What now?
 #
-# The data here are made up, in the shape of a lathe's that was measured (`models/lathe`), so that we know what is true: a
-# network of seven nodes stands for the machine, its numbers off by up to 20 %. Everything below is Python; the commands
-# are `twin check`, `twin new`, `twin build`, `twin score` and `twin diagnose`.
+# The data here are made up, in the shape of a lathe's that was measured (`models/lathe`), so that we know what is true:
+# a network of seven nodes stands for the machine, its numbers off by up to 20 %. Everything below is Python; the
+# commands are `twin check`, `twin new`, `twin build`, `twin score` and `twin diagnose`.
 
 # %%
 import shutil
@@ -30,7 +30,6 @@ import numpy as np
 
 import twin
 from twin.face.new import from_log
-from twin.logs.read import read_run
 from twin.logs.write import write_run
 
 LATHE, OUT = Path("models/lathe"), Path("out/real_log")
@@ -53,8 +52,16 @@ PLAN = {
 HOURS = 7.0  # simulated; five are logged, and what comes after is spliced into one of them
 
 described = twin.load(LATHE)
-lengths = {"motor": (1.5, -2.0), "headstock": (3.0, 2.5), "saddle": (-2.0, 1.0), "column": (2.0, -3.0), "bed": (-1.5, 3.5)}
-known = {f"tcp.expansion.{node}.{axis}": 1e-6 * v for node, xz in lengths.items() for axis, v in zip("xz", xz)}
+lengths = {
+    "motor": (1.5, -2.0),
+    "headstock": (3.0, 2.5),
+    "saddle": (-2.0, 1.0),
+    "column": (2.0, -3.0),
+    "bed": (-1.5, 3.5),
+}
+known = {
+    f"tcp.expansion.{node}.{axis}": 1e-6 * v for node, xz in lengths.items() for axis, v in zip("xz", xz, strict=True)
+}
 off = {path: rng.uniform(0.8, 1.2) * value for path, value in described.parameters.items() if value}
 real = described.edited(off | known, OUT / "real.toml")
 
@@ -70,8 +77,9 @@ def loads(folder: Path, plan: tuple[tuple[float, float], ...]) -> Path:
     header = "time [s],spindle_speed [1/min],feeding [1],TC04 [degC],TC08 [degC]"
     rows = np.column_stack([time, speed, speed > 0.0, cabin, room])
     np.savetxt(folder / "loads.csv", rows, "%.6g", ",", header=header, comments="")
-    facts = f'sampling = "60 s"\nprovenance = "made by a notebook"\nsynthetic = ["loads"]\ninitial_temperature = "{room[0]:.3f} degC"\n'
-    (folder / "run.toml").write_text(facts, encoding="utf-8")
+    facts = 'sampling = "60 s"\nprovenance = "made by a notebook"\nsynthetic = ["loads"]\n'
+    start = f'initial_temperature = "{room[0]:.3f} degC"\n'
+    (folder / "run.toml").write_text(facts + start, encoding="utf-8")
     return folder
 
 
@@ -84,8 +92,8 @@ whole = {
 # %% [markdown]
 # ## Two mishaps
 #
-# On Tuesday the sensor PT05 breaks after two hours: its readings are noise from then on. Wednesday's file goes on, from row
-# 200 on, with rows of an hour and a half later.
+# On Tuesday the sensor PT05 breaks after two hours: its readings are noise from then on. Wednesday's file goes on, from
+# row 200 on, with rows of an hour and a half later.
 
 # %%
 ROWS = 300
@@ -119,9 +127,9 @@ print(logs["monday"].read_text("utf-8")[:260])
 # %% [markdown]
 # ## A twin from nothing but the files
 #
-# Columns are taken for what their headers and values say. A column that broke is used in no run, and of a spliced file what
-# comes before the splice; both are told. What remains: bodies that follow a logged temperature or a heat with some lag and
-# move the tool. Friday is kept aside.
+# Columns are taken for what their headers and values say. A column that broke is used in no run, and of a spliced file
+# what comes before the splice; both are told. What remains: bodies that follow a logged temperature or a heat with some
+# lag and move the tool. Friday is kept aside.
 
 # %%
 training = ["monday", "tuesday", "wednesday", "thursday"]
@@ -145,7 +153,9 @@ for day in PLAN:
     temperatures = {n: columns[n] for n in run.temperatures.columns}
     driven = {n: v[:ROWS] for n, v in run.loads.columns.items()}
     displacement = np.column_stack([1e-6 * columns["Disp. X"], np.full(ROWS, np.nan), 1e-6 * columns["Disp. Z"]])[::5]
-    tcp = replace(run.tcp, time=time[::5], position=np.zeros((len(time[::5]), 0)), displacement=displacement, sigma=None)
+    tcp = replace(
+        run.tcp, time=time[::5], position=np.zeros((len(time[::5]), 0)), displacement=displacement, sigma=None
+    )
     made = replace(
         run, loads=replace(run.loads, time=time, columns=driven), tcp=tcp, tcp_reference="first", machine=None,
         temperatures=replace(run.temperatures, time=time, columns=temperatures), folder=OUT / "runs" / day,
@@ -160,9 +170,9 @@ for findings in found.values():
 # %% [markdown]
 # ## What a diagnosis makes of it
 #
-# Somebody has described the lathe after all (`models/lathe`, with the lengths that move the tool). Its numbers are those of a
-# designer, up to 20 % off. A diagnosis of Tuesday and Wednesday must not invent heat for a broken sensor, nor for rows
-# of another time.
+# Somebody has described the lathe after all (`models/lathe`, with the lengths that move the tool). Its numbers are
+# those of a designer, up to 20 % off. A diagnosis of Tuesday and Wednesday must not invent heat for a broken sensor,
+# nor for rows of another time.
 
 # %%
 lathe = described.edited(known, OUT / "described.toml")

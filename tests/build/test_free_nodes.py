@@ -147,7 +147,7 @@ def test_members_are_written_as_such_nodes(tmp_path):
     names = full.thermal.bodies[0].members
     own = [x[0][full.thermal.bodies[0].member_states(names.index(n)).start] for n in names if n.startswith("follows_")]
     expected = responses(run, [m.candidate for m in found], time[-1:])[0]
-    np.testing.assert_allclose(own, expected, atol=0.02)
+    np.testing.assert_allclose(own, expected, atol=0.03)  # of 4 K: the runtime's step, the exact lag
 
 
 @pytest.mark.parametrize(

@@ -6,30 +6,24 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.search.leftovers import _moved, _surrogate, with_leftovers
+from twin.diagnose.search.leftovers import leftovers, surrogate, with_leftovers
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.verdict import limits_at
 
 
-def test_leftovers_move_without_a_leap_and_keep_their_size():
-    values = np.cumsum(np.random.default_rng(0).standard_normal((200, 3)), axis=0)
-    steps = np.abs(np.diff(values, axis=0)).max()
-    for shift in (0.0, 0.3, 0.77):
-        moved = _moved(values, 200, shift)
-        assert np.abs(np.diff(moved, axis=0)).max() <= steps + 1e-12
-        assert np.isin(moved, values).all()
-        assert (moved.std(axis=0) > 0.2 * values.std(axis=0)).all()
-    np.testing.assert_allclose(_moved(values, 200, 0.0), values)
-    assert _moved(values, 120, 0.4).shape == (120, 3)
-
-
-def test_gaps_are_bridged_and_channels_go_together():
-    left = [(np.column_stack([np.arange(50.0), -np.arange(50.0)]), np.zeros((0, 3))) for _ in range(2)]
-    left[0][0][10:20, 0] = np.nan
-    for made in _surrogate(left, np.random.default_rng(1)):
-        both = made.reshape(50, 2)
-        assert np.isfinite(both).all()
-        np.testing.assert_allclose(both[:, 0], -both[:, 1], atol=1.0)
+def test_leftovers_change_place_and_sign_alike_in_all_runs():
+    rng = np.random.default_rng(0)
+    first = rng.standard_normal((40, 4)), rng.standard_normal((6, 3))
+    runs = [first, (2.0 * first[0][:30], first[1][:5])]
+    made = surrogate(runs, np.random.default_rng(1))
+    assert len(made) == 40 * 4 + 6 * 3 + 30 * 4 + 5 * 3
+    T, w = made[:160].reshape(40, 4), made[160:178].reshape(6, 3)
+    again = made[178:298].reshape(30, 4)
+    np.testing.assert_allclose(again, 2.0 * T[:30])
+    np.testing.assert_allclose(np.sort((T**2).sum(axis=0)), np.sort((first[0] ** 2).sum(axis=0)))
+    np.testing.assert_allclose(np.abs(w), np.abs(first[1]))
+    others = [surrogate(runs, np.random.default_rng(seed)) for seed in range(2, 8)]
+    assert not any(np.allclose(made, other) for other in others)
 
 
 @pytest.mark.long
@@ -40,23 +34,25 @@ def test_thresholds_and_limits_grow_and_never_shrink():
     exact = np.concatenate([study.outputs(k, np.zeros(n)) for k in study.fitted])
     rng = np.random.default_rng(3)
 
-    def found(size: float) -> tuple[Search, np.ndarray]:
-        """The machine as described, with slow leftovers of so many kelvins beside noise."""
+    def raised(size: float):
+        """For the machine as described, with slow leftovers of so many kelvins beside noise."""
         parts, first = [], 0
         for k in study.fitted:
             T, w = study.runs[k].split(exact[first : first + study.runs[k].size])
             first += study.runs[k].size
-            slow = np.sin(np.linspace(0.0, 5.0, len(T)))[:, None] * rng.uniform(-1.0, 1.0, T.shape[1])
+            slow = np.sin(np.linspace(0.0, 25.0, len(T)))[:, None] * rng.uniform(0.5, 1.0, T.shape[1])
             parts += [(T + size * slow + 0.02 * rng.standard_normal(T.shape)).ravel(), w.ravel()]
         y = np.concatenate(parts)
-        x = np.zeros(n)
-        return Search(detector, x, x, (), (), y, y, detector.columns.heat, np.eye(n)), y
+        found = Search(detector, np.zeros(n), np.zeros(n), (), (), y, y, detector.columns.heat, np.eye(n))
+        left = leftovers(detector, found, y)
+        return with_leftovers(detector, left), np.median(left.by_sensor(detector))
 
-    small, large = (with_leftovers(detector, *found(size)) for size in (0.01, 2.0))
+    (small, noise), (large, form) = raised(0.0), raised(2.0)
+    assert noise < 1.5 < form
     for name, value in detector.thresholds.items():
         assert small.thresholds[name] >= value
         assert large.thresholds[name] >= value
     assert large.thresholds["heat_source"] > 3.0 * small.thresholds["heat_source"]
     before, after = limits_at(small), limits_at(large)
     assert all(after[key] >= before[key] for key in before)
-    assert np.all(large.pulls.settled.sigma >= detector.pulls.settled.sigma)
+    assert not np.any(large.pulls.strain(np.full(n, 9.0), np.full(n, 9.0)))

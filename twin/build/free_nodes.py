@@ -2,9 +2,9 @@
 
     C x' = theta_k a (T_k - x) + q
 
-with the area a and the coefficient of their film, and what sources give. Nothing couples them to the mesh: they share its
-body so that all that steps, reduces and stores bodies takes them along. Of the TCP they move what [tcp.expansion] says,
-at every position alike.
+with the area a and the coefficient of their film, and what sources give. Nothing couples them to the mesh: they share
+its body so that all that steps, reduces and stores bodies takes them along. Of the TCP they move what [tcp.expansion]
+says, at every position alike.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ from twin.diagnose.result.place import Scene
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import predicted
-from twin.diagnose.search.leftovers import with_leftovers
+from twin.diagnose.search.leftovers import leftovers, with_leftovers
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -184,9 +184,10 @@ def diagnose(
     groups = {f.name: f.group for f in settings.families}
     found = search(detector, measured_of(study))
     verdict, causes, shown = _judged(found, settings.families, groups)
-    poor = too_poor(shown, plans, usable, settings.temperature_sigma)
+    left = leftovers(detector, shown, measured_of(study))
+    poor = too_poor(shown, plans, usable, settings.temperature_sigma, left)
     if poor is not None:  # what it leaves is no noise: thresholds grow with it, and the search begins anew
-        detector = with_leftovers(detector, found, measured_of(study), progress)
+        detector = with_leftovers(detector, left, progress)
         found = search(detector, measured_of(study))
         verdict, causes, shown = _judged(found, settings.families, groups)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]

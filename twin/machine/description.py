@@ -365,5 +365,5 @@ class Machine(Entry):
 
     @property
     def members(self) -> tuple[str, ...]:
-        """Names of the parts, or of the nodes and bars: what contacts join to bodies. Nodes beside parts belong to none."""
+        """Names of the parts, or of the nodes and bars: what contacts join to bodies. Nodes beside parts are none."""
         return tuple(self.parts) or (*self.nodes, *self.bars)

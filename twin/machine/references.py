@@ -216,7 +216,12 @@ def _laws(machine: Machine) -> Iterator[Problem]:
     yield from _each(machine.sources, lambda name: wiring.source(name, machine.sources[name], machine))
     yield from _each(machine.films, lambda name: wiring.film_law(name, machine.films[name], machine))
     for name, entry in machine.sources.items():
-        if entry is not None and entry.surface is not None and not machine.lumped and entry.surface not in machine.nodes:
+        if (
+            entry is not None
+            and entry.surface is not None
+            and not machine.lumped
+            and entry.surface not in machine.nodes
+        ):
             yield from _surface(entry.surface, f"sources.{name}.surface", machine)
 
 

@@ -15,10 +15,11 @@ from twin.nearest import did_you_mean
 
 
 def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> dict[str, tuple[tuple[str, str], ...]]:
-    """(part, surface) of every film, nodes beside parts left out, with "part.*" expanded to what no film, fixed contact or adiabatic list names.
+    """(part, surface) of every film, with "part.*" expanded to what no film, fixed contact or adiabatic list names.
 
     `surfaces` holds the named surfaces of every part's mesh. A fixed contact may share its surface with others; what
-    they leave uncovered exchanges no heat. Raises DescriptionError with all unknown, unused and doubly used surfaces.
+    they leave uncovered exchanges no heat. Nodes beside parts are left out. Raises DescriptionError with all unknown,
+    unused and doubly used surfaces.
     """
     uses = _Uses(surfaces)
     for part_name, part in machine.parts.items():

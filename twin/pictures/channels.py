@@ -19,8 +19,8 @@ MOST = 40  # panels: channels with something wrong first, then displacements, th
 DOTS = 240  # readings that a panel shows at most
 COMPUTED, ASIDE = "#0072b2", "#d55e00"
 CAPTION = (
-    "Dots are measured, lines computed; orange readings are set aside or corrected. Runs follow one another, their names "
-    "at the top. Behind a channel's name: rms of what was compared."
+    "Dots are measured, lines computed; orange readings are set aside or corrected. Runs follow one another, their "
+    "names at the top. Behind a channel's name: rms of what was compared."
 )
 
 
@@ -69,7 +69,9 @@ def _rms(group: Sequence[Trace]) -> float:
 
 def _starts(traces: Sequence[Trace], runs: Sequence[str]) -> dict[str, float]:
     """Hours at which each run begins on the common axis."""
-    lengths = {run: max((float(t.time[-1]) for t in traces if t.run == run and len(t.time)), default=0.0) for run in runs}
+    lengths = {
+        run: max((float(t.time[-1]) for t in traces if t.run == run and len(t.time)), default=0.0) for run in runs
+    }
     ends = np.cumsum([lengths[run] / 3600.0 for run in runs])
     return dict(zip(runs, [0.0, *ends[:-1]], strict=True))
 

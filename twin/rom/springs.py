@@ -109,7 +109,7 @@ class SpringSystem:
         return t
 
     def scale_rows(self, positions: Positions) -> list[tuple[int, np.ndarray, np.ndarray]]:
-        """What the growth of each scale, and each node beside the parts, adds: (body, its nodes (m,), displacement (3, m) [m/K] per T - T_ref there)."""
+        """What each scale, and each node beside the parts, adds: (body, states (m,), TCP displacement (3, m) [m/K])."""
         at = self.vector(positions)
         return [
             (e.strip.body, e.strip.nodes, np.outer(-self._lever(e) * e.sign, self.scale_row(e, positions)))

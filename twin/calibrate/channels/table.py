@@ -1,4 +1,4 @@
-"""Every measured channel of some runs as a row: how well it is met, how much of it stands, and what is wrong with it."""
+"""Every measured channel of some runs as a row: how well it is met, how much of it stands, what is wrong with it."""
 
 from __future__ import annotations
 
@@ -33,9 +33,7 @@ def channel_rows(traces: Sequence[Trace], judgement: Judgement, names: Sequence[
 
 def with_findings(traces: Sequence[Trace], judgement: Judgement, names: Sequence[str]) -> tuple[Trace, ...]:
     """The traces with what a judgement found of their channels, in words."""
-    found = {
-        (names[k], channel): words(f, names) for f in judgement.findings for k in f.runs for channel in f.channels
-    }
+    found = {(names[k], channel): words(f, names) for f in judgement.findings for k in f.runs for channel in f.channels}
     return tuple(replace(t, wrong=found.get((t.run, t.channel), "")) for t in traces)
 
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from twin.calibrate.members.driver import LAWS, RISE, Driver
 from twin.calibrate.members.responses import Candidate, short
-from twin.errors import DescriptionError
 from twin.logs.run import Run
 
 AREA, COEFFICIENT = 0.01, 100.0  # m^2 and W/(m^2 K) of a member: 1 W/K in all
@@ -41,7 +40,8 @@ def with_members(text: str, members: Sequence[Member], scale: float, runs: Seque
     A logged temperature that no signal of the machine reads becomes one. Where runs state one temperature at the start,
     the environment counts from there: what a sensor reads first is taken for that temperature.
 
-    In a machine of parts they are nodes beside the parts. Raises DescriptionError for a load that no law turns into heat.
+    In a machine of parts they are nodes beside the parts.
+    Raises DescriptionError for a load that no law turns into heat.
     """
     from twin.machine.extend import appended, changed  # the edge has no pydantic, and writes no descriptions
 

@@ -52,9 +52,7 @@ def broken_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[
     return causes
 
 
-def refuted_sensors(
-    runs: Sequence[Run], judgement: Judgement, names: Sequence[str]
-) -> tuple[list[Run], list[Cause]]:
+def refuted_sensors(runs: Sequence[Run], judgement: Judgement, names: Sequence[str]) -> tuple[list[Run], list[Cause]]:
     """Runs without the readings of sensors that all other channels refute, and a cause for each: found before anything
     is fitted, which a single wrong channel would drag along."""
     found = [f for f in judgement.findings if f.statistic < np.inf]  # the others are told already

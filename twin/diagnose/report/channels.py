@@ -25,4 +25,6 @@ def channels_table(d: Diagnosis) -> str:
     for r in order:
         rms = "-" if r["rms"] is None else f"{r['rms']:.3f} K" if r["unit"] == "K" else f"{1e6 * r['rms']:.2f} um"
         rows.append([r["channel"], r["run"], rms, f"{100 * r['kept']:.0f} %", str(r["leaps"]), r["wrong"]])
-    return table(["channel", "run", "rms that is left", "kept", "leaps", "what is wrong"], rows, (2, 3, 4)) if rows else ""
+    return (
+        table(["channel", "run", "rms that is left", "kept", "leaps", "what is wrong"], rows, (2, 3, 4)) if rows else ""
+    )

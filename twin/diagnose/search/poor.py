@@ -16,6 +16,7 @@ from twin.calibrate.fit.measured import Measured
 from twin.calibrate.members.driver import drivers_of
 from twin.calibrate.members.responses import Candidate, candidates, responses
 from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.leftovers import Leftovers
 from twin.diagnose.search.look import Search
 from twin.logs.run import Run
 
@@ -46,14 +47,19 @@ class Poor:
             help_ = "" if p.by is None else f": a body that {p.by.words} would explain {p.share:.0%} of it"
             told.append(f"{p.sensor} {p.rms:.2g} K (worst from {p.hour:.0f} h of {p.run}){help_}")
         left = f"at half of its sensors it leaves {self.median:.0f} times the noise of a reading, or more"
-        head = "the model is poor, thresholds have grown with what it leaves" if named else (
-            "the model is too poor to name a cause"
+        head = (
+            "the model is poor, thresholds have grown with what it leaves"
+            if named
+            else ("the model is too poor to name a cause")
         )
         return f"{head}: {left}; fits worst: {'; '.join(told)}"
 
 
-def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float) -> Poor | None:
-    """None where half of the sensors are left with less than policy.poor sigma [K], or causes explain most of it."""
+def too_poor(
+    found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float, left: Leftovers
+) -> Poor | None:
+    """None where half of the sensors are left with less than policy.poor sigma [K], or causes explain most of it, and
+    with less than policy.formless of what noise and the known discrepancy explain."""
     policy = found.detector.policy
     sensors = plans[0].sensors
     if len(sensors) < policy.sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
@@ -67,7 +73,8 @@ def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigm
     rms = _rms(errors)
     median = float(np.nanmedian(rms)) / sigma
     explained = bool(np.nanmedian(rms) < policy.relieves * np.nanmedian(_rms(before)))
-    if explained or not median > policy.poor:
+    form = float(np.median(left.by_sensor(found.detector))) > policy.formless
+    if (explained or not median > policy.poor) and not form:
         return None
     order = np.argsort(-np.nan_to_num(rms))[: policy.worst]
     return Poor(median, tuple(_piece(sensors[i], int(i), float(rms[i]), errors, plans, runs) for i in order))

@@ -84,7 +84,9 @@ def _put_meshed(out: Arrays, structure: ElasticStructure, first: np.ndarray) -> 
     system = structure.system
     if system.nodes:
         raise TwinError(
-            "nodes beside parts that move the tool are not exported to C", "nodes", "export another format, or take them out"
+            "nodes beside parts that move the tool are not exported to C",
+            "nodes",
+            "export another format, or take them out",
         )
     ports = np.diff(system.offsets)
     body_of = np.repeat(np.arange(len(ports)), ports)
