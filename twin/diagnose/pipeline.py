@@ -34,7 +34,6 @@ from twin.diagnose.result.place import Scene
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import predicted
-from twin.diagnose.search.leftovers import leftovers, with_leftovers
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -181,22 +180,19 @@ def diagnose(
         known_family(settings.plan, settings.families)  # now, not after minutes
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     asked = named(settings.plan, detector) if settings.plan else []
-    groups = {f.name: f.group for f in settings.families}
     found = search(detector, measured_of(study))
-    verdict, causes, shown = _judged(found, settings.families, groups)
-    left = leftovers(detector, shown, measured_of(study))
-    poor = too_poor(shown, plans, usable, settings.temperature_sigma, left)
-    if poor is not None:  # what it leaves is no noise: thresholds grow with it, and the search begins anew
-        detector = with_leftovers(detector, left, progress)
-        found = search(detector, measured_of(study))
-        verdict, causes, shown = _judged(found, settings.families, groups)
+    verdict, causes = verdict_of(found, settings.families)
+    shown = found
+    groups = {f.name: f.group for f in settings.families}
+    if verdict == "unknown":  # told and judged is the calibration beside faulty channels then, not what was tried
+        shown = _beside_sensors(found, groups)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
-    if poor is not None and verdict in ("nothing", "unknown"):
-        verdict, causes, shown = "too_poor", (), _beside_sensors(found, {})
+    poor = too_poor(shown, plans, usable, settings.temperature_sigma)
     if poor is not None:
-        notes.insert(0, poor.note(bool(causes)))
+        notes.insert(0, poor.note)
+        verdict, causes, shown = "too_poor", (), _beside_sensors(found, {})
     searched = causes  # what was seen before any search has no statistic that channels could share
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [
@@ -263,15 +259,6 @@ def diagnose(
     return Result(diagnosis, found, extension, settings.families, described)
 
 
-def _judged(
-    found: Search, families: Sequence[Family], groups: Mapping[str, str]
-) -> tuple[Verdict, tuple[Cause, ...], Search]:
-    """Verdict and causes, and the search as it is told: of an unknown, the calibration beside faulty channels, not what
-    was tried."""
-    verdict, causes = verdict_of(found, families)
-    return verdict, causes, _beside_sensors(found, groups) if verdict == "unknown" else found
-
-
 def _beside_sensors(found: Search, groups: Mapping[str, str]) -> Search:
     """The search with the causes that are faulty temperature sensors alone, and the calibration beside these."""
     kept = tuple(a for a in found.accepted if groups.get(a.hypothesis.family) == "sensor")
@@ -321,7 +308,7 @@ def _whiteness(found: Search, plans: Sequence[Measured]) -> tuple[tuple[str, flo
 
 def _traces(found: Search, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement) -> tuple[Trace, ...]:
     """Every channel of every run beside the extended model, or the recalibrated one where there is no extension."""
-    traces = []
+    traces: list[Trace] = []
     for k, (m, run) in enumerate(zip(plans, runs, strict=True)):
         T, w = found.detector.study.runs[k].split(predicted(found, k).extended)
         traces += traces_of_run(m, run, T, w)

@@ -34,11 +34,6 @@ class SearchPolicy:
     poor: float = _rule(
         5.0, JUDGED, "of the rms left at half of the sensors, above which no cause is named", "sigma of a reading"
     )
-    formless: float = _rule(
-        1.5,
-        JUDGED,
-        "of the rms at half of the sensors that noise and the known discrepancy explain, above which the rest is form",
-    )
     relieves: float = _rule(
         0.5,
         JUDGED,

@@ -16,7 +16,6 @@ from twin.calibrate.fit.measured import Measured
 from twin.calibrate.members.driver import drivers_of
 from twin.calibrate.members.responses import Candidate, candidates, responses
 from twin.diagnose.search.gain import predicted
-from twin.diagnose.search.leftovers import Leftovers
 from twin.diagnose.search.look import Search
 from twin.logs.run import Run
 
@@ -40,26 +39,18 @@ class Poor:
     median: float  # over sensors: rms that is left, in standard deviations of one reading
     pieces: tuple[Piece, ...]
 
-    def note(self, named: bool = False) -> str:
-        """In words; named: whether a cause stands out all the same."""
+    @property
+    def note(self) -> str:
         told = []
         for p in self.pieces:
             help_ = "" if p.by is None else f": a body that {p.by.words} would explain {p.share:.0%} of it"
             told.append(f"{p.sensor} {p.rms:.2g} K (worst from {p.hour:.0f} h of {p.run}){help_}")
         left = f"at half of its sensors it leaves {self.median:.0f} times the noise of a reading, or more"
-        head = (
-            "the model is poor, thresholds have grown with what it leaves"
-            if named
-            else ("the model is too poor to name a cause")
-        )
-        return f"{head}: {left}; fits worst: {'; '.join(told)}"
+        return f"the model is too poor to name a cause: {left}; fits worst: {'; '.join(told)}"
 
 
-def too_poor(
-    found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float, left: Leftovers
-) -> Poor | None:
-    """None where half of the sensors are left with less than policy.poor sigma [K], or causes explain most of it, and
-    with less than policy.formless of what noise and the known discrepancy explain."""
+def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float) -> Poor | None:
+    """None where half of the sensors are left with less than policy.poor sigma [K], or causes explain most of it."""
     policy = found.detector.policy
     sensors = plans[0].sensors
     if len(sensors) < policy.sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
@@ -73,8 +64,7 @@ def too_poor(
     rms = _rms(errors)
     median = float(np.nanmedian(rms)) / sigma
     explained = bool(np.nanmedian(rms) < policy.relieves * np.nanmedian(_rms(before)))
-    form = float(np.median(left.by_sensor(found.detector))) > policy.formless
-    if (explained or not median > policy.poor) and not form:
+    if explained or not median > policy.poor:
         return None
     order = np.argsort(-np.nan_to_num(rms))[: policy.worst]
     return Poor(median, tuple(_piece(sensors[i], int(i), float(rms[i]), errors, plans, runs) for i in order))
