@@ -57,5 +57,3 @@ def _moving(machine: Machine) -> Iterator[Problem]:
         if name not in machine.nodes:
             remedy = did_you_mean(name, machine.nodes, "nodes") if machine.nodes else "the meshes know it: remove it"
             yield Problem(f"'{name}' is no node: parts move the tool as they grow", f"tcp.expansion.{name}", remedy)
-    if machine.tcp.expansion and not {"tool", "work"} <= machine.tcp.model_fields_set:
-        yield Problem("no TCP that nodes could move", "tcp.expansion", "describe [tcp.tool] and [tcp.work]")

@@ -43,7 +43,9 @@ def channel_figure(traces: Sequence[Trace]) -> Figure:
 
 
 def write_channels(path: Path, traces: Sequence[Trace]) -> None:
-    """The figure as a PNG file, whole or not at all."""
+    """The figure as a PNG file, whole or not at all; none where there is no channel."""
+    if not traces:
+        return
     drawn = channel_figure(traces)
     with atomic_path(path) as temporary:
         drawn.savefig(temporary, format="png", dpi=110, metadata={"Software": None})

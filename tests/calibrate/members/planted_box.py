@@ -56,6 +56,14 @@ position = [0.075, 0.075, 0.05]
 surface = "column.z_min"
 stiffness = ["200 N/um", "200 N/um", "200 N/um"]
 
+[supports.side] # three points off one line hold what stands on springs
+surface = "column.x_min"
+stiffness = ["20 N/um", "20 N/um", "20 N/um"]
+
+[supports.back]
+surface = "column.y_min"
+stiffness = ["20 N/um", "20 N/um", "20 N/um"]
+
 [tcp.tool]
 surface = "column.z_max"
 point = [0.075, 0.075, 0.45]
