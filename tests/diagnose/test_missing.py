@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tests.calibrate.members import planted, planted_box
+from tests.calibrate.members import planted
 from twin.cli.main import cli
 from twin.face.diagnose import DiagnoseOptions, diagnose
 from twin.face.model import read
-from twin.face.score import score
 from twin.logs.write import write_run
 from twin.machine.extend import removed
 
@@ -81,26 +80,3 @@ def test_a_model_that_misses_by_kelvins_names_nothing(runs, tmp_path):
     assert found.verdict == "too_poor"
     assert not found.causes
     assert "a body that follows" in str(found)
-
-
-@pytest.mark.long
-def test_of_a_machine_of_parts_too(tmp_path):
-    """The holder at the wall is named, and stands beside the parts in a description that builds."""
-    real = planted.machine(tmp_path / "real", planted_box.hidden())
-    folders = []
-    for seed in range(3):
-        write_run(tmp_path / f"run_{seed}", planted.measured(real, seed))
-        folders.append(tmp_path / f"run_{seed}")
-    planted.machine(tmp_path / "box", planted_box.TEXT)
-    done = CliRunner().invoke(cli, ["build", str(tmp_path / "box"), "-o", str(tmp_path / "box.h5")])
-    assert done.exit_code == 0, done.output
-    options = DiagnoseOptions(nulls=20, noise="0.05 K", tcp_noise="0.3 um")
-    found = diagnose(read(tmp_path / "box.h5"), folders[:2], [folders[2]], options=options)
-    assert found.verdict == "named", str(found)
-    assert "signals.wall" in [c.place for c in found.causes if c.family == "missing_member"]
-    report = found.report(tmp_path / "report")
-    machine = report.machine.description
-    assert not machine.lumped
-    assert "follows_wall_20min" in machine.nodes
-    delivered, extended = (score(model, [folders[2]]).tcp_rms for model in (read(tmp_path / "box.h5"), report.model))
-    assert extended < 0.5 * delivered

@@ -34,7 +34,7 @@ signal = "air"
 [sources.friction]
 law = "turning_heat"
 surface = "column.z_max"
-parameters = { power = "150 W", reference = "5000 1/min", exponent = 1.67 }
+parameters = { power = "30 W", reference = "5000 1/min", exponent = 1.67 }
 signals = { speed = "speed" }
 
 [films.all]
@@ -97,5 +97,5 @@ holder = ["0 um/K", "6 um/K", "-4 um/K"]
 
 def hidden() -> str:
     """The real machine: other parameters within tolerance, and the holder."""
-    text = TEXT.replace('"150 W"', '"165 W"').replace('natural = "10 W', 'natural = "11 W')
+    text = TEXT.replace('"30 W"', '"33 W"').replace('natural = "10 W', 'natural = "11 W')
     return text.rstrip() + "\n" + HIDDEN
