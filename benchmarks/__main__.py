@@ -20,7 +20,7 @@ NAMES = (
     "members", "diagnosis", "recovery", "hidden_certify",
     "window",
 )  # fmt: skip
-ASKED = ("sensitivity",)  # by name alone: it takes a day
+ASKED = ("sensitivity", "lathe_diagnosis", "lathe_calibration")  # by name alone: a day, and hours
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -158,6 +159,14 @@ def test_command_writes_every_figure(path, folders, tmp_path, capsys):
         assert (row["share"] == "") == (entry["share"] is None)
     assert told["model_minus_best_baseline"]["scored"]["block_rows"] >= 1
     assert told["baselines"]["regression"] == "fitted to 1 training run"
+    assert (out / "channels.png").read_bytes()[:4] == b"\x89PNG"
+    by_channel = {(r["run"], r["channel"]): r for r in told["channels"]}
+    for run in map(Path, folders[:2]):
+        entry = by_channel[run.name, "T01"]
+        assert entry["kept"] == 1.0
+        assert entry["wrong"] == ""
+        assert 0.0 < entry["rms"] < 10.0
+        assert (run.name, "dx") in by_channel
     command.main([*arguments[:-2], "--json"], standalone_mode=False)
     assert json.loads(capsys.readouterr().out) == told
 

@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 from tests.calibrate import lumped_case
-from twin.cli.calibrate_text import _channels as channel_lines
+from twin.calibrate.channels.table import channel_lines
 from twin.cli.main import run as twin
 from twin.logs.write import write_run
 from twin.machine.load import load_machine
@@ -52,6 +52,7 @@ def test_writes_the_artefact_the_report_and_the_description(folder, calibrated, 
         if row["learned"] > 0.9:
             assert row["value"] == pytest.approx(1.3 * row["nominal"], abs=4 * row["sigma"]), row
     assert max(row["learned"] for row in report["parameters"]) > 0.9
+    assert (folder / "B.png").read_bytes()[:4] == b"\x89PNG"
     b = read_artefact(B)
     described = load_machine(lumped_case.FOLDER, edited.read_text(encoding="utf-8"))
     for source in b.model.load_model.sources:

@@ -9,6 +9,7 @@ import numpy as np
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival, Series, Unknown, Verdict, Window
 from twin.diagnose.result.place import Network, Scene, Shell, Support
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
+from twin.pictures.trace import Trace
 
 FAMILIES = ("heat_source", "film_gain", "forced_convection", "joint", "zone", "sensor", "signal", "coolant", "sun")
 
@@ -71,6 +72,12 @@ def made_gains(run: str = "sealed_run", sensors: int = 6) -> tuple[Gain, ...]:
     return temperatures + tcp
 
 
+_HOURS = 300.0 * np.arange(1.0, 21.0)
+TRACES = (
+    Trace("run_1", "sensor_0", "degC", _HOURS, np.where(_HOURS < 3000.0, 21.1, 850.0),
+          np.where(_HOURS < 3000.0, 21.1, np.nan), np.full(20, 21.0), "'sensor_0' rests at 850 degC in run_1"),
+    Trace("run_1", "dx", "m", _HOURS, 1e-9 * _HOURS, 1e-9 * _HOURS, 2e-9 * _HOURS),
+)  # fmt: skip
 SUPPORT = Support((("sensor_0", 0.7), ("sensor_3", 0.2), ("dx", 0.1)), 1.85)
 BOX = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6],
@@ -156,6 +163,9 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
         provenance={"artefact": "0123abc", "runs": ["run_1", "sealed_run"], "seconds": 412.0},
         support=SUPPORT if causes[verdict] else None,
         scene=NETWORK if verdict == "sensor" else SHELL if causes[verdict] else None,
+        traces=TRACES,
+        channels=({"run": "run_1", "channel": "sensor_0", "unit": "K", "rms": 0.1, "kept": 0.5, "leaps": 1,
+                   "wrong": "'sensor_0' rests at 850 degC in run_1"},),
     )  # fmt: skip
 
 

@@ -130,12 +130,12 @@ def test_each_mistake_is_one_problem_at_its_place(tmp_path, old, new, place, say
     assert problem.remedy
 
 
-def test_parts_and_nodes_do_not_mix(tmp_path):
-    path = descriptions.edited(tmp_path, ("[axes.x]", "[nodes.a]\ncapacity = 1\n\n[axes.x]"))
+def test_a_node_beside_parts_needs_a_film(tmp_path):
+    path = descriptions.edited(tmp_path, ("[axes.x]", '[nodes.a]\ncapacity = 1\narea = "1 m^2"\n\n[axes.x]'))
     with pytest.raises(DescriptionError) as caught:
         load_machine(path)
     (problem,) = caught.value.problems
-    assert "both parts and nodes" in problem.what
+    assert "is in no films" in problem.what
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def _other_uses(machine: Machine) -> Iterator[tuple[str, str]]:
             if surface := getattr(axis.encoder, key):
                 yield f"axes.{name}.encoder.{key}", surface
     for name, source in machine.sources.items():
-        if source.surface:
+        if source.surface and source.surface not in machine.nodes:
             yield f"sources.{name}.surface", source.surface
     for name, tank in machine.tanks.items():
         yield f"tanks.{name}.surface", tank.surface

@@ -53,7 +53,8 @@ def _of_meshed(structure: Structure) -> tuple[ElasticStructure, tuple[np.ndarray
         mean, slope = np.eye(n, 2 * n), np.eye(n, 2 * n, n)
         encoders.append(replace(e, strip=replace(e.strip, nodes=at, mean=mean, slope=slope)))
     scales = tuple(_scale(scale, rows) for scale in structure.system.scales)
-    system = replace(structure.system, encoders=tuple(encoders), scales=scales)
+    nodes = tuple(replace(n, states=rows.add(n.body, n.states, np.eye(1))) for n in structure.system.nodes)
+    system = replace(structure.system, encoders=tuple(encoders), scales=scales, nodes=nodes)
     bodies = tuple(PortFlexibility(body.name, body.F, body.R) for body in structure.bodies)
     return ElasticStructure(bodies, system, structure.middles, structure.size), rows.matrices()
 

@@ -22,12 +22,14 @@ from twin.build.elastic_ports import PortTable
 from twin.build.elasticity import body_elasticity
 from twin.build.encoder import EncoderTerms
 from twin.build.flexibility import BodyFlexibility, block_count, condense
+from twin.build.free_nodes import node_rows
 from twin.build.linear import linear_elasticity
 from twin.build.mesh import BodyMesh
 from twin.build.springs import spring_system
 from twin.build.workers import workers
 from twin.machine.bodies import bodies_of, tanks_on
 from twin.machine.description import Machine
+from twin.machine.free_nodes import free_nodes
 from twin.progress import Progress, silent
 from twin.rom.elastic_structure import ElasticStructure
 from twin.rom.scales import LinearEncoder
@@ -133,7 +135,7 @@ def assemble_structure(
     normal) and ModelError (a mechanism, naming body and direction).
     """
     ports = PortTable(bodies)
-    system = spring_system(machine, bodies_of(machine), ports)
+    system = replace(spring_system(machine, bodies_of(machine), ports), nodes=node_rows(machine, bodies[0]))
     at_once = workers() if sum(body.n for body in bodies) < LARGEST_AT_ONCE else 1
     with (
         progress("elastic bodies", sum(block_count(len(names)) for names in ports.names)) as advance,
@@ -145,8 +147,9 @@ def assemble_structure(
             if linear:
                 solid, U, points = linear_elasticity(body, solid, U)
             found = condense(body.name, tuple(names), U, solid, points, advance)
-            tanks = len(tanks_on(machine, tuple(part.name for part in body.parts)))  # these move nothing
-            return replace(found, H=np.pad(found.H, ((0, 0), (0, tanks)))) if tanks else found
+            more = len(tanks_on(machine, tuple(part.name for part in body.parts)))  # these bend nothing
+            more += len(free_nodes(machine)) if body is bodies[0] else 0
+            return replace(found, H=np.pad(found.H, ((0, 0), (0, more)))) if more else found
 
         flexible = list(pool.map(condensed, bodies, ports.names, ports.matrices()))
     middles = np.array([body.nodes.mean(axis=0) for body in bodies])

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from skfem import BilinearForm
 from skfem.helpers import dot, grad
 
+from twin.build.free_nodes import with_free_nodes
 from twin.build.interface import interface
 from twin.build.mesh import BodyMesh, PartMesh
 from twin.build.ports import ContactPorts, contact_ports, port_averages
@@ -21,6 +22,7 @@ from twin.build.wiring import load_model
 from twin.errors import DescriptionError, Problem, TwinError
 from twin.machine.bodies import split_surface
 from twin.machine.description import Machine, Material
+from twin.machine.free_nodes import free_nodes
 from twin.machine.kinematics import linear_axes
 from twin.machine.references import reference_problems
 from twin.machine.surfaces import film_surfaces
@@ -52,10 +54,11 @@ def assemble_thermal(machine: Machine, bodies: tuple[BodyMesh, ...]) -> MachineM
         raise DescriptionError.collect(wrong)
     films = film_surfaces(machine, {part.name: tuple(part.surfaces) for body in bodies for part in body.parts})
     ports = contact_ports(machine, bodies)
-    load = load_model(machine, ports, _film_areas(bodies, films))
+    load = load_model(machine, ports, _film_areas(machine, bodies, films))
     rows = _sensor_rows(machine, bodies)
+    meshed = [_body(machine, body, films, ports, load, rows[body.name]) for body in bodies]
     return machine_model(
-        machine, load, tuple(_body(machine, body, films, ports, load, rows[body.name]) for body in bodies)
+        machine, load, tuple(with_free_nodes(machine, i == 0, body, load) for i, body in enumerate(meshed))
     )
 
 
@@ -175,7 +178,11 @@ def _source_loads(machine: Machine, body: BodyMesh, load: LoadModel) -> dict[int
     """Number of a source on the body -> its heat of 1 W at the nodes, (n,)."""
     own = {part.name for part in body.parts}
     heated = {i: place for i, s in enumerate(load.sources) if (place := machine.sources[s.name].surface) is not None}
-    return {i: _spread(body, surface) for i, surface in heated.items() if split_surface(surface)[0] in own}
+    return {
+        i: _spread(body, surface)
+        for i, surface in heated.items()
+        if surface not in machine.nodes and split_surface(surface)[0] in own
+    }
 
 
 def _structural(machine: Machine) -> tuple[str, ...]:
@@ -183,9 +190,12 @@ def _structural(machine: Machine) -> tuple[str, ...]:
     return tuple(name for name, s in machine.sensors.items() if s.environment is None)
 
 
-def _film_areas(bodies: tuple[BodyMesh, ...], films: FilmSurfaces) -> dict[str, float]:
+def _film_areas(machine: Machine, bodies: tuple[BodyMesh, ...], films: FilmSurfaces) -> dict[str, float]:
     """m^2 of every film's surfaces."""
-    areas = dict.fromkeys(films, 0.0)
+    nodes = free_nodes(machine)
+    areas = {
+        name: sum(float(nodes[s].area or 0.0) for s in machine.films[name].surfaces if s in nodes) for name in films
+    }
     for body in bodies:
         for part in body.parts:
             for name, surfaces in films.items():

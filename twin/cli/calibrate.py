@@ -55,9 +55,9 @@ def command(
     """Fit the parameters of ARTEFACT to the temperatures and TCP deviations measured in RUNS.
 
     Bounded least squares with priors; stops at the minimum, after --iterations or after --budget, and Ctrl-C during the
-    iterations keeps the best values so far. Writes the artefact with the fitted values and OUTPUT.json with values,
-    intervals, pulls, what the data cannot separate and which experiment would. Check it on a run it was not fitted to:
-    `twin score`.
+    iterations keeps the best values so far. Writes the artefact with the fitted values, OUTPUT.json with values,
+    intervals, pulls, what the data cannot separate and which experiment would, and OUTPUT.png with every channel,
+    measured and computed. Check it on a run it was not fitted to: `twin score`.
     """
     import json
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from twin.calibrate.channels.table import channel_lines
 
 STOPPED = {
     "minimum": "at the minimum",
@@ -33,7 +34,7 @@ def lines(facts: dict[str, Any], output: str) -> list[str]:
         result.append(f"{run['name']}: {', '.join(left)} (rms)")
         result += [f"  not used: {what}" for what in run["not_used"]]
     result += [f"set aside: {what}" for what in facts["set_aside"]]
-    result += _channels(facts["channels"], AT_FIRST)
+    result += channel_lines(facts["channels"], AT_FIRST)
     width = max(len(row["path"]) for row in facts["parameters"])
     result += ["", f"{'parameter':<{width}} {'nominal':>10} {'value':>10} {'+-':>9} {'pull':>6}  unit"]
     for row in facts["parameters"]:
@@ -60,29 +61,6 @@ def lines(facts: dict[str, Any], output: str) -> list[str]:
                 )
     if not facts["description_edited"]:
         result += ["", "the description in the artefact is as it was: editing it takes the packages of 'twin[build]'"]
-    report = Path(output).with_suffix(".json")
-    return [*result, "", f"wrote {output} and {report}; next: twin score {output} RUN, on a run it was not fitted to"]
-
-
-def _channels(rows: Sequence[Mapping[str, Any]], most: int) -> list[str]:
-    """The channels that lost weight or leap, the least kept first, then those that are met worst."""
-    if not rows:
-        return []
-    marked = sorted((r for r in rows if r["kept"] < 0.9 or r.get("leaps") or r.get("wrong")), key=lambda r: r["kept"])
-    others = [r for r in rows if r["rms"] and r not in marked]
-    worst = sorted(others, key=lambda r: (r["unit"] != "K", -r["rms"]))
-    shown = [*marked[:most], *worst[: max(0, most - len(marked))]]
-    if not shown:
-        return []
-    width = max(len(r["channel"]) for r in shown)
-    long = max(len(r["run"]) for r in shown)
-    lines = [
-        "",
-        f"{'channel':<{width}} {'run':<{long}} {'rms':>9} {'kept':>6} {'leaps':>6}  ({len(rows)} in the report)",
-    ]
-    for r in shown:
-        rms = "" if r["rms"] is None else f"{r['rms']:.3f} K" if r["unit"] == "K" else f"{1e6 * r['rms']:.2f} um"
-        lines.append(
-            f"{r['channel']:<{width}} {r['run']:<{long}} {rms:>9} {100 * r['kept']:>4.0f} % {r.get('leaps', 0):>6}"
-        )
-    return lines
+    report, picture = (Path(output).with_suffix(kind) for kind in (".json", ".png"))
+    written = f"{output}, {report} and {picture} (every channel)" if picture.exists() else f"{output} and {report}"
+    return [*result, "", f"wrote {written}; next: twin score {output} RUN, on a run it was not fitted to"]

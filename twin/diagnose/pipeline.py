@@ -10,8 +10,11 @@ import numpy as np
 
 from twin import __version__
 from twin.build.cache import arrays_hash, cached, machine_hash
+from twin.calibrate.channels.judge import Judgement, judge
+from twin.calibrate.channels.table import channel_rows, with_findings
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
+from twin.calibrate.fit.traces import traces_of_run
 from twin.diagnose.evidence.coarse import too_coarse
 from twin.diagnose.evidence.discretisation import Difference, differences
 from twin.diagnose.evidence.nulls import form_of
@@ -44,6 +47,7 @@ from twin.logs.run import Run
 from twin.machine.description import Machine
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
+from twin.pictures.trace import Trace
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 
@@ -169,7 +173,8 @@ def diagnose(
     names = run_names([*runs, *sealed])
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
-    usable, refuted = refuted_sensors(usable, sensors, names[: len(runs)])
+    judgement = judge(usable, sensors)
+    usable, refuted = refuted_sensors(usable, judgement, names[: len(runs)])
     faults += [*broken_sensors(usable, sensors, names[: len(runs)]), *refuted]
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
@@ -207,6 +212,7 @@ def diagnose(
             verdict, causes, described = "named", (*kept, *missing.causes), missing.description
             gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
             notes.insert(0, missing.note)
+    traces = _traces(shown, plans, [*runs, *sealed], judgement)
     first = found.steps[0]
     heat = unknown_of(found) if verdict == "unknown" else None
     planned = None
@@ -247,6 +253,8 @@ def diagnose(
         support=support_of(found) if searched and heat is None else None,
         scene=_scene(machine, study.probed, searched or causes, heat),
         plan=planned,
+        traces=traces,
+        channels=tuple(channel_rows(traces, judgement, names[: len(runs)])),
     )
     return Result(diagnosis, found, extension, settings.families, described)
 
@@ -296,6 +304,15 @@ def _whiteness(found: Search, plans: Sequence[Measured]) -> tuple[tuple[str, flo
                     a, b = r[1:][pair], r[:-1][pair]
                     table.setdefault(name, []).append(float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-30)))
     return tuple((name, float(np.mean(before[name])), float(np.mean(after[name]))) for name in before)
+
+
+def _traces(found: Search, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement) -> tuple[Trace, ...]:
+    """Every channel of every run beside the extended model, or the recalibrated one where there is no extension."""
+    traces: list[Trace] = []
+    for k, (m, run) in enumerate(zip(plans, runs, strict=True)):
+        T, w = found.detector.study.runs[k].split(predicted(found, k).extended)
+        traces += traces_of_run(m, run, T, w)
+    return with_findings(traces, judgement, [m.name for m in plans[: len(found.detector.study.fitted)]])
 
 
 def _series(found: Search, plans: Sequence[Measured], fitted: int) -> tuple[Series, ...]:

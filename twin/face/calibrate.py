@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from twin.calibrate.fit.fit import Iteration, Stop
     from twin.calibrate.fit.options import Options
     from twin.logs.run import Run
+    from twin.pictures.trace import Trace
     from twin.rom.artefact import Artefact
     from twin.rom.parameter import Parameter
 
@@ -78,6 +80,7 @@ class Calibration:
     runs: tuple[str, ...]  # that it was fitted to
     fitted: tuple[Parameter, ...] = field(repr=False)
     facts: dict[str, Any] = field(repr=False)  # what the report beside the artefact holds
+    traces: tuple[Trace, ...] = field(repr=False, default=())  # every channel, measured and computed with these values
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -103,7 +106,8 @@ class Calibration:
             return Model(read(path).artefact)
 
     def save(self, path: str | Path, machine: str | Path | None = None) -> Model:
-        """Write the artefact, its report beside it as JSON, and the edited description to `machine`.
+        """Write the artefact, its report beside it as JSON, a picture of every channel as PNG (where matplotlib is
+        installed), and the edited description to `machine`.
 
         Raises TwinError where a file cannot be written, or would replace the artefact that the fit started from.
         """
@@ -113,6 +117,10 @@ class Calibration:
         refuse_targets(path, machine, self.start.source)
         text = self._write(Path(path))
         write_report(Path(path).with_suffix(".json"), self.facts)
+        with suppress(ModuleNotFoundError):  # the edge draws nothing
+            from twin.pictures.channels import write_channels
+
+            write_channels(Path(path).with_suffix(".png"), self.traces)
         if machine is not None:
             with atomic_path(Path(machine)) as temporary:
                 temporary.write_text(text, encoding="utf-8")
@@ -137,7 +145,7 @@ def refuse_targets(path: str | Path, machine: str | Path | None, source: str | P
         if Path(machine).suffix != ".toml":
             raise TwinError("a description's name ends with .toml", f"--machine {machine}", "name another file")
         import twin.machine.edit  # noqa: F401  needs the workstation's packages: say so now, not after the fit
-    for written in (target, target.with_suffix(".json"), *([Path(machine)] if machine else [])):
+    for written in (target, *map(target.with_suffix, (".json", ".png")), *([Path(machine)] if machine else [])):
         check_file(written)
         refuse_run_folder(written.parent)
         if source and written.exists() and Path(source).exists() and written.samefile(source):
@@ -194,11 +202,11 @@ def calibrate(
     steps = [read_runs] if options.window is None else [[run] for run in _windows(read_runs, options)]
     parameters = chosen(loaded.artefact, only, hold, any(run.tcp is not None for run in read_runs))
     fitter = _Fitter(loaded.artefact, parameters, settings, options, reporter(progress), on_iteration, judgement)
-    facts = fitter.through(steps, on_window)
-    if facts is None:
+    found = fitter.through(steps, whole, on_window)
+    if found is None:
         remedy = "give a run with temperatures.csv or tcp.csv"
         raise TwinError("nothing was measured in any window", name_of(given[0]), remedy)
-    return Calibration(loaded, tuple(map(name_of, given)), parameters, facts)
+    return Calibration(loaded, tuple(map(name_of, given)), parameters, *found)
 
 
 def _windows(runs: Sequence[Run], options: CalibrateOptions) -> list[Run]:
@@ -226,12 +234,18 @@ class _Fitter:
     on_iteration: Callable[[Iteration], None]
     judgement: Judgement
 
-    def through(self, steps: Sequence[Sequence[Run]], on_window: Callable[[Window], None]) -> dict[str, Any] | None:
-        """The report of the last step that holds something to compare; None where none does."""
+    def through(
+        self, steps: Sequence[Sequence[Run]], whole: Sequence[Run], on_window: Callable[[Window], None]
+    ) -> tuple[dict[str, Any], tuple[Trace, ...]] | None:
+        """The report and channels of the last step that holds something to compare; None where none does.
+
+        whole: the runs as logged.
+        """
         from twin.calibrate.fit.calibration import calibrate
         from twin.calibrate.fit.product import told
+        from twin.calibrate.fit.traces import traces_of
 
-        stop, facts = self.options.stop(), None
+        stop, found = self.options.stop(), None
         for k, these in enumerate(steps):
             hours = float(these[0].loads.time[-1]) / 3600
             try:
@@ -244,8 +258,9 @@ class _Fitter:
                 on_window(Window(hours, problem=e.problems[0].what))
                 continue
             facts = told(result, these, k == len(steps) - 1, self.judgement)
+            found = facts, traces_of(result.fit, whole, self.judgement)
             if self.options.window is not None:
                 on_window(Window(hours, facts))
             if result.fit.stopped == "interrupted":
                 break
-        return facts
+        return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from twin.logs.run import Run
 
 Runs = Sequence["Run | str | Path"]
+MOST_CHANNELS = 8  # that the terminal tells at most, of those that leap or are refuted
 
 
 @dataclass(frozen=True)
@@ -73,10 +75,12 @@ class Score:
         raise TwinError(f"no {kind} was measured in the scored runs", self.source, "score a run that holds some")
 
     def __str__(self) -> str:
+        from twin.calibrate.channels.table import channel_lines
         from twin.calibrate.score.text import score_text
 
         refuted = [f"refuted: {what}" for what in self.facts.get("refuted", [])]
-        return "\n".join([score_text(self.figures, self.source), *refuted])
+        channels = channel_lines(self.facts.get("channels", []), MOST_CHANNELS, marked_only=True)
+        return "\n".join([score_text(self.figures, self.source), *refuted, *channels])
 
 
 def score(
@@ -91,8 +95,9 @@ def score(
     """Replay measured runs on a model and compare, beside baselines that need no model.
 
     sealed: runs kept back from every fit, scored by themselves. train: runs that baselines learn from, not scored.
-    output: folder for score.json and score.csv. Temperature channels that all others refute are told in `refuted`; they
-    are scored all the same.
+    output: folder for score.json, score.csv and, where matplotlib is installed, channels.png: every channel, measured
+    and computed. Temperature channels that all others refute are told in `refuted` and `channels`; they are scored all
+    the same.
     Raises LogError for runs without anything measured, TwinError for a run that is given twice.
 
     >>> import twin
@@ -106,8 +111,10 @@ def score(
 
     from twin import __version__
     from twin.atomic import check_folder
-    from twin.calibrate.channels.judge import judge, words
+    from twin.calibrate.channels.judge import judge, set_aside, words
+    from twin.calibrate.channels.table import as_set_aside, channel_rows, with_findings
     from twin.calibrate.score.files import score_json, write_score
+    from twin.calibrate.score.score import run_name
     from twin.calibrate.score.score import score as figures
     from twin.face.model import read
     from twin.run.results import refuse_run_folder
@@ -127,10 +134,17 @@ def score(
     }
     told = score_json(found, settings, facts)
     measured = [*scored, *kept]
-    judgement = judge([run for _, run in measured])
-    told["refuted"] = [words(f, [Path(name).name for name, _ in measured]) for f in judgement.findings]
+    judgement, names = judge([run for _, run in measured]), [run_name(name) for name, _ in measured]
+    told["refuted"] = [words(f, names) for f in judgement.findings]
+    sound = set_aside([run for _, run in measured], judgement.findings)
+    marked = as_set_aside(with_findings(found.traces, judgement, names), names, sound)
+    told["channels"] = channel_rows(marked, judgement, names)
     if output is not None:
         write_score(Path(output), told, found)
+        with suppress(ModuleNotFoundError):  # the edge draws nothing
+            from twin.pictures.channels import write_channels
+
+            write_channels(Path(output) / "channels.png", marked)
     return Score(told, found, loaded.source or loaded.name)
 
 

@@ -98,7 +98,8 @@ class Part(Entry):
 
 
 class Node(Entry):
-    """Of a lumped machine: a capacity at one temperature. Without a film it exchanges heat through contacts only."""
+    """A capacity at one temperature. Of a lumped machine without a film it exchanges heat through contacts only; beside
+    parts nothing but films and sources reaches it (`twin.machine.free_nodes`)."""
 
     capacity: Capacity | None = Field(None, gt=0)  # or a material with a volume or a mass
     material: str | None = None
@@ -282,7 +283,7 @@ class Tcp(Entry):
 
     tool: TcpSide = TcpSide(surface="")  # both sides are needed where there are parts
     work: TcpSide = TcpSide(surface="")
-    # lumped machines: TCP displacement along x, y, z per kelvin of a node, or of a bar's mean
+    # TCP displacement along x, y, z per kelvin of a node, or of a bar's mean
     expansion: dict[str, tuple[DisplacementPerKelvin, DisplacementPerKelvin, DisplacementPerKelvin]] = {}
     # lumped machines: bars that position an axis; the screw grows from its fixed end, and its nut holds this side
     screws: dict[str, Literal["tool", "work"]] = {}
@@ -329,7 +330,7 @@ class MachineEntry(Entry):
 
 
 class Machine(Entry):
-    """A machine of parts with meshes, or a lumped machine: nodes and bars, no mesh."""
+    """A machine of parts with meshes, perhaps with nodes beside them, or a lumped machine: nodes and bars, no mesh."""
 
     machine: MachineEntry
     materials: dict[str, Material] = {}
@@ -354,8 +355,8 @@ class Machine(Entry):
 
     @property
     def lumped(self) -> bool:
-        """Whether it consists of nodes and bars."""
-        return bool(self.nodes or self.bars)
+        """Whether it consists of nodes and bars alone."""
+        return bool(self.nodes or self.bars) and not self.parts
 
     @property
     def has_tcp(self) -> bool:
@@ -364,5 +365,5 @@ class Machine(Entry):
 
     @property
     def members(self) -> tuple[str, ...]:
-        """Names of the parts, or of the nodes and bars: what bodies are made of."""
-        return (*self.parts, *self.nodes, *self.bars)
+        """Names of the parts, or of the nodes and bars: what contacts join to bodies. Nodes beside parts are none."""
+        return tuple(self.parts) or (*self.nodes, *self.bars)

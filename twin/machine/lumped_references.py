@@ -21,11 +21,6 @@ PARALLEL = 1e-3  # rad between a bar and the axis that runs on it
 
 def lumped_problems(machine: Machine) -> Iterator[Problem]:
     """Problems of nodes, bars, contacts, films, sensors and the TCP of a lumped machine."""
-    if machine.parts:
-        what = f"both parts and {'nodes' if machine.nodes else 'bars'}"
-        remedy = "a machine has meshes, or nodes and bars: describe the others as a machine of their own"
-        yield Problem(what, "nodes" if machine.nodes else "bars", remedy)
-        return
     if both := [name for name in machine.nodes if name in machine.bars]:
         for name in both:
             yield Problem(f"'{name}' is also a bar", f"nodes.{name}", "give each node and bar a name of its own")
@@ -48,7 +43,7 @@ def misplaced(machine: Machine) -> Iterator[Problem]:
     ]
     if machine.tcp is not None:
         remedy = "the meshes know it: remove it, and name the two sides as [tcp.tool] and [tcp.work]"
-        places += [(f"tcp.{key}", getattr(machine.tcp, key) or None, remedy) for key in ("expansion", "screws")]
+        places.append(("tcp.screws", machine.tcp.screws or None, remedy))
     for where, value, remedy in places:
         if value is not None:
             yield Problem(f"'{where.rpartition('.')[2]}' in a machine with meshes", where, remedy)

@@ -143,6 +143,9 @@ def _environments(machine: Machine) -> Iterator[_Declared]:
 
 
 def _tcp(machine: Machine) -> Iterator[_Declared]:
+    """Of lumped machines: what nodes beside parts move was found beside the parts, and is fitted with them."""
+    if not machine.lumped:
+        return
     for place, row in machine.tcp.expansion.items():
         sigma = TCP_EXPANSION * max(abs(v) for v in row)
         for component, value in enumerate(row):

@@ -20,6 +20,7 @@ from twin.machine.bodies import bodies_of
 from twin.machine.description import BOX_SURFACES, Machine
 from twin.machine.displaced import elastic_constants, held_by_a_gap
 from twin.machine.encoders import encoder_problems, scale_problems
+from twin.machine.free_nodes import free_node_problems, on_parts
 from twin.machine.kinematics import linear_axes, rail_moves
 from twin.machine.lumped_references import (
     bodies_without_film,
@@ -43,7 +44,10 @@ _NAMED = (
 def reference_problems(machine: Machine) -> list[Problem]:
     """All problems that need more than one entry, or more than its type, to be seen."""
     problems = [*_names(machine)]
-    of_meshes = (_parts, _axes, _contacts, _laws, _films, _sensors, _watched, _tcp, _supports, misplaced, _added)
+    of_meshes = (
+        _parts, _axes, _contacts, _laws, _films, _sensors, _watched, _tcp, _supports, misplaced, _added,
+        free_node_problems,
+    )  # fmt: skip
     for check in (
         *((lumped_problems, _axes, _laws, _sensors, _added) if machine.lumped else of_meshes),
         _poses,
@@ -212,14 +216,19 @@ def _laws(machine: Machine) -> Iterator[Problem]:
     yield from _each(machine.sources, lambda name: wiring.source(name, machine.sources[name], machine))
     yield from _each(machine.films, lambda name: wiring.film_law(name, machine.films[name], machine))
     for name, entry in machine.sources.items():
-        if entry is not None and entry.surface is not None and not machine.lumped:
+        if (
+            entry is not None
+            and entry.surface is not None
+            and not machine.lumped
+            and entry.surface not in machine.nodes
+        ):
             yield from _surface(entry.surface, f"sources.{name}.surface", machine)
 
 
 def _films(machine: Machine) -> Iterator[Problem]:
     owner: dict[str, str] = {}
     for name, film in machine.films.items():
-        for surface in film.surfaces if film is not None else ():
+        for surface in on_parts(machine, film) if film is not None else ():
             where = f"films.{name}.surfaces"
             yield from _surface(surface, where, machine, wildcard=not film.additional)
             if not film.additional and owner.setdefault(surface, name) != name:

@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping
 from twin.errors import DescriptionError, Problem
 from twin.machine.bodies import split_surface
 from twin.machine.description import Machine
+from twin.machine.free_nodes import on_parts
 from twin.nearest import did_you_mean
 
 
@@ -17,7 +18,8 @@ def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> 
     """(part, surface) of every film, with "part.*" expanded to what no film, fixed contact or adiabatic list names.
 
     `surfaces` holds the named surfaces of every part's mesh. A fixed contact may share its surface with others; what
-    they leave uncovered exchanges no heat. Raises DescriptionError with all unknown, unused and doubly used surfaces.
+    they leave uncovered exchanges no heat. Nodes beside parts are left out. Raises DescriptionError with all unknown,
+    unused and doubly used surfaces.
     """
     uses = _Uses(surfaces)
     for part_name, part in machine.parts.items():
@@ -30,7 +32,7 @@ def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> 
     rest: dict[str, str] = {}  # part -> film that takes what is left of it
     for film_name, film in machine.films.items():
         where = f"films.{film_name}.surfaces"
-        for surface in film.surfaces:
+        for surface in on_parts(machine, film):
             part_name, name = split_surface(surface)
             if name == "*" and not film.additional:
                 uses.claim_rest(rest, surface, film_name, where)

@@ -65,6 +65,19 @@ class LinearEncoder:
 
 
 @dataclass(frozen=True)
+class NodeRow:
+    """What a node beside the parts moves the TCP by, at every position alike."""
+
+    body: int
+    states: np.ndarray  # (1,) of the body
+    per_kelvin: np.ndarray  # (3,) m/K, tool minus work
+
+    def rows(self) -> np.ndarray:
+        """TCP displacement (3, 1) [m/K] per T - T_ref of the node."""
+        return self.per_kelvin[:, None]
+
+
+@dataclass(frozen=True)
 class AddedScale:
     """What one `[scales.NAME]` adds to the TCP displacement."""
 

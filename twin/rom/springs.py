@@ -15,7 +15,7 @@ import numpy as np
 
 from twin.rom.contact import station_weights
 from twin.rom.elastic_ports import MeanPort, RailPort, RigidPort
-from twin.rom.scales import AddedScale, LinearEncoder
+from twin.rom.scales import AddedScale, LinearEncoder, NodeRow
 
 Positions = Mapping[str, float] | np.ndarray  # m, by axis name (others at zero) or in the order of the linear axes
 
@@ -56,6 +56,7 @@ class SpringSystem:
     work: RigidPort
     encoders: tuple[LinearEncoder, ...] = ()  # linear scales; axes without one are read at their screw
     scales: tuple[AddedScale, ...] = ()  # growth that encoders lack
+    nodes: tuple[NodeRow, ...] = ()  # beside the parts
 
     def vector(self, positions: Positions) -> np.ndarray:
         """Positions (n_axes,) [m] in the order of `axes`. Raises ValueError for unknown axes or a wrong number."""
@@ -108,12 +109,15 @@ class SpringSystem:
         return t
 
     def scale_rows(self, positions: Positions) -> list[tuple[int, np.ndarray, np.ndarray]]:
-        """What the growth of each scale adds: (body, its nodes (m,), displacement (3, m) [m/K] per T - T_ref there)."""
+        """What each scale, and each node beside the parts, adds: (body, states (m,), TCP displacement (3, m) [m/K])."""
         at = self.vector(positions)
         return [
             (e.strip.body, e.strip.nodes, np.outer(-self._lever(e) * e.sign, self.scale_row(e, positions)))
             for e in self.encoders
-        ] + [(s.body, s.states, s.rows(at[s.axis])) for s in self.scales]
+        ] + [
+            *((s.body, s.states, s.rows(at[s.axis])) for s in self.scales),
+            *((n.body, n.states, n.rows()) for n in self.nodes),
+        ]
 
     def scale_row(self, encoder: LinearEncoder, positions: Positions) -> np.ndarray:
         """(m,) [m/K]: growth of a scale up to its reader per T - T_ref at its `strip.nodes`."""

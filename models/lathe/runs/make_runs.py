@@ -101,9 +101,8 @@ def write_run(folder: Path, day: Day) -> None:
     sensors = {f"{name} [degC]": values for name, values in day.temperatures.items()}
     write_table(folder / "temperatures.csv", {"time [s]": day.time, **sensors}, 3)
     few = np.unique(np.searchsorted(day.time, np.arange(day.time[0], day.time[-1], EVERY)))
-    nothing = np.zeros(len(few))  # y is not measured, and not in the model
-    tcp = {"time [s]": day.time[few], "dx [um]": day.displacements["dx"][few], "dy [um]": nothing,
-           "dz [um]": day.displacements["dz"][few], "sigma [um]": nothing + SIGMA}  # fmt: skip
+    tcp = {"time [s]": day.time[few], "dx [um]": day.displacements["dx"][few],
+           "dz [um]": day.displacements["dz"][few], "sigma [um]": np.full(len(few), SIGMA)}  # fmt: skip
     write_table(folder / "tcp.csv", tcp, 4)
     begin = float(np.median([day.temperatures[name][0] for name in STRUCTURE]))
     text = f"""# Day {day.name} of a lathe. Made by models/lathe/runs/make_runs.py from a recording on a real machine.

@@ -7,15 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.calibrate.members import planted
+from tests.calibrate.members import planted, planted_box
+from twin.build.full_model import assemble
+from twin.build.pipeline import rich_model
+from twin.build.rich_basis import RichOptions
 from twin.calibrate.members.describe import Member, with_members
 from twin.calibrate.members.driver import Driver, drivers_of
 from twin.calibrate.members.evidence import Sums, explain, held_out, total, with_noise
-from twin.calibrate.members.find import beside_model
+from twin.calibrate.members.find import beside_model, left_by
 from twin.calibrate.members.responses import Candidate, candidates, responses
-from twin.errors import DescriptionError
 from twin.machine.edit import edited
 from twin.machine.extend import removed
+from twin.machine.parameters import parameters
+from twin.rom.artefact import Artefact
 from twin.run.replay import replay
 
 
@@ -58,10 +62,11 @@ def test_extension_predicts_a_run_that_it_has_not_seen(found, runs, tmp_path):
     assert removed(with_members(planted.TEXT, found.members, 1e-6, runs[:3])) == planted.TEXT
 
 
-def test_a_machine_of_parts_is_refused():
+def test_beside_parts_the_rows_are_no_parameters():
     member = Member(Candidate(Driver("wall", "degC"), 1200.0), np.array([np.nan, 1e-6, 1e-6]))
-    with pytest.raises(DescriptionError, match="parts"):
-        with_members('[parts.bed]\nmesh = "bed.msh"\n', [member], 1e-6, [planted.loads(0)])
+    text = with_members('[parts.bed]\nmesh = "bed.msh"\n', [member], 1e-6, [planted.loads(0)])
+    assert "[nodes.follows_wall_20min]" in text
+    assert "tcp.expansion.follows" not in text
 
 
 def test_response_is_the_exact_lag_of_a_step():
@@ -121,3 +126,31 @@ def test_held_out_rows_are_not_seen():
     ]
     np.testing.assert_allclose(every, np.sqrt(np.mean(np.square(rest), axis=0)))
     assert (one > 0.0).all()
+
+
+@pytest.mark.long
+def test_beside_a_machine_of_parts(tmp_path):
+    """What follows the wall is named beside parts, too, and what is written computes what was found."""
+    machine = planted.machine(tmp_path / "box", planted_box.TEXT)
+    real = planted.machine(tmp_path / "real", planted_box.hidden())
+    runs = [planted.measured(real, seed) for seed in range(2)]
+    bare = artefact_of(machine, planted_box.TEXT)
+    found = beside_model(bare, runs)
+    assert "wall" in [j.name for j in found.selected.named]
+    assert "door" not in [j.name for j in found.selected.named]
+    text = edited(planted_box.TEXT, found.expansions)
+    text = with_members(text, found.members, found.selected.explained.scale, runs)
+    extended = artefact_of(planted.machine(tmp_path / "extended", text), text)
+    for run, expected in zip(runs, left_by(found, bare, runs), strict=True):
+        left = []
+        for artefact in (bare, extended):
+            result = replay(artefact, run, 60.0)
+            w = np.column_stack([np.interp(run.tcp.time, result.time, v) for v in result.tcp_actual.T])
+            left.append(np.sqrt(np.mean((run.tcp.displacement - (w - w[0])) ** 2, axis=0)))
+        np.testing.assert_allclose(left[1], expected, atol=0.1e-6)
+        assert (left[1][1:] < 0.3 * left[0][1:]).all()
+
+
+def artefact_of(machine, text):
+    rich = rich_model(machine, assemble(machine), RichOptions(samples=6))
+    return Artefact(rich, text, {}, {}, (), parameters(machine), "", machine.machine.name)

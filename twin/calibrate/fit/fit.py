@@ -138,7 +138,8 @@ def _seen(
         (estimated(sensors.without_form(T), floor[0]), estimated(tcp.without_form(w), floor[1]))
         for (T, w), (sensors, tcp), floor in zip(evaluated.residuals(x), noise, limits, strict=True)
     ]
-    return _weighted(evaluated, noise_at(evaluated, channels, x), limits, x)
+    noise = noise_at(evaluated, channels, x)
+    return _weighted(evaluated, noise, limits, x) if evaluated.problem.options.weights else noise
 
 
 def _weighted(

@@ -21,6 +21,7 @@ class Options:
         0.03  # by which every source's effect on every output may be wrong, see `twin.calibrate.fit.noise`
     )
     exclude: tuple[str, ...] = ()  # sensors
+    weights: bool = True  # hours of a channel that fit far worse than its others lose weight
     tail: float = 5e-8  # share of the squared trajectories, in units of the noise, that the window model leaves out
     draws: int = 10  # of parameters, besides the nominal ones, that the window model is made from
     seed: int = 1

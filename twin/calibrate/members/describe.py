@@ -1,4 +1,4 @@
-"""Members written into the description of a lumped machine: a node of every lag, with what they follow.
+"""Members written into a description: a node of every lag, with what they follow.
 
 A body that follows a logged temperature stands in an environment of that signal; one that a load heats stands in air of
 constant temperature. Only the lag, capacity over area times coefficient, is ever seen, so these are round numbers.
@@ -16,7 +16,6 @@ import numpy as np
 
 from twin.calibrate.members.driver import LAWS, RISE, Driver
 from twin.calibrate.members.responses import Candidate, short
-from twin.errors import DescriptionError
 from twin.logs.run import Run
 
 AREA, COEFFICIENT = 0.01, 100.0  # m^2 and W/(m^2 K) of a member: 1 W/K in all
@@ -41,14 +40,12 @@ def with_members(text: str, members: Sequence[Member], scale: float, runs: Seque
     A logged temperature that no signal of the machine reads becomes one. Where runs state one temperature at the start,
     the environment counts from there: what a sensor reads first is taken for that temperature.
 
-    Raises DescriptionError for a machine of parts, and for a load that no law turns into heat.
+    In a machine of parts they are nodes beside the parts.
+    Raises DescriptionError for a load that no law turns into heat.
     """
     from twin.machine.extend import appended, changed  # the edge has no pydantic, and writes no descriptions
 
     data = tomllib.loads(text)
-    if "parts" in data:
-        remedy = "add the body as a part, or describe the machine as nodes"
-        raise DescriptionError("a machine of parts has no nodes that follow a temperature", "parts", remedy)
     signals = {s.get("column", name): name for name, s in data.get("signals", {}).items()}
     names_of = {section: set(data.get(section, {})) for section in ("signals", "nodes")}
     rows: dict[str, list[str]] = {}
@@ -72,9 +69,10 @@ def with_members(text: str, members: Sequence[Member], scale: float, runs: Seque
     measured = np.isfinite(np.array([m.expansion for m in members])).any(axis=0)
     known = {"fixed": False, "tolerance": f"{1e6 * scale:.4g} um/K"}
     tables.append(("parameters", {"path": "*.follows_*", "fixed": True}))
-    tables += [
-        ("parameters", {"path": f"tcp.expansion.follows_*.{'xyz'[a]}", **known}) for a in np.flatnonzero(measured)
-    ]
+    if "parts" not in data:  # beside parts these rows are no parameters
+        tables += [
+            ("parameters", {"path": f"tcp.expansion.follows_*.{'xyz'[a]}", **known}) for a in np.flatnonzero(measured)
+        ]
     if data.get("tcp", {}).get("expansion"):
         text = changed(text, {f"tcp.expansion.{name}": row for name, row in rows.items()}, mark)
     else:

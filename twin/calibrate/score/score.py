@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from twin.calibrate.score.compare import TCP, LeftOut, channels, left_out
 from twin.calibrate.score.metrics import Figures, figures
 from twin.calibrate.score.pieces import Piece, Rows, input_names, members, rows_of, split
 from twin.logs.run import Run, Segment
+from twin.pictures.trace import Trace
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 from twin.run.replay import replay
@@ -79,6 +81,7 @@ class Score:
     best: dict[str, str]  # part -> baseline with the smallest rms over its rows, chosen with hindsight
     difference: dict[str, Difference]  # part -> rms of the model minus that of the best baseline, TCP vectors [m]
     regression: dict[str, Difference] = field(default_factory=dict)  # part -> the same of the ridge regression
+    traces: tuple[Trace, ...] = ()  # every scored channel, a trace per test
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,7 @@ class _Test:
     piece: Piece
     segments: tuple[Segment, ...]
     temperatures: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]  # sensor -> time, measured and simulated rise
+    traces: tuple[Trace, ...]
 
 
 def score(
@@ -131,7 +135,13 @@ def score(
             if all((REGRESSION, id(t)) in predictions for t in with_tcp[part]):
                 regression[part] = _difference(with_tcp[part], predictions, REGRESSION)
     known = tuple((b.name, b.how) for b in found)
-    return Score(tuple(entries), tuple(told), known, air, best, difference, regression)
+    traces = tuple(t for test in tests if test.part != "train" for t in test.traces)
+    return Score(tuple(entries), tuple(told), known, air, best, difference, regression, traces)
+
+
+def run_name(path: str) -> str:
+    """As a picture and a table of channels say it."""
+    return Path(path).name or path
 
 
 def _replayed(
@@ -152,7 +162,12 @@ def _replayed(
             for c in found
             if c.kind == "temperature" and c.name not in air
         }
-        tests.append(_Test(part, Piece(test, name, rows, reference), segments, rises))
+        traces = tuple(
+            Trace(run_name(name), c.name, c.unit, c.time, c.measured, c.measured, c.simulated)
+            for c in found
+            if c.name not in air
+        )
+        tests.append(_Test(part, Piece(test, name, rows, reference), segments, rises, traces))
         flagged += int(result.flags.any(axis=1).sum())
         named += Counter(dict(zip(result.flag_names, result.flags.sum(axis=0).tolist(), strict=True)))
         steps += len(result.time) - 1

@@ -235,6 +235,8 @@ def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> 
     if probed.base.load_model.sources[source].contact:
         return None
     B, own = body.B[:, body.sources.index(source)], own_place(study, source)
+    if own is None:
+        return None
     near = [p for p in beside(probed.places, own) if not Spot.read(probed.places[p].name).pad]
     share = abs(form.beside * rng.standard_normal())
     if not near:

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.calibrate.channels.exchange import THRESHOLD as EXCHANGE
 from twin.calibrate.channels.finding import UNITS
-from twin.calibrate.channels.judge import judge, set_aside
+from twin.calibrate.channels.judge import Judgement, set_aside
 from twin.calibrate.channels.refute import THRESHOLDS, shape_of
 from twin.diagnose.result.diagnosis import Cause, Window
 from twin.logs.faults.usable import BROKEN, usable
@@ -52,10 +52,10 @@ def broken_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[
     return causes
 
 
-def refuted_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[str]) -> tuple[list[Run], list[Cause]]:
+def refuted_sensors(runs: Sequence[Run], judgement: Judgement, names: Sequence[str]) -> tuple[list[Run], list[Cause]]:
     """Runs without the readings of sensors that all other channels refute, and a cause for each: found before anything
     is fitted, which a single wrong channel would drag along."""
-    found = [f for f in judge(runs, sensors).findings if f.statistic < np.inf]  # the others are told already
+    found = [f for f in judgement.findings if f.statistic < np.inf]  # the others are told already
     causes = []
     for f in found:
         least = EXCHANGE if f.what == "swapped" else THRESHOLDS[shape_of(f)]

@@ -218,7 +218,8 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         v = vector([B] * len(runs))
         for name, history in _law_histories(study, j, histories).items():
             column(("source", source.name, name), v, history)
-        for p in beside(probed.places, own_place(study, j)):
+        own_at = own_place(study, j)
+        for p in beside(probed.places, own_at) if own_at is not None else ():
             v = vector([probed.B[p] - B] * len(runs))
             column(("moved", f"{source.name}>{probed.places[p].name}", "always"), v, [q[:, j] for q in powers])
     for name, factor, of in _signals(study, nominal, powers):

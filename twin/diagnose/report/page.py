@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from twin.atomic import atomic_path, check_folder
+from twin.diagnose.report.channels import channels_picture, channels_table
 from twin.diagnose.report.evidence import candidates_picture, cosine_picture, nulls_picture, pulls_picture
 from twin.diagnose.report.gain import gain_picture, overlay_picture, unknown_picture
 from twin.diagnose.report.pictures import Picture, inline_svg, rms
@@ -145,6 +146,7 @@ def page(d: Diagnosis) -> str:
         Section("plan", "The next experiment", plan_section(d.plan)),
         Section("gain", "Gain on the sealed run", *_gain(d, show)),
         Section("residuals", "Residuals", folded=_residuals(d, show)),
+        Section("channels", "Channels", folded=channels_table(d) + show(channels_picture(d))),
         Section("decision", "How it was decided", folded=_decision(d, show)),
         Section("pulls", "Pulls", folded=_pulls(d, show)),
         Section("unknown", "Heat that nothing explains", *_unknown(d, show)),

@@ -13,6 +13,7 @@ import numpy as np
 from twin.diagnose.result.place import Scene, Support
 from twin.diagnose.result.plan import Plan
 from twin.machine.effects.effect import Window
+from twin.pictures.trace import Trace
 
 Verdict = Literal["named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing", "too_poor"]
 VERDICTS: tuple[Verdict, ...] = (
@@ -154,11 +155,13 @@ class Diagnosis:
     plan: Plan | None = None  # of the next experiment, where one was asked for
     support: Support | None = None  # of the first cause
     scene: Scene | None = None  # where it is, for the picture
+    traces: tuple[Trace, ...] = ()  # every channel of every run, measured beside the extended model
+    channels: tuple[Mapping[str, Any], ...] = ()  # a row each: run, channel, unit, rms, kept, leaps, wrong
 
     def to_json(self) -> dict[str, Any]:
         """What report.json holds: everything but the series."""
-        d = asdict(replace(self, series=(), scene=None))
-        del d["series"], d["scene"]
+        d = asdict(replace(self, series=(), scene=None, traces=()))
+        del d["series"], d["scene"], d["traces"]
         if self.unknown:
             d["unknown"] = {"place": self.unknown.surface, **d["unknown"]}  # as a cause says where it is
         d["cosine"] = self.cosine.tolist()

@@ -2,8 +2,8 @@
 
 Tried where displacements hold an effect that nothing in the catalogue explains, or a fault of the reading of the tool
 alone. The members are fitted beside the model as it was delivered, must halve what the model leaves otherwise, must
-predict stretches that they were not fitted to, and must not make the sealed runs worse. A lumped machine gets them into
-its description; of a machine of parts they are told alone.
+predict stretches that they were not fitted to, and must not make the sealed runs worse. The description gets them as
+nodes; of a machine of parts they stand beside the parts.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Missing:
     """Members that were found, and what they are worth."""
 
     causes: tuple[Cause, ...]  # the drivers that the data ask for strongly
-    description: str  # machine.toml with all members; "" of a machine of parts
+    description: str  # machine.toml with all members; "" where it cannot say them
     gains: tuple[Gain, ...]  # of the displacements of sealed runs, in place of those of the search
     note: str
 
@@ -63,15 +63,13 @@ def missing_members(
     worse, better = (sum(sign * g.ci95[i] > 0.0 for g in gains) for sign, i in ((-1.0, 1), (1.0, 0)))
     if worse > better:
         return None
-    text = ""
-    if "nodes" in artefact.description:
-        try:
-            text = edited(artefact.description, members.expansions)
-            text = with_members(text, members.members, selected.explained.scale, runs)
-        except TwinError:
-            text = ""
+    try:
+        text = edited(artefact.description, members.expansions)
+        text, told = with_members(text, members.members, selected.explained.scale, runs), ""
+    except TwinError as e:
+        text, told = "", e.problems[0].what
     causes = tuple(_cause(j, members) for j in selected.named)
-    return Missing(causes, text, gains, _note(members, bool(text)))
+    return Missing(causes, text, gains, _note(members, told))
 
 
 def _cause(j: Joined, members: Found) -> Cause:
@@ -87,7 +85,7 @@ def _cause(j: Joined, members: Found) -> Cause:
     )  # fmt: skip
 
 
-def _note(members: Found, written: bool) -> str:
+def _note(members: Found, refused: str) -> str:
     s = members.selected
     figures = ", ".join(
         f"{AXES[a]} {1e6 * after:.2g} um in place of {1e6 * before:.2g} um"
@@ -95,7 +93,7 @@ def _note(members: Found, written: bool) -> str:
     )
     others = [j.name for j in s.joined if not j.sure]
     more = f"; {', '.join(others)} help to predict and are not named" if others else ""
-    where = "" if written else "; a machine of parts has no place for nodes that follow: add the body as a part"
+    where = f"; not in the description: {refused}" if refused else ""
     return f"missing members: left of stretches that they were not fitted to, rms: {figures}{more}{where}"
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twin.errors import TwinError
 from twin.export.c.text import Arrays
 from twin.rom.elastic_structure import ElasticStructure
 from twin.rom.lumped_structure import LumpedStructure
@@ -81,6 +82,12 @@ def _put_lumped(out: Arrays, structure: LumpedStructure, first: np.ndarray) -> d
 
 def _put_meshed(out: Arrays, structure: ElasticStructure, first: np.ndarray) -> dict[str, int]:
     system = structure.system
+    if system.nodes:
+        raise TwinError(
+            "nodes beside parts that move the tool are not exported to C",
+            "nodes",
+            "export another format, or take them out",
+        )
     ports = np.diff(system.offsets)
     body_of = np.repeat(np.arange(len(ports)), ports)
     out.integers("port_body", body_of)

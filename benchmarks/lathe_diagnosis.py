@@ -1,0 +1,193 @@
+"""A real lathe with a twin that misses by 1 K, through all of `twin diagnose`: false alarms, and faults of the machine.
+
+Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. The twin is models/lathe, calibrated as
+its README does. Every pair of days is looked at as measured; then faults are planted into it: what the twin's full
+model computes with the fault less what it computes without is added to the readings, so that what the twin leaves of
+the real days stays as noise. Sizes are twice the limit that the diagnosis of the pair as measured states for that
+place.
+
+`python -m benchmarks.lathe_diagnosis HALF PAIRS FAULTS`: pairs of days 1, 3, 5 ... (0) or 2, 4, 6 ... (1), and faults
+in each. A row per diagnosis goes to out/lathe_diagnosis/HALF_PAIR.jsonl; those that are there are not made again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.measured import VARIABLE, measured_data
+from models.recordings import lathe_days
+from models.scripts import load_script
+from twin.build.simulate import simulate_run
+from twin.cli.main import run as command
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.pipeline import Result, Settings, diagnose, machine_of
+from twin.diagnose.search.verdict import limits_at
+from twin.logs.read import read_run
+from twin.logs.run import Run
+from twin.machine.description import Machine
+from twin.machine.effects.edits import extended_description
+from twin.machine.effects.effect import Effect
+from twin.machine.load import load_machine
+from twin.rom.artefact import Artefact, read_artefact
+
+ROOT = Path(__file__).parents[1]
+MODEL, OUT = ROOT / "models" / "lathe", ROOT / "out" / "lathe_diagnosis"
+TRAINING = ("20200701", "20200616", "20200710", "20200723", "20200730", "20200814")  # of models/lathe/README.md
+PAIRS, FAULTS = 12, 3  # per half
+FORM, NULLS = 32, 60  # synthetic measurements: what the twin leaves decides anyway
+UNITS = {"heat_source": "W", "loss_law": "1", "joint": "1", "film_gain": "1"}
+TWICE = 2.0
+
+Row = dict[str, Any]
+
+
+def main() -> None:
+    data = measured_data("lathe")
+    if data is None:
+        print(f"   not run: no measured data; set {VARIABLE} to the folder that holds lathe")
+        return
+    given = [int(a) for a in sys.argv if a.isdigit()]
+    halves = given[:1] or [0, 1]
+    pairs, faults = (*given[1:], *(PAIRS, FAULTS)[len(given[1:]) :])
+    artefact = the_twin(data)
+    for half in halves:
+        rows: list[Row] = []
+        days = [p.stem for p in lathe_days()[half::2]]
+        rng = np.random.default_rng(half)
+        for k in range(pairs):
+            chosen = [days[int(i)] for i in rng.choice(len(days), 2, replace=False)]
+            path = OUT / f"{half}_{k}.jsonl"
+            if not path.exists():
+                made = rows_of(artefact, chosen, faults, np.random.default_rng([half, k]))
+                path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
+            rows += [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        print(f"   days {('1, 3, 5 ...', '2, 4, 6 ...')[half]}")
+        told(rows)
+
+
+def the_twin(data: Path) -> Path:
+    """The calibrated artefact, and the runs of all days beside it."""
+    made = OUT / "lathe.h5"
+    if not made.exists():
+        with contextlib.redirect_stdout(io.StringIO()):
+            load_script(MODEL / "runs", "make_runs.py").write_runs(data, OUT / "runs")
+            runs = [str(OUT / "runs" / day) for day in TRAINING]
+            for asked in (
+                ["build", str(MODEL), "-o", str(OUT / "rough.h5")],
+                ["calibrate", str(OUT / "rough.h5"), *runs, "-o", str(made)],
+            ):
+                if command(asked):
+                    raise SystemExit(f"twin {' '.join(asked)} failed")
+    return made
+
+
+def rows_of(path: Path, days: Sequence[str], faults: int, rng: np.random.Generator) -> list[Row]:
+    """The diagnosis of a pair of days as measured, then with faults in it."""
+    artefact = read_artefact(path)
+    machine = machine_of(artefact, path)
+    runs = [read_run(OUT / "runs" / day) for day in days]
+    made, clean = _row(artefact, machine, runs, days, None)
+    rows = [made]
+    plain = [simulate_run(machine, run)[0] for run in runs]
+    known = plantable(clean)
+    for i in rng.permutation(len(known))[:faults]:
+        family, place, size = known[int(i)]
+        faulty = load_machine(
+            machine.folder,
+            extended_description(artefact.description, [Effect(family, place, size, UNITS[family])]).text,
+        )
+        planted = [
+            with_difference(run, simulate_run(faulty, run)[0], own) for run, own in zip(runs, plain, strict=True)
+        ]
+        rows.append(_row(artefact, machine, planted, days, (family, place, size))[0])
+    return rows
+
+
+def plantable(clean: Result) -> list[tuple[str, str, float]]:
+    """(family, place, size): twice the limit of every place where that is a size that physics has."""
+    detector = clean.search.detector
+    batches = {(b.family, b.unit, name): b for b in detector.columns.batches for name in b.places}
+    found = []
+    for (family, unit, place, windowed), limit in limits_at(detector).items():
+        if UNITS.get(family) != unit or windowed:
+            continue
+        batch = batches[family, unit, place]
+        size = fault_of(batch).curve.told(TWICE * limit)
+        if batch.possible(batch.places.index(place), TWICE * limit):
+            found.append((family, place, float(size)))
+    return found
+
+
+def with_difference(run: Run, faulty: Run, plain: Run) -> Run:
+    """The measured run with what a fault adds to its temperatures and displacements."""
+    assert run.temperatures is not None
+    assert run.tcp is not None
+    columns = dict(run.temperatures.columns)
+    for name in columns:
+        if faulty.temperatures is not None and plain.temperatures is not None and name in faulty.temperatures.columns:
+            added = faulty.temperatures.columns[name] - plain.temperatures.columns[name]
+            columns[name] = columns[name] + np.interp(run.temperatures.time, faulty.temperatures.time, added)
+    assert faulty.tcp is not None
+    assert plain.tcp is not None
+    added = faulty.tcp.displacement - plain.tcp.displacement
+    at = np.column_stack([np.interp(run.tcp.time, faulty.tcp.time, c) for c in added.T])
+    displacement = run.tcp.displacement + at - at[0]  # they count from the first row
+    return replace(
+        run, temperatures=replace(run.temperatures, columns=columns), tcp=replace(run.tcp, displacement=displacement)
+    )
+
+
+def _row(
+    artefact: Artefact, machine: Machine, runs: Sequence[Run], days: Sequence[str],
+    hidden: tuple[str, str, float] | None,
+) -> tuple[Row, Result]:  # fmt: skip
+    began = time.perf_counter()
+    result = diagnose(artefact, machine, list(runs), (), Settings(form=FORM, nulls=NULLS))
+    d = result.diagnosis
+    causes = [(c.family, c.place, c.amplitude, c.unit) for c in d.causes]
+    rivals = [(r.family, r.place) for c in d.causes[:1] for r in c.rivals]
+    row = {"days": list(days), "hidden": hidden, "verdict": d.verdict, "causes": causes, "rivals": rivals}
+    row["best"] = [(r.family, r.place, round(r.statistic), round(d.thresholds[r.family])) for r in d.ranked[:3]]
+    return row | {"seconds": round(time.perf_counter() - began)}, result
+
+
+def answer(row: Row) -> str:
+    """What a row is worth: as `benchmarks.drawn_machines`, "part" where the family or the place alone is right."""
+    if row["hidden"] is None:
+        return "nothing" if row["verdict"] in ("nothing", "too_poor") else "false alarm"
+    if row["verdict"] in ("nothing", "too_poor", "unknown"):
+        return row["verdict"].replace("_", " ")
+    family, place, _ = row["hidden"]
+    named = [tuple(c[:2]) for c in row["causes"]]
+    if named[:1] == [(family, place)]:
+        return "right"
+    others = {*named, *((tuple(r) for r in row["rivals"]) if row["verdict"] == "ambiguous" else ())}
+    if (family, place) in others:
+        return "among"
+    return "wrong"
+
+
+def told(rows: Sequence[Row]) -> None:
+    """Every diagnosis, and how many there are of each answer."""
+    for clean in (True, False):
+        own = [r for r in rows if (r["hidden"] is None) == clean]
+        answers = [answer(r) for r in own]
+        for r, a in zip(own, answers, strict=True):
+            hidden = "" if clean else " {} {} {:.3g}".format(*r["hidden"])
+            print(f"      {' '.join(r['days'])}{hidden}: {a}, {r['verdict']} {r['causes']} {r['seconds']} s")
+        counts = ", ".join(f"{answers.count(a)} {a}" for a in dict.fromkeys(answers))
+        print(f"   {'as measured' if clean else 'a fault at twice its limit'}: {len(own)} diagnoses: {counts}")
+
+
+if __name__ == "__main__":
+    main()
