@@ -10,8 +10,9 @@ import numpy as np
 
 from twin.errors import LogError
 from twin.logs.block_file import read_blocks
-from twin.logs.blocks import Block, Counts, Resolver, gap_between, in_order, tables
+from twin.logs.blocks import Block, gap_between, in_order, tables
 from twin.logs.compress import compress_stream
+from twin.logs.resolver import Counts, Resolver
 from twin.logs.run import Run, Table
 from twin.units import parse_unit
 
