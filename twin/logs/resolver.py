@@ -134,6 +134,15 @@ class Resolver(Generic[B]):
             self._begin(arrival.stream, 0)
         return out + (self._leap(arrival) if self._numbers.far(s) else self._take(arrival))
 
+    @property
+    def stream(self) -> int:
+        """The stream that is read; 0 before the first arrival."""
+        return self._stream or 0
+
+    def go_on(self, stream: int, following: int) -> None:
+        """Before the first arrival: everything of a stream below the number `following` has been given before."""
+        self._begin(stream, following)
+
     def missing(self) -> tuple[int, ...]:
         """Numbers that later blocks wait for."""
         numbers = self._numbers
