@@ -11,6 +11,7 @@ import twin.run.jax_setup  # noqa: F401  isort: skip  before NumPy
 import json
 import math
 from array import array
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -36,7 +37,8 @@ class JaxEngine:
         """Raises ArtefactError for files that are no artefact."""
         artefact = read_artefact(path)
         self.facts = facts_of(artefact)
-        self._model, self._prepared = artefact.model, prepare(artefact.model)
+        self._prepared = prepare(artefact.model)
+        self._model = replace(artefact.model, bodies=(), structure=None)  # what is stepped is in `_prepared`
         self._substeps = int(artefact.certificate.get("substeps", 1))
         self._load = artefact.model.load_model
         self._positions = set(self.facts.axis_channels)

@@ -139,6 +139,11 @@ class Resolver(Generic[B]):
         """The stream that is read; 0 before the first arrival."""
         return self._stream or 0
 
+    @property
+    def waiting(self) -> int:
+        """Blocks that wait for missing ones."""
+        return len(self._waiting)
+
     def go_on(self, stream: int, following: int) -> None:
         """Before the first arrival: everything of a stream below the number `following` has been given before."""
         self._begin(stream, following)
