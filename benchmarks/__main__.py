@@ -17,7 +17,7 @@ NAMES = (
     "growth", "pymor", "steel_profile", "steel_profile_fit", "correction", "exports", "calibration", "update",
     "spindle_drift", "spindle_diagnosis", "log_faults", "lathe_channels",
     "members", "diagnosis", "recovery", "hidden_certify",
-    "window",
+    "window", "live",
 )  # fmt: skip
 ASKED = ("sensitivity",)  # by name alone: it takes a day
 

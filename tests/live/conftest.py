@@ -7,17 +7,19 @@ from pathlib import Path
 
 import pytest
 
-import twin
+from twin.build.pipeline import BuildOptions
+from twin.build.product import build_artefact
+from twin.build.rich_basis import RichOptions
 
 ROOT = Path(__file__).parents[2]
-RUN = ROOT / "tests" / "machines" / "spindle" / "runs" / "warm_up"
 
 
 @pytest.fixture(scope="session")
 def spindle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A.h5 of the spindle; do not write to it."""
     path = tmp_path_factory.mktemp("spindle") / "a.h5"
-    twin.build(ROOT / "tests" / "machines" / "spindle", options=twin.BuildOptions(held_out=1)).save(path)
+    options = BuildOptions(training=2, held_out=1, hours=0.5, rich=RichOptions(samples=3))
+    build_artefact(ROOT / "tests" / "machines" / "spindle", path, options)
     return path
 
 

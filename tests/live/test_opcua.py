@@ -169,6 +169,7 @@ def test_offsets_are_written_and_read_back(control):
         sink.close()
 
 
+@pytest.mark.long
 def test_a_server_that_goes_away_is_a_gap_and_no_jump(tmp_path):
     control = Control(tmp_path)
     source = OpcUaSource(control.url, channels_of(control))

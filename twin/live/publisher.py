@@ -58,6 +58,7 @@ class Publisher:
     _age: float = 0.0  # s: how old the inputs were then
     _why: str = ""
     _rhythm: float = 0.0  # s
+    _block: int = -1
     _failed: str = ""
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
@@ -69,13 +70,13 @@ class Publisher:
         with self._lock:
             self._target, self.limited = allowed(target, self.limits, self.form)
 
-    def alive(self, now: float, age: float, why: str, rhythm: float) -> None:
+    def alive(self, now: float, age: float, why: str, rhythm: float, block: int = -1) -> None:
         """The model has taken something in at `now` [s]; its oldest input is `age` [s] old, because of `why`.
 
-        rhythm [s]: until the next is to come; only later than twice that inputs grow older.
+        rhythm [s]: until the next is to come; only later than twice that inputs grow older. block: its number.
         """
         with self._lock:
-            self._heard, self._age, self._why, self._rhythm = now, age, why, rhythm
+            self._heard, self._age, self._why, self._rhythm, self._block = now, age, why, rhythm, block
 
     def fail(self, words: str) -> None:
         """What the model says cannot be: to neutral at once, until the process starts anew."""
@@ -97,7 +98,7 @@ class Publisher:
                 written = time.time()
                 until = written + max(5.0, 5.0 * self.limits.period)
                 try:
-                    outlet.sink.write(Sent(self.count, written, until, self.mode, self.words, values))
+                    outlet.sink.write(Sent(self.count, written, until, self.mode, self.words, values, self._block))
                 except (OSError, ValueError) as e:
                     outlet.failures += 1
                     outlet.error = str(e)

@@ -138,7 +138,7 @@ class Runtime:
         age, whose = (0.0, "") if intake.base is None else intake.gate.oldest(line.last)
         waiting = intake.gate.waiting()
         why = f"no value of {', '.join(waiting)} yet" if waiting else f"no good value of {whose}" if whose else ""
-        self.publisher.alive(now, age if age > line.spacing else 0.0, why, block.records * block.interval)
+        self.publisher.alive(now, age if age > line.spacing else 0.0, why, block.records * block.interval, block.sequence)
         self.publisher.tick(now)
         self._checkpoint()
 

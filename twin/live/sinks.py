@@ -29,6 +29,7 @@ class Sent:
     mode: str  # of twin.live.publisher.MODES
     words: str  # why
     values: Values  # m
+    block: int = -1  # number of the last block that went into the model
 
 
 class Sink(Protocol):
@@ -74,6 +75,7 @@ class FileSink:
             "machine": facts.machine,
             "artefact": facts.digest,
             "count": sent.count,
+            "block": sent.block,
             "written": sent.written,
             "good_until": sent.good_until,
             "mode": sent.mode,
@@ -93,14 +95,14 @@ class FileSink:
 
 
 class RingSink:
-    """The newest of a ring of blocks (`twin.live.ring`): one record of mode, good_until and all values."""
+    """The newest of a ring of blocks (`twin.live.ring`): one record of mode, good_until, block and all values."""
 
     def __init__(self, facts: Facts, form: Form, path: Path):
         """Raises TwinError where the ring cannot be made."""
         self.name, self.facts, self.form = f"ring:{path}", facts, form
         n = facts.poses if form == "grid" else len(facts.fit)
-        self.names = ("mode", "good_until", *(f"{a.name}_{k}" for a in facts.axes for k in range(n)))
-        self.units = ("1", "s", *("m" for _ in facts.axes for _ in range(n)))
+        self.names = ("mode", "good_until", "block", *(f"{a.name}_{k}" for a in facts.axes for k in range(n)))
+        self.units = ("1", "s", "1", *("m" for _ in facts.axes for _ in range(n)))
         self._before = self._read(path)
         self._ring = RingWriter(path, slots=8, slot=4096 + 64 * len(self.names))
         self._stream = struct.unpack("<Q", os.urandom(8))[0]
@@ -116,7 +118,7 @@ class RingSink:
             reader.close()
         if found is None or found.names != self.names:
             return None
-        values, n = list(found.values)[2:], (len(self.names) - 2) // len(self.facts.axes)
+        values, n = list(found.values)[3:], (len(self.names) - 3) // len(self.facts.axes)
         return tuple(tuple(values[k : k + n]) for k in range(0, len(values), n))
 
     def last(self) -> Values | None:
@@ -125,7 +127,8 @@ class RingSink:
     def write(self, sent: Sent) -> None:
         from twin.live.publisher import MODES
 
-        values = array("d", [float(MODES.index(sent.mode)), sent.good_until, *(v for axis in sent.values for v in axis)])
+        head = [float(MODES.index(sent.mode)), sent.good_until, float(sent.block)]
+        values = array("d", [*head, *(v for axis in sent.values for v in axis)])
         block = Block(self._stream, sent.count, sent.written, 1.0, self.names, self.units, values)
         self._ring.write(block)
 
