@@ -31,10 +31,10 @@ from twin.rom.drive import evaluate
 
 RUN = FOLDER / "runs" / "experiment_a"
 RECORDS, CORE = 1000, 0.01  # records of a block and s between them: 100 Hz in blocks of 10 s, as for MiniHex
-LATENCY_BLOCKS = 240  # 40 min: of these 39 complete a step of a minute
+LATENCY_BLOCKS = {"c": 240, "jax": 60}  # 40 and 10 min: one of six completes a step of a minute
 STARTS = 5
 KILLS, SPEED, GROUP, HOURS = 20, 1000.0, 10, 8.0
-DAYS = float(os.environ.get("TWIN_LIVE_DAYS", "30"))  # of the long replay
+DAYS = float(os.environ.get("TWIN_LIVE_DAYS", "10"))  # of the long replay
 ROW = 60.0  # s between its rows
 
 
@@ -56,7 +56,13 @@ def command(source: str, out: list[str], state: Path, *more: str) -> list[str]:
 def memory(pid: int, key: str) -> float:
     """MB, of VmRSS or VmHWM."""
     text = Path(f"/proc/{pid}/status").read_text()
-    return int(text.partition(f"{key}:")[2].split()[0]) / 1024.0
+    return int((text.partition(f"{key}:")[2].split() or ["0"])[0]) / 1024.0  # none of a process that has ended
+
+
+def cpu(pid: int) -> float:
+    """s of a core that a process has used: what is left of a time where others use the computer too."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def until(condition: Callable[[], bool], seconds: float = 120.0, pause: float = 0.001) -> None:
@@ -67,13 +73,13 @@ def until(condition: Callable[[], bool], seconds: float = 120.0, pause: float = 
         time.sleep(pause)
 
 
-def at_100_hz() -> Iterator[Block]:
+def at_100_hz(count: int) -> Iterator[Block]:
     """Every signal of the machine at 100 Hz: six positions and speeds, currents, air; axes to and fro."""
     first = blocks(RUN / "loads.csv", 1)[0]
     t0 = np.arange(RECORDS) * CORE
     rng = np.random.default_rng(0)
     base = np.array(list(first.values))
-    for k in range(LATENCY_BLOCKS):
+    for k in range(count):
         t = t0 + k * RECORDS * CORE
         values = np.tile(base, (RECORDS, 1))
         for column, name in enumerate(first.names):
@@ -97,16 +103,22 @@ def latency(engine: str, folder: Path) -> None:
     """One block after the other, each sent when the one before is answered."""
     ring, out = folder / "in", folder / "out"
     writer = RingWriter(ring, slots=16, slot=1 << 19)
-    process = subprocess.Popen(command(f"ring:{ring}", [f"ring:{out}"], folder / "state", "--engine", engine))
+    process = subprocess.Popen(
+        command(f"ring:{ring}", [f"ring:{out}"], folder / "state", "--engine", engine), stdout=subprocess.DEVNULL
+    )
     until(out.is_file, 300.0)
     reader, waits = RingReader(out), []
-    for block in at_100_hz():
+    spent = 0.0
+    for block in list(at_100_hz(LATENCY_BLOCKS[engine])):
+        if block.sequence == 12:  # caches are warm, JAX has compiled
+            spent = cpu(process.pid)
         began = time.perf_counter()
         writer.write(block)
         until(lambda n=block.sequence: taken(reader) >= n, pause=0.0005)
         waits.append(1e3 * (time.perf_counter() - began))
         if block.sequence == 0:
             print(f"   {engine}: first block of the first start answered after {waits[0]:.0f} ms")
+    used = 1e3 * (cpu(process.pid) - spent) / (LATENCY_BLOCKS[engine] - 12)
     resident, most = memory(process.pid, "VmRSS"), memory(process.pid, "VmHWM")
     process.terminate()
     process.wait()
@@ -115,21 +127,26 @@ def latency(engine: str, folder: Path) -> None:
     stepping = warm[[i for i in range(len(warm)) if (i + 12) % 6 == 0]]
     print(f"   {engine}: block of {RECORDS} records x {len(block.names)} signals in to correction out, median "
           f"{np.median(warm):.1f} ms, 99th percentile {np.quantile(warm, 0.99):.1f} ms (asked 50), of blocks that "
-          f"complete a step with 125 poses {np.median(stepping):.1f} / {np.quantile(stepping, 0.99):.1f} ms")  # fmt: skip
+          f"complete a step with 125 poses {np.median(stepping):.1f} / {np.quantile(stepping, 0.99):.1f} ms; "
+          f"{used:.1f} ms of a core per block")  # fmt: skip
     print(f"   {engine}: resident {resident:.0f} MB, at most {most:.0f} MB (asked {60 if engine == 'c' else 300}); "
           f"{told['model']['steps']} steps, balance {told['model']['worst_balance_error']:.1e}")  # fmt: skip
 
 
 def start(engine: str, folder: Path) -> None:
     """From the start of the process to the first correction, with the state that `latency` has left."""
-    out, waits, bare = folder / "out", [], []
+    out, waits, bare, spent = folder / "out", [], [], []
     for _ in range(STARTS):
         reader = RingReader(out)
         before = reader.next()
         began = time.perf_counter()
-        process = subprocess.Popen(command(f"ring:{folder / 'in'}", [f"ring:{out}"], folder / "state", "--engine", engine))
+        process = subprocess.Popen(
+            command(f"ring:{folder / 'in'}", [f"ring:{out}"], folder / "state", "--engine", engine),
+            stdout=subprocess.DEVNULL,
+        )
         until(lambda r=reader, b=before: r.next() != b, pause=0.0005)
         waits.append(time.perf_counter() - began)
+        spent.append(cpu(process.pid))
         process.terminate()
         process.wait()
         reader.close()
@@ -137,7 +154,8 @@ def start(engine: str, folder: Path) -> None:
         subprocess.run([sys.executable, "-c", "pass"], check=True)
         bare.append(time.perf_counter() - began)
     print(f"   {engine}: first correction of a warm start after {min(waits):.2f} s at best, {np.median(waits):.2f} s "
-          f"median of {STARTS} (asked {0.1 if engine == 'c' else 3}); Python alone {np.median(bare):.3f} s")  # fmt: skip
+          f"median of {STARTS} (asked {0.1 if engine == 'c' else 3}), {np.median(spent):.2f} s of a core; Python alone "
+          f"{np.median(bare):.3f} s")  # fmt: skip
 
 
 def heat(journal: Path) -> float:
@@ -163,7 +181,7 @@ def uninterrupted(folder: Path, rows: Path) -> Checkpoint:
     sent = blocks(rows, GROUP)
     for block in sent:
         writer.write(block)
-    process = subprocess.Popen(command(f"ring:{ring}", [f"ring:{out}"], folder / "state"))
+    process = subprocess.Popen(command(f"ring:{ring}", [f"ring:{out}"], folder / "state"), stdout=subprocess.DEVNULL)
     until(out.is_file)
     reader = RingReader(out)
     until(lambda: taken(reader) == sent[-1].sequence, pause=0.01)
@@ -192,7 +210,7 @@ def kills(folder: Path, engines: Path) -> None:
                                  str(SPEED), str(began)])  # fmt: skip
 
     def runtime() -> subprocess.Popen:
-        return subprocess.Popen(command(f"ring:{ring}", [f"ring:{out}"], here / "state"))
+        return subprocess.Popen(command(f"ring:{ring}", [f"ring:{out}"], here / "state"), stdout=subprocess.DEVNULL)
 
     running = {"sender": sender(), "runtime": runtime()}
     counts = dict.fromkeys(running, 0)
@@ -217,8 +235,8 @@ def kills(folder: Path, engines: Path) -> None:
     same = found.engine == whole.engine
     all_heat, kept = heat(folder / "whole" / "state" / "journal"), heat(here / "state" / "journal")
     print(f"   {HOURS:g} h at {SPEED:g} times in {took:.0f} s, {KILLS} kills ({counts['sender']} of the sender, "
-          f"{counts['runtime']} of the process): {100 * abs(1 - kept / all_heat):.4f} % of {all_heat / 3.6e6:.2f} kWh lost "
-          f"(asked 0.1), state {'the same to the last bit' if same else 'NOT THE SAME'}, "
+          f"{counts['runtime']} of the process): {100 * abs(1 - kept / all_heat):.4f} % of {all_heat / 3.6e6:.2f} kWh "
+          f"lost (asked 0.1), state {'the same to the last bit' if same else 'NOT THE SAME'}, "
           f"{told['input']['gaps']} gaps")  # fmt: skip
 
 
@@ -234,7 +252,10 @@ def long_replay(folder: Path, engines: Path) -> None:
     with csv.open("w") as f:
         f.write(",".join(["time [s]", *(f"{n} [{u}]" for n, u in zip(one[0].names, one[0].units, strict=True))]) + "\n")
         for k in range(round(DAYS * 86400.0 / ROW)):
-            f.write(",".join([f"{ROW * k:g}" if k < 16_000 else str(int(ROW * k)), *map(repr, one[k % len(one)].values)]) + "\n")
+            f.write(
+                ",".join([f"{ROW * k:g}" if k < 16_000 else str(int(ROW * k)), *map(repr, one[k % len(one)].values)])
+                + "\n"
+            )
     state = folder / "state"
     shutil.copytree(engines, state / "engine")
     began = time.perf_counter()

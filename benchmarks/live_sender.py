@@ -1,6 +1,6 @@
 """The sender of `benchmarks.live`: writes a run folder's rows to a ring as blocks, paced, from where the ring ends.
 
-It stands for a control with its log behind it: killed and started again, it goes on with the block after the newest one.
+It stands for a control with its log behind it: killed and started again, it goes on after the newest block.
 Usage: python -m benchmarks.live_sender LOADS.CSV RING ROWS_PER_BLOCK SPEED BEGAN(monotonic s)
 """
 

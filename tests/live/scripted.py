@@ -37,7 +37,7 @@ NAMES, UNITS = tuple(c.column for c in CHANNELS), tuple(c.unit for c in CHANNELS
 
 
 class Lag:
-    """One heat capacity: its rise follows the square of the current. Exact arithmetic is not its point; its state is."""
+    """One heat capacity: its rise follows the square of the current. What matters is its state."""
 
     facts = FACTS
 

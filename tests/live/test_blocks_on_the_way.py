@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from itertools import pairwise
 
 import pytest
 
@@ -74,7 +75,7 @@ def test_without_numbers_grouping_does_not_matter(tmp_path):
     grouped, at = [], 0
     for n in (7, 20, 33, 30):
         part = rows[at : at + n]
-        ok = all(b[0] - a[0] == 10.0 for a, b in zip(part, part[1:], strict=False))
+        ok = all(b[0] - a[0] == 10.0 for a, b in pairwise(part))
         for piece in [part] if ok else [[r] for r in part]:
             grouped.append(Block(1, at, piece[0][0], 10.0, NAMES, UNITS, array("d", [x for r in piece for x in r[1]])))
         at += n

@@ -151,8 +151,8 @@ def test_a_wrong_password_is_refused_and_nothing_arrives(control):
     source = OpcUaSource(control.url, channels_of(control, "wrong"))
     try:
         assert polled(source, 1, 3.0) == []
+        source._connection._tried = -1e9
         with pytest.raises(ConnectionError):
-            source._connection._tried = -1e9
             source._connection.client()
     finally:
         source.close()

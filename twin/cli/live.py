@@ -20,8 +20,8 @@ def _options() -> type[Any]:
     return LiveOptions
 
 
-@click.command(epilog="Example: twin live out/five_axis.h5 --source replay:models/five_axis/runs/experiment_a --speed 1000 "
-               "--out file:out/correction_now.json --state out/live")  # fmt: skip
+@click.command(epilog="Example: twin live out/five_axis.h5 --source replay:models/five_axis/runs/experiment_a "
+               "--speed 1000 --out file:out/now.json --state out/live")  # fmt: skip
 @click.argument("artefact", type=click.Path())
 @click.option("--source", required=True, help="csv:FILE that grows, replay:RUN, ring:FILE, opcua:URL")
 @click.option("--out", required=True, multiple=True, help="file:FILE, ring:FILE, opcua:URL; may be given again")

@@ -42,7 +42,7 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
     _known(told, _KEYS, path, "")
     _known(told.get("opcua", {}), _OPCUA, path, "opcua")
     _known(told.get("outputs", {}), _OUTPUTS, path, "outputs")
-    units = {c.column: c.unit for c in facts.channels} | {s: "degC" for s in facts.sensors}
+    units = {c.column: c.unit for c in facts.channels} | dict.fromkeys(facts.sensors, "degC")
     nodes, limits = {}, {}
     for column, own in told.get("channels", {}).items():
         if column not in units:
@@ -59,7 +59,9 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
 def _known(table: dict[str, Any], keys: set[str], path: Path, name: str) -> None:
     unknown = [k for k in table if k not in keys]
     if unknown:
-        raise TwinError(f"unknown keys: {', '.join(unknown)}", f"{path}: {name}", f"keys are: {', '.join(sorted(keys))}")
+        raise TwinError(
+            f"unknown keys: {', '.join(unknown)}", f"{path}: {name}", f"keys are: {', '.join(sorted(keys))}"
+        )
 
 
 def _checked(text: Any, unit: str, where: str) -> None:

@@ -1,7 +1,7 @@
 """The checkpoint: the state of the machine and of all that is between the source and it, at a position of the journal.
 
-One file, written whole or not at all, with a checksum: a line of JSON, then the engine's bytes, then CRC-32 of both. The
-one before is kept, in case the disk damages the last.
+One file, written whole or not at all, with a checksum: a line of JSON, then the engine's bytes, then CRC-32 of both.
+The one before is kept, in case the disk damages the last.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Blocks from CSV files: one that grows, or a recorded run at any speed.
 
-A row is a block of its own, or, where many wait, equally spaced ones are one block: only where times are whole numbers of
-1/1024 s, with which sums are exact, so that what is computed does not depend on how rows were grouped.
+A row is a block of its own, or, where many wait, equally spaced ones are one block: only where times are whole numbers
+of 1/1024 s, with which sums are exact, so that what is computed does not depend on how rows were grouped.
 """
 
 from __future__ import annotations

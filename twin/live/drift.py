@@ -1,6 +1,6 @@
 """Which temperature sensor drifts: measured minus simulated, each against the others.
 
-A model that is wrong, or a machine in a draught, moves many residuals together; a sensor that comes loose moves its own.
+A model that is wrong, or a machine in a draught, moves many residuals together; a sensor that comes loose moves one.
 Residuals are averaged over TAU and taken relative to what they were in the first hours; what one is apart from the
 median of all is told of that sensor alone. The light half of `twin diagnose`, which weighs machine causes too.
 """
@@ -8,14 +8,20 @@ median of all is told of that sensor alone. The light half of `twin diagnose`, w
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
-from statistics import median
 
 TAU = 1800.0  # s: longer than the filling of a coolant tank or an open door, shorter than a shift
 LEARN = 2 * 3600.0  # s in which residuals are taken as what the model is off by anyway
 APART = 1.5  # K from the median of the others: what `twin check` refutes a channel by
 FEWEST = 3  # sensors, below which none can be told from the machine
+
+
+def median(values: Iterable[float]) -> float:
+    """Of one value at least. (The statistics module takes longer to load than all of this package.)"""
+    ordered = sorted(values)
+    n = len(ordered)
+    return 0.5 * (ordered[(n - 1) // 2] + ordered[n // 2])
 
 
 @dataclass

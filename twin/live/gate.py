@@ -1,8 +1,8 @@
 """What a value of a load signal cannot be: not finite, outside what the machine can do, faster than it can change.
 
 Such a value is taken as missing: the last good one holds, and the signal grows older until a good one comes. Limits are
-those of the description, widened, unless the channels file says otherwise; they are to catch a sensor that shows 85 degC
-after a reset, not to judge a certified range, of which flags tell.
+those of the description, widened, unless the channels file says otherwise; they are to catch a sensor that shows
+85 degC after a reset, not to judge a certified range, of which flags tell.
 """
 
 from __future__ import annotations
@@ -73,9 +73,7 @@ class Gate:
     def _took(self, k: int, value: float, time: float) -> None:
         self.good[k], self.since[k], self.seen[k] = value, time, True
 
-    def _one_by_one(
-        self, k: int, limit: Limits, times: array[float], rows: array[float], column: array[float]
-    ) -> None:
+    def _one_by_one(self, k: int, limit: Limits, times: array[float], rows: array[float], column: array[float]) -> None:
         n = len(self.limits)
         for i, value in enumerate(column):
             if math.isnan(value):  # nothing was logged: no fault of a value

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from twin.live.block import Block
+from twin.live.condense import condense
 from twin.live.drift import Drift
 from twin.live.engine import Engine
 from twin.live.gate import Gate, Limits
@@ -32,6 +33,8 @@ class Intake:
         self.measured: dict[str, float] = {}  # degC, last readings
         self.worst_balance = 0.0
         self.wrong: dict[str, str] = {}  # columns that are not used, and why
+        self._units = tuple(c.unit for c in engine.facts.channels)
+        self._positions = frozenset(engine.facts.axis_channels)
         self._columns: tuple[tuple[str, ...], tuple[str, ...]] | None = None
         self._channels: list[tuple[int, int]] = []  # channel, column
         self._sensors: list[tuple[str, int]] = []
@@ -59,6 +62,8 @@ class Intake:
         if gap is not None and gap < times[0]:
             times, rows = array("d", [gap]) + times, array("d", [NAN]) * s + rows
         self.gate.pass_rows(times, rows)
+        if self.numbered:  # rows without numbers come in groups of any size, which must not matter
+            condense(rows, self._units, self._positions, block.interval)
         self._feed(block, times, rows, each_step)
 
     def _start(self, times: array[float], rows: array[float]) -> int:
@@ -100,7 +105,9 @@ class Intake:
             at = end
             if done:
                 self.worst_balance = max(self.worst_balance, engine.balance())
-                self.drift.take(self.measured, dict(zip(engine.facts.sensors, engine.sensors(), strict=True)), done * step)
+                self.drift.take(
+                    self.measured, dict(zip(engine.facts.sensors, engine.sensors(), strict=True)), done * step
+                )
                 self.measured = {}
                 each_step()
 

@@ -2,8 +2,8 @@
 
 Segments `000000001.twb` of frames as `twin.logs.frame` describes them, so that `twin unpack` makes a run folder of one.
 A segment is only ever appended to. A crash costs the frame that was being written, which is cut off when the journal is
-opened again; the source brings it once more, or it is lost and counted. Older segments are removed, so that all together
-stay below a number of bytes; none that the checkpoint needs is.
+opened again; the source brings it once more, or it is lost and counted. Older segments are removed, so that all
+together stay below a number of bytes; none that the checkpoint needs is.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Axis offsets out of TCP displacements at the poses, as values on the grid or as coefficients of polynomials.
 
-offset = -J^+ w at every pose (`twin.run.correction_axes`); the polynomials are those of `twin correction`, fitted to the
-offsets, with s = clip((position - centre) / half_range, -1, 1) per axis.
+offset = -J^+ w at every pose (`twin.run.correction_axes`); the polynomials are those of `twin correction`, fitted to
+the offsets, with s = clip((position - centre) / half_range, -1, 1) per axis.
 """
 
 from __future__ import annotations

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import platform
-import shutil
-import subprocess
+import os
 import sys
-from importlib import resources
+import zlib
 from pathlib import Path
 
 from twin import __version__
@@ -15,8 +12,10 @@ from twin.errors import ArtefactError, TwinError
 from twin.live.engine import Engine
 from twin.live.facts import read_facts
 
-_CODE = ("export/c/algebra.c", "export/c/drive.c", "export/c/step.c", "export/c/tcp.c", "export/c/runtime.h",
-         "live/live.c", "live/facts.py", "live/prepare.py")  # fmt: skip
+
+def _files(package: Path) -> list[Path]:
+    """The code that writes C."""
+    return [*sorted((package / "export" / "c").glob("*.*")), *(package / "live" / n for n in ("live.c", "prepare.py"))]
 
 
 def open_engine(artefact: Path, kind: str, folder: Path) -> Engine:
@@ -32,6 +31,8 @@ def open_engine(artefact: Path, kind: str, folder: Path) -> Engine:
 
     own = folder / _key(artefact)
     if not (own / "machine.so").is_file():
+        import shutil
+
         for older in folder.glob("*"):
             shutil.rmtree(older, ignore_errors=True)
         _prepare(artefact, own)
@@ -39,21 +40,20 @@ def open_engine(artefact: Path, kind: str, folder: Path) -> Engine:
 
 
 def _key(artefact: Path) -> str:
-    """Of what the compiled code was made from."""
-    digest = hashlib.sha256(f"{__version__} {platform.machine()}".encode())
-    for name in _CODE:
-        digest.update((resources.files("twin") / name).read_bytes())
+    """Of what the compiled code was made from, by size and time as `make` goes: a hash takes a tenth of a start."""
+    package = Path(__file__).parents[1]
     try:
-        with artefact.open("rb") as f:
-            while piece := f.read(1 << 20):
-                digest.update(piece)
+        told = [(path.stat().st_size, path.stat().st_mtime_ns) for path in (artefact, *_files(package))]
     except OSError as e:
         raise ArtefactError(f"cannot read: {e.strerror or e}", str(artefact), "make it with `twin build`") from e
-    return digest.hexdigest()[:24]
+    text = repr((__version__, os.uname().machine, told)).encode()
+    return f"{zlib.crc32(text):08x}{zlib.adler32(text):08x}"
 
 
 def _prepare(artefact: Path, folder: Path) -> None:
     """In a process of its own: writing C needs JAX, which this one is not to load."""
+    import subprocess
+
     command = [sys.executable, "-m", "twin.live.prepare", str(artefact), str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -1,9 +1,9 @@
-"""The correction on its way out: follows the model, freezes, goes to neutral, and never steps further than its slew limit.
+"""The correction on its way out: follows the model, freezes, goes to neutral, never steps beyond its slew limit.
 
-Every sink has a limiter of its own, which starts from what the sink last took: one that was unreachable for an hour goes
-on from where it stood. The publisher is the watchdog too: it needs a word from the model (`alive`) again and again, and
-whether none comes because the source is silent, the computation hangs or has died, the outputs freeze and then go to
-neutral.
+Every sink has a limiter of its own, which starts from what the sink last took: one that was unreachable for an hour
+goes on from where it stood. The publisher is the watchdog too: it needs a word from the model (`alive`) again and
+again, and whether none comes because the source is silent, the computation hangs or has died, the outputs freeze and
+then go to neutral.
 """
 
 from __future__ import annotations

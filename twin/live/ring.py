@@ -8,9 +8,9 @@ Little-endian:
     ... up to 64 bytes
     slots    each u32 length, then a frame as in `twin.logs.frame`: block of number n in slot n mod slots
 
-A writer writes the slot first, then which is the newest. A reader that meets a slot which is being written sees that its
-checksum is wrong, or its number another, and takes it as not there (yet, or any more). Plain mmap of a file: on Python
-3.11 a process that attaches multiprocessing.shared_memory removes the segment when it exits.
+A writer writes the slot first, then which is the newest. A reader that meets a slot which is being written sees that
+its checksum is wrong, or its number another, and takes it as not there (yet, or any more). Plain mmap of a file: on
+Python 3.11 a process that attaches multiprocessing.shared_memory removes the segment when it exits.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ class RingWriter:
             with path.open("r+b") as f:
                 self._map = mmap.mmap(f.fileno(), size)
         except OSError as e:
-            raise TwinError(f"cannot write: {e.strerror or e}", str(path), "name a file in /dev/shm, for example") from e
+            raise TwinError(
+                f"cannot write: {e.strerror or e}", str(path), "name a file in /dev/shm, for example"
+            ) from e
 
     def write(self, block: Block) -> None:
         """Raises ValueError for a block that no slot can hold."""

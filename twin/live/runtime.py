@@ -20,7 +20,7 @@ from twin.live.engine import EngineFailure
 from twin.live.health import FORMAT, HealthFiles, Latency
 from twin.live.intake import Intake
 from twin.live.journal import Journal, Position
-from twin.live.offsets import Form, offsets
+from twin.live.offsets import offsets
 from twin.live.publisher import Publisher
 from twin.live.source import Mark, Source
 from twin.logs.resolver import Damaged, Resolver
@@ -138,7 +138,9 @@ class Runtime:
         age, whose = (0.0, "") if intake.base is None else intake.gate.oldest(line.last)
         waiting = intake.gate.waiting()
         why = f"no value of {', '.join(waiting)} yet" if waiting else f"no good value of {whose}" if whose else ""
-        self.publisher.alive(now, age if age > line.spacing else 0.0, why, block.records * block.interval, block.sequence)
+        self.publisher.alive(
+            now, age if age > line.spacing else 0.0, why, block.records * block.interval, block.sequence
+        )
         self.publisher.tick(now)
         self._checkpoint()
 

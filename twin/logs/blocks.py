@@ -127,7 +127,7 @@ def resolve(arrivals: Iterable[Block | Damaged], window: int | None = None, firs
 
     window, first: as in `Resolver`. Raises LogError where nothing sound arrived, or the columns change.
     """
-    resolver = Resolver(window, first)
+    resolver: Resolver[Block] = Resolver(window, first)
     blocks = list(in_order(arrivals, resolver))
     if not blocks:
         raise LogError(f"no sound block ({resolver.counts})", "blocks", "check the sender")

@@ -101,9 +101,9 @@ class Resolver(Generic[B]):
     """
 
     window: int | None = 16
-    keep_overlaps: bool = False  # let records out whose time has been given: for who keeps a clock of their own
     first: int | None = 0  # number of the first block expected; None: that of the first arrival, to join in midstream
     counts: Counts = Counts()
+    keep_overlaps: bool = False  # let records out whose time has been given: for who keeps a clock of their own
     _stream: int | None = None
     _numbers: _Numbers = field(default_factory=_Numbers)
     _over: dict[int, _Numbers] = field(default_factory=dict)
