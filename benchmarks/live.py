@@ -34,7 +34,7 @@ RECORDS, CORE = 1000, 0.01  # records of a block and s between them: 100 Hz in b
 LATENCY_BLOCKS = {"c": 240, "jax": 60}  # 40 and 10 min: one of six completes a step of a minute
 STARTS = 5
 KILLS, SPEED, GROUP, HOURS = 20, 1000.0, 10, 8.0
-DAYS = float(os.environ.get("TWIN_LIVE_DAYS", "10"))  # of the long replay
+DAYS = float(os.environ.get("TWIN_LIVE_DAYS", "30"))  # of the long replay
 ROW = 60.0  # s between its rows
 
 
@@ -260,7 +260,7 @@ def long_replay(folder: Path, engines: Path) -> None:
     shutil.copytree(engines, state / "engine")
     began = time.perf_counter()
     process = subprocess.Popen(command(f"replay:{csv.parent}", [f"file:{folder / 'c.json'}"], state, "--speed", "0",
-                                       "--journal", "2"), stdout=subprocess.PIPE, text=True)  # fmt: skip
+                                       "--journal", "1"), stdout=subprocess.PIPE, text=True)  # fmt: skip
     seen: list[tuple[float, float, float]] = []
     while process.poll() is None:
         time.sleep(0.2)
@@ -273,12 +273,12 @@ def long_replay(folder: Path, engines: Path) -> None:
         seen.append((day, resident, disk))
     took = time.perf_counter() - began
     told = json.loads((state / "health.json").read_text())
-    after = np.array([s for s in seen if s[0] >= min(4.0, DAYS / 4)])
+    after = np.array([s for s in seen if s[0] >= min(6.0, DAYS / 4)])
     first, last = after[: len(after) // 4], after[-(len(after) // 4) :]
     print(f"   {told['model']['time_s'] / 86400:.0f} days, {told['model']['steps']:,} steps in {took:.0f} s "
           f"({1e3 * took / told['model']['steps']:.1f} ms each): resident {first[:, 1].mean():.1f} MB then "
           f"{last[:, 1].mean():.1f} MB, at most {after[:, 1].max():.1f}; state folder {first[:, 2].mean():.2f} then "
-          f"{last[:, 2].mean():.2f} MB, at most {after[:, 2].max():.2f} (journal of 2 MB)")  # fmt: skip
+          f"{last[:, 2].mean():.2f} MB, at most {after[:, 2].max():.2f} (journal of 1 MB)")  # fmt: skip
 
 
 def main() -> None:

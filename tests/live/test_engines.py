@@ -79,10 +79,3 @@ def test_the_c_engine_needs_neither_jax_nor_numpy(spindle, state, tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_a_state_of_another_artefact_is_refused(spindle, slide_artefact, state, tmp_path):
-    out = [f"file:{tmp_path}/c.json"]
-    live(spindle, f"replay:{RUN}", out, state, LiveOptions(speed=0.0))
-    with pytest.raises(twin.TwinError, match="of another artefact"):
-        live(slide_artefact, f"replay:{RUN}", out, state, LiveOptions(speed=0.0, engine="jax"))

@@ -2,8 +2,8 @@
 
 Currents, forces and torques become rms, speeds the mean of their magnitude, all others their mean, as
 `twin unpack --mean` does (`twin.logs.compress`); missing values are left out. Positions stay as they are, record by
-record: where pads dwell is exact. Heat within a window no longer follows the position; a window of a second is far below a tenth of every time
-constant, within which averaging is admissible (paper 001, section 16.2.2).
+record: where pads dwell is exact. Heat within a window no longer follows the position; a window of a second is far
+below a tenth of every time constant, within which averaging is admissible (paper 001, item 1.13).
 
 What it saves are the tables of laws that follow a temperature: they are made anew whenever a signal changes.
 """

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field
 
 TAU = 1800.0  # s: longer than the filling of a coolant tank or an open door, shorter than a shift
 LEARN = 2 * 3600.0  # s in which residuals are taken as what the model is off by anyway
-APART = 1.5  # K from the median of the others: what `twin check` refutes a channel by
+APART = 1.5  # K from the median of all: what `twin check` refutes a channel by
 FEWEST = 3  # sensors, below which none can be told from the machine
 
 
@@ -63,15 +63,13 @@ class Drift:
         moved = {name: r.mean - r.first for name, r in self.of.items() if r.seconds > LEARN}
         if len(moved) < FEWEST:
             return []
-        found = []
-        for name, change in moved.items():
-            others = median(v for other, v in moved.items() if other != name)
-            if abs(change - others) > APART:
-                found.append(
-                    f"sensor {name} reads {change - others:+.1f} K more than the model and the other sensors since "
-                    f"its first {LEARN / 3600:g} h: it drifts, or sits loose"
-                )
-        return found
+        most = median(moved.values())  # of all: of three, one that drifts does not shift it
+        return [
+            f"sensor {name} reads {change - most:+.1f} K against the model and the other sensors since its first "
+            f"{LEARN / 3600:g} h: it drifts, or sits loose"
+            for name, change in moved.items()
+            if abs(change - most) > APART
+        ]
 
     def stored(self) -> dict[str, dict]:
         return {name: asdict(r) for name, r in self.of.items()}

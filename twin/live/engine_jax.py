@@ -120,7 +120,8 @@ class JaxEngine:
         except FailedCheck as e:
             raise EngineFailure(e.problems[0].what, "engine", e.problems[0].remedy) from e
         self._air = measured_air(self._load, drive)[0, [i for _, i in self._model.ambient_sensors]].tolist()
-        followed = following_flags(self._load, drive, heat.theta, heat.surface, self._height, heat.winding)
+        theta, surface, winding = (np.asarray(a) for a in (heat.theta, heat.surface, heat.winding))
+        followed = following_flags(self._load, drive, theta, surface, self._height, winding)
         axes = [a.name for a in self._load.axes]
         here = drive.position[:, [axes.index(a) for a in self._model.pose_axes]]
         self._flags = [name for k, name in enumerate(drive.flag_names) if drive.flags[0, k]]

@@ -27,7 +27,7 @@ def unpack(path: Path, mean: float | None = None, machine: str | None = None) ->
     Raises LogError: no file of blocks, nothing sound in it, columns that change or with units unknown, a log shorter
     than `mean`, records further apart than `mean`.
     """
-    resolver = Resolver(window=None)
+    resolver: Resolver[Block] = Resolver(window=None)
     blocks = in_order(read_blocks(path), resolver)
     first = next(blocks, None)
     if first is None:
