@@ -16,7 +16,7 @@ import pytest
 
 from tests.live.scripted import Kept, Listed, block, run, runtime
 from twin.errors import TwinError
-from twin.face.live import LiveOptions, live
+from twin.face.live import LiveOptions, live, wired
 from twin.live.block import Block
 from twin.live.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from twin.live.csv_rows import GrowingFile
@@ -198,3 +198,26 @@ def test_a_ring_gives_whole_blocks_or_none(tmp_path):
     assert RingWriter(tmp_path / "ring", slots=4, slot=1024).next() == (7, 10)
     with pytest.raises(ValueError, match="bytes for slots"):
         writer.write(block(11, [0.1, 1.0, 21.0] * 100))
+
+
+def test_a_file_that_comes_back_after_a_restart_is_not_taken_twice(spindle, state, tmp_path):
+    lines = (RUN / "loads.csv").read_text().splitlines(keepends=True)
+    grown = tmp_path / "loads.csv"
+    out, options = [f"file:{tmp_path}/c.json"], LiveOptions(freeze="1 h")
+
+    def until_records(wanted, write):
+        made = wired(spindle, f"csv:{grown}", out, state, options)
+        made.begin(False)
+        made.once(0.05)
+        write()
+        for _ in range(100):
+            if made.intake.records < wanted:
+                made.once(0.1)
+        made.close()
+        return made.intake
+
+    assert until_records(100, lambda: grown.write_text("".join(lines[:101]))).records == 100
+    grown.unlink()
+    again = until_records(150, lambda: grown.write_text("".join(lines[:151])))
+    assert again.records == 150
+    assert (again.timeline.leaps, again.timeline.last) == (0, 1490.0)

@@ -103,8 +103,3 @@ class GrowingFile:
         self._at += sum(len(line) + 1 for line in taken)
         self.line += len(taken)
         return [line.decode("utf-8", "replace") for line in taken]
-
-    def skip(self, rows: int) -> None:
-        """Go on behind so many rows."""
-        while self.line < rows and self.lines(min(rows - self.line, 10_000)):
-            pass

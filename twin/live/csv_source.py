@@ -35,6 +35,7 @@ class CsvSource:
         self._file, self._beside = GrowingFile(path), None if beside is None else GrowingFile(beside)
         if paced and not path.is_file():
             raise LogError("no such file", str(path), "give a run folder with loads.csv, or csv:FILE for one to come")
+        self._mark: Mark | None = None  # the last row in the journal
         self._stream = 0
         self._interval = USUAL
         self._waiting: list[tuple[float, list[float]]] = []  # of the file beside
@@ -43,11 +44,7 @@ class CsvSource:
         self._begun: tuple[float, float] | None = None  # time of a row, and when it was due
 
     def resume(self, mark: Mark | None) -> None:
-        self._read()
-        if mark is not None and mark.stream == self._stream:
-            self._ahead = [row for row in self._ahead if row[0] > mark.sequence]
-            while not self._ahead and self._file.line <= mark.sequence and self._read():
-                self._ahead = [row for row in self._ahead if row[0] > mark.sequence]
+        self._mark = mark
 
     def fetch(self, stream: int, numbers: Sequence[int]) -> Sequence[Block]:
         return ()
@@ -90,9 +87,16 @@ class CsvSource:
                 continue
             if not self._stream:  # of the columns and the first time: another file is another stream
                 self._stream = zlib.crc32(repr((header.names, row[0])).encode()) or 1
-            self._ahead.append((first + k, row[0], row[1] + self._at_side(row[0])))
             sound += 1
+            if self._known(first + k):
+                continue
+            self._ahead.append((first + k, row[0], row[1] + self._at_side(row[0])))
         return sound
+
+    def _known(self, number: int) -> bool:
+        """Whether a row of the file is in the journal."""
+        mark = self._mark
+        return mark is not None and mark.stream == self._stream and number <= mark.sequence
 
     def _at_side(self, time: float) -> list[float]:
         if self._beside is None:

@@ -19,7 +19,7 @@ from twin.errors import TwinError
 from twin.live.block import Block, block_of, frame_of
 from twin.logs.frame import Frame, frames, packed
 
-SEGMENTS = 16  # so many at the most: what is removed at once is a sixteenth
+SEGMENTS = 16  # about so many: what is removed at once is a sixteenth
 SYNC = 1.0  # s between writes to the disk itself: what a power failure may cost; a killed process loses nothing
 
 
@@ -36,7 +36,7 @@ class Journal:
 
     def __init__(self, folder: Path, most: int):
         """most: bytes of all segments. Raises TwinError where the folder cannot be written."""
-        self.folder, self.size = folder, max(most // SEGMENTS, 1)
+        self.folder, self.most, self.size = folder, most, max(most // SEGMENTS, 1)
         self.needed = 0  # no segment from this one on is removed
         self._synced = 0.0
         try:
@@ -108,8 +108,10 @@ class Journal:
         self._file.close()
         self._segment += 1
         self._file = self._path(self._segment).open("ab", buffering=0)
+        total = self.bytes + self.size  # with the segment that begins
         for segment in self._present():
-            if segment <= self._segment - SEGMENTS and segment < self.needed:
+            if total > self.most and segment < min(self.needed, self._segment):
+                total -= self._path(segment).stat().st_size
                 self._path(segment).unlink()
 
     def _cut(self) -> None:

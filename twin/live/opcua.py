@@ -181,7 +181,6 @@ class OpcUaSink:
         if "{axis}" not in channels.outputs.get("offsets", ""):
             raise TwinError("no node for the offsets", url, "write [outputs] offsets = 'ns=2;s=offset_{axis}'")
         self._connection = Connection(url, channels)
-        self._known = False  # whether what stands on the server is what was written last
 
     def last(self) -> Values | None:
         try:

@@ -58,7 +58,7 @@ class Runtime:
         self._mark: Mark | None = None
         self._asked: set[int] = set()
         self._saved = (0.0, 0.0)  # of the machine's time and of real time: the last checkpoint
-        self._told = (0.0, "", "")  # real time of the last health record, mode and words of the last event
+        self._told = (0.0, "")  # real time of the last health record, mode of the last event
         self._step_time = 0.0
         self._began = time.time()
         self._going = False  # past the journal
@@ -187,13 +187,12 @@ class Runtime:
 
     def _tell(self) -> None:
         publisher, real = self.publisher, time.monotonic()
-        state = (publisher.mode, publisher.words.partition(" s old")[0] if publisher.mode == "frozen" else "")
         changed = publisher.mode != self._told[1]
         if changed:
             self.files.event({"time": time.time(), "mode": publisher.mode, "words": publisher.words})
         if changed or real - self._told[0] >= self.keeping.health:
             self.files.write(self.health())
-            self._told = (real, state[0], state[1])
+            self._told = (real, publisher.mode)
 
     def health(self) -> dict[str, Any]:
         """The record as docs/live.md describes it."""
