@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.live.scripted import Kept, Listed, block, run, runtime
+from twin.cli.main import run as command
 from twin.errors import TwinError
 from twin.face.live import LiveOptions, live, wired
 from twin.live.block import Block
@@ -23,6 +24,7 @@ from twin.live.csv_rows import GrowingFile
 from twin.live.journal import Journal, Position
 from twin.live.ring import RingReader, RingWriter
 from twin.logs.block_file import read_blocks
+from twin.logs.read import read_run
 
 RUN = Path(__file__).parents[1] / "machines" / "spindle" / "runs" / "warm_up"
 GROUP = 3  # rows in a block
@@ -221,3 +223,19 @@ def test_a_file_that_comes_back_after_a_restart_is_not_taken_twice(spindle, stat
     again = until_records(150, lambda: grown.write_text("".join(lines[:151])))
     assert again.records == 150
     assert (again.timeline.leaps, again.timeline.last) == (0, 1490.0)
+
+
+def test_the_journal_of_a_file_is_the_run_again(spindle, state, tmp_path):
+    grown = tmp_path / "loads.csv"
+    lines = (RUN / "loads.csv").read_text().splitlines(keepends=True)
+    made = wired(spindle, f"csv:{grown}", [f"file:{tmp_path}/c.json"], state, LiveOptions())
+    made.begin(False)
+    for rows in (1, 2, 3, 30, 31, 100):
+        grown.write_text("".join(lines[: rows + 1]))
+        made.once(0.3)
+    made.close()
+    assert made.intake.records == 100
+    assert command(["unpack", str(state / "journal" / "000000001.twb"), "-o", str(tmp_path / "again")]) == 0
+    given, again = read_run(RUN).loads, read_run(tmp_path / "again").loads
+    assert again.time.tolist() == given.time[:100].tolist()
+    assert again.columns["x_position"] == pytest.approx(given.columns["x_position"][:100], rel=1e-14)

@@ -21,7 +21,6 @@ from twin.logs.resolver import Damaged
 
 MOST = 1000  # rows in a block
 LOOK = 0.2  # s between two looks at a file
-USUAL = 60.0  # s between rows, until two were seen
 
 
 class CsvSource:
@@ -37,7 +36,8 @@ class CsvSource:
             raise LogError("no such file", str(path), "give a run folder with loads.csv, or csv:FILE for one to come")
         self._mark: Mark | None = None  # the last row in the journal
         self._stream = 0
-        self._interval = USUAL
+        self._interval = 0.0  # s, between the last two rows; 0: there were no two yet, and the first one waits
+        self._before = -math.inf  # s, time of the last row
         self._waiting: list[tuple[float, list[float]]] = []  # of the file beside
         self._joined: list[float] = []
         self._ahead: list[tuple[int, float, list[float]]] = []  # rows read and not given: number, time, values
@@ -52,7 +52,7 @@ class CsvSource:
     def poll(self, wait: float) -> Sequence[Block | Damaged]:
         until = clock.monotonic() + wait
         while True:
-            bad = [] if self._ahead else self._read_counted()
+            bad = [] if self._ahead and self._interval else self._read_counted()
             due = self._due()
             if due or bad:
                 return [*bad, *due]
@@ -88,6 +88,10 @@ class CsvSource:
             if not self._stream:  # of the columns and the first time: another file is another stream
                 self._stream = zlib.crc32(repr((header.names, row[0])).encode()) or 1
             sound += 1
+            apart = row[0] - self._before
+            if 0.0 < apart < math.inf:
+                self._interval = apart
+            self._before = row[0]
             if self._known(first + k):
                 continue
             self._ahead.append((first + k, row[0], row[1] + self._at_side(row[0])))
@@ -130,9 +134,11 @@ class CsvSource:
         return self._begun[1] + (time - self._begun[0]) / self.speed
 
     def _pause(self) -> float:
-        return self._wanted(self._ahead[0][1]) - clock.monotonic() if self._ahead else LOOK
+        return self._wanted(self._ahead[0][1]) - clock.monotonic() if self._ahead and self._interval else LOOK
 
     def _due(self) -> list[Block]:
+        if not self._interval:
+            return []
         now = clock.monotonic()
         n = 0
         while n < min(len(self._ahead), MOST) and self._wanted(self._ahead[n][1]) <= now:
@@ -153,11 +159,10 @@ class CsvSource:
             if interval > 0.0 and _exact(begin) and _exact(interval):
                 while n < len(rows) and begin + n * interval == rows[n][1] and rows[n][0] == number + n:
                     n += 1
-        if n > 1:
-            self._interval = rows[1][1] - begin
+        apart = rows[1][1] - begin if n > 1 else self._interval
         values = array("d", [v for row in rows[:n] for v in row[2]])
         names, units = self._names()
-        return Block(self._stream, rows[n - 1][0], begin, self._interval, names, units, values), n
+        return Block(self._stream, rows[n - 1][0], begin, apart, names, units, values), n
 
 
 def _exact(time: float) -> bool:

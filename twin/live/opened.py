@@ -54,8 +54,11 @@ def _prepare(artefact: Path, folder: Path) -> None:
     """In a process of its own: writing C needs JAX, which this one is not to load."""
     import subprocess
 
+    print("compiling the machine, once", file=sys.stderr, flush=True)
     command = [sys.executable, "-m", "twin.live.prepare", str(artefact), str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode < 0:
+        raise TwinError("compiling was interrupted", "--engine", "start again")
     if done.returncode:
         lines = done.stderr.strip().splitlines() or ["no message"]
         what = lines[0] if done.returncode in (1, 2) and "Traceback" not in lines[0] else lines[-1]
