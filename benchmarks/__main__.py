@@ -18,7 +18,7 @@ NAMES = (
     "calibration", "update",
     "spindle_drift", "spindle_diagnosis", "log_faults", "lathe_channels",
     "members", "diagnosis", "recovery", "hidden_certify",
-    "window",
+    "window", "live",
 )  # fmt: skip
 ASKED = ("sensitivity", "lathe_diagnosis", "lathe_calibration")  # by name alone: a day, and hours
 

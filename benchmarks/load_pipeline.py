@@ -13,7 +13,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from twin.logs.block_file import decode, encode
-from twin.logs.blocks import Block, Resolver, group, tables
+from twin.logs.blocks import Block, group, tables
+from twin.logs.resolver import Resolver
 from twin.logs.run import Table
 from twin.rom.drive import Drive, evaluate
 from twin.rom.load_model import AxisWiring, EnvironmentWiring, Film, LawUse, LoadModel, Pair, Rail, Signal, Source

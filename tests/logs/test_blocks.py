@@ -18,10 +18,11 @@ from tests.support import synthetic
 from twin.cli.main import run
 from twin.errors import LogError
 from twin.logs.block_file import append, decode, encode, read_blocks
-from twin.logs.blocks import Block, Counts, Damaged, Resolver, group, in_order, resolve, tables
+from twin.logs.blocks import Block, group, in_order, resolve, tables
 from twin.logs.check import check_run
 from twin.logs.compress import compress_loads
 from twin.logs.read import read_run
+from twin.logs.resolver import Counts, Damaged, Resolver
 from twin.logs.unpack import unpack
 from twin.logs.write import write_run
 from twin.rom.drive import evaluate

@@ -29,6 +29,7 @@ COMMANDS = {
     "build": "Reduce a machine to an artefact with a certificate.",
     "verify": "Test an artefact against the full model on held-out scenarios.",
     "run": "Run an artefact on a run folder: temperatures, TCP error.",
+    "live": "Run an artefact beside the machine: load blocks in, axis offsets out.",
     "score": "Score an artefact on measured runs, beside naive baselines.",
     "calibrate": "Fit an artefact's parameters to measured runs.",
     "update": "Correct an artefact online by sparse TCP measurements.",

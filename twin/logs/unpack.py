@@ -10,8 +10,9 @@ import numpy as np
 
 from twin.errors import LogError
 from twin.logs.block_file import read_blocks
-from twin.logs.blocks import Block, Counts, Resolver, gap_between, in_order, tables
+from twin.logs.blocks import Block, gap_between, in_order, tables
 from twin.logs.compress import compress_stream
+from twin.logs.resolver import Counts, Resolver
 from twin.logs.run import Run, Table
 from twin.units import parse_unit
 
@@ -26,7 +27,7 @@ def unpack(path: Path, mean: float | None = None, machine: str | None = None) ->
     Raises LogError: no file of blocks, nothing sound in it, columns that change or with units unknown, a log shorter
     than `mean`, records further apart than `mean`.
     """
-    resolver = Resolver(window=None)
+    resolver: Resolver[Block] = Resolver(window=None)
     blocks = in_order(read_blocks(path), resolver)
     first = next(blocks, None)
     if first is None:

@@ -201,7 +201,7 @@ def _clean(
     time = np.asarray(time, dtype=float)
     if time.ndim != 1 or len(time) == 0 or not np.all(np.diff(time) > 0.0) or not np.all(np.isfinite(time)):
         raise LogError("times do not increase strictly", "loads", "run `twin check` on the run folder")
-    needed = _needed(load_model)
+    needed = needed_signals(load_model)
     defaults = {s.name: s.default for s in load_model.signals if s.default is not None and s.name not in signals}
     absent = sorted(name for name in needed if name not in signals and name not in defaults)
     if absent:
@@ -216,7 +216,7 @@ def _clean(
     return time, values, missing, sorted(needed & set(defaults))
 
 
-def _needed(load_model: LoadModel) -> set[str]:
+def needed_signals(load_model: LoadModel) -> set[str]:
     """Signals that laws, positions, environments and switches read."""
     uses = [source.use for source in load_model.sources] + [film.use for film in load_model.films]
     needed = {name for use in uses for name in use.signals.values()}

@@ -1,0 +1,81 @@
+"""Both back ends against `twin run`, and their states."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from array import array
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import twin
+from twin.face.live import LiveOptions, live
+from twin.live.offsets import at, offsets
+from twin.live.opened import open_engine
+
+RUN = Path(__file__).parents[1] / "machines" / "spindle" / "runs" / "warm_up"
+
+
+@pytest.fixture(scope="module")
+def result(spindle):
+    return twin.read(spindle).run(RUN).numbers
+
+
+# The JAX engine makes a new factor in every step, `twin run` and C keep one as long as films stay near it
+@pytest.mark.parametrize(("engine", "kelvin", "metres"), [("c", 1e-9, 1e-13), ("jax", 2e-4, 1e-9)])
+def test_a_replay_ends_where_twin_run_ends(engine, kelvin, metres, spindle, state, result, tmp_path):
+    out = tmp_path / "c.json"
+    options = LiveOptions(engine=engine, speed=0.0, slew="1 mm/s", period="60 s", initial="20 degC")
+    runtime = live(spindle, f"replay:{RUN}", [f"file:{out}"], state, options)
+    facts = runtime.intake.engine.facts
+    np.testing.assert_allclose(runtime.intake.engine.sensors(), result.temperature[-1], rtol=0, atol=kelvin)
+    expected = offsets(facts, result.tcp[-1].ravel(), "grid")
+    assert np.abs(expected).max() > 1e-6
+    found = json.loads(out.read_text())
+    np.testing.assert_allclose(found["offsets"]["x"], expected[0], rtol=0, atol=metres)
+    assert found["mode"] == "following"
+
+
+@pytest.mark.parametrize("engine", ["c", "jax"])
+def test_a_state_goes_on_bit_by_bit(engine, spindle, compiled):
+    one, other = (open_engine(spindle, engine, compiled) for _ in range(2))
+    rng = np.random.default_rng(3)
+    channels = one.facts.channels
+
+    def rows(first, n):
+        times = array("d", [7.0 * (first + i) for i in range(n)])
+        values = [[rng.uniform(c.low, c.high) for c in channels] for _ in range(n)]
+        return times, array("d", np.ravel(values).tolist())
+
+    one.start(21.0)
+    one.feed(*rows(0, 20))
+    other.restore(one.saved())
+    more = rows(20, 30)
+    assert one.feed(*more) == other.feed(*more) > 2
+    assert one.saved() == other.saved()
+    assert one.displacements() == other.displacements()
+
+
+def test_polynomial_and_grid_agree_at_the_poses(spindle, compiled, result):
+    facts = open_engine(spindle, "c", compiled).facts
+    tcp = result.tcp[-1].ravel()
+    grid, polynomial = offsets(facts, tcp, "grid"), offsets(facts, tcp, "polynomial")
+    for k, position in enumerate(facts.pose_grid[0]):
+        there = at(facts, grid[0], "grid", [position])
+        assert there == pytest.approx(grid[0][k], abs=1e-15)
+        assert at(facts, polynomial[0], "polynomial", [position]) == pytest.approx(there, abs=2e-8)
+
+
+def test_the_c_engine_needs_neither_jax_nor_numpy(spindle, state, tmp_path):
+    code = (
+        "import sys\nfrom twin.cli.main import run\n"
+        f"status = run(['live', {str(spindle)!r}, '--source', 'replay:{RUN}', '--speed', '0', "
+        f"'--out', 'file:{tmp_path}/c.json', '--state', {str(state)!r}])\n"
+        "heavy = {'numpy', 'jax', 'scipy', 'pint', 'h5py'} & set(sys.modules)\n"
+        "print(heavy)\nsys.exit(status or len(heavy))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr

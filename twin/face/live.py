@@ -1,0 +1,108 @@
+"""The process beside the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from twin.errors import TwinError
+from twin.face.inputs import Quantity, positive, quantity
+
+if TYPE_CHECKING:
+    from twin.live.channels import Channels
+    from twin.live.facts import Facts
+    from twin.live.runtime import Runtime
+    from twin.live.sinks import Sink
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """How the process works; every limit is of the offset of an axis, anywhere in the workspace."""
+
+    engine: Literal["c", "jax"] = "c"
+    form: Literal["grid", "polynomial"] = "grid"
+    initial: Quantity | None = None  # temperature of the whole machine at a fresh start; None: of the air around it
+    speed: float = 1.0  # of a replay, times real time; 0: as fast as it goes
+    limit: Quantity = "200 um"
+    slew: Quantity = "0.2 um/s"  # ten times the fastest drift in experiment A of the five-axis machine
+    period: Quantity = "1 s"  # between steps of the outputs
+    freeze: Quantity = "60 s"  # age of inputs from which on the correction stands still
+    neutral: Quantity = "600 s"  # from which on it goes to neutral
+    journal: int = 256  # MB
+    channels: str | Path | None = None  # file with nodes of OPC UA and limits of values
+    fresh: bool = False  # forget what is in the state folder
+
+
+def live(
+    artefact: str | Path,
+    source: str,
+    out: Sequence[str],
+    state: str | Path,
+    options: LiveOptions | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Runtime:
+    """Run beside a machine until the source ends or `stop()` is true: blocks of loads in, axis offsets out.
+
+    source: "csv:FILE", "replay:RUN", "ring:FILE" or "opcua:URL". out: "file:FILE", "ring:FILE", "opcua:URL". state:
+    folder for journal, checkpoint and health record, from which a process that was killed goes on. Returns the closed
+    runtime, whose counts and state can be read. docs/live.md tells all of it.
+    Raises TwinError for a machine without a TCP, a state of another artefact or in use, and names of no source.
+    """
+    runtime = wired(artefact, source, out, state, options or LiveOptions())
+    runtime.begin((options or LiveOptions()).fresh)
+    runtime.run(stop)
+    return runtime
+
+
+def wired(artefact: str | Path, source: str, out: Sequence[str], state: str | Path, options: LiveOptions) -> Runtime:
+    """The same, not begun."""
+    from twin.live.channels import read_channels
+    from twin.live.clock import RealClock, RecordClock
+    from twin.live.gate import limits_of
+    from twin.live.intake import Intake
+    from twin.live.limiter import Limits
+    from twin.live.offsets import neutral
+    from twin.live.opened import open_engine
+    from twin.live.publisher import Patience, Publisher
+    from twin.live.runtime import Keeping, Runtime
+    from twin.live.source import open_source
+
+    if not 0.0 <= options.speed < 1e9:
+        raise TwinError(f"speed {options.speed:g} is out of range", "--speed", "write --speed 1000, or 0")
+    limits = Limits(
+        positive("--limit", options.limit, "m"),
+        positive("--slew", options.slew, "m/s"),
+        positive("--period", options.period, "s"),
+    )
+    patience = Patience(positive("--freeze", options.freeze, "s"), positive("--neutral", options.neutral, "s"))
+    initial = None if options.initial is None else quantity("--initial", options.initial, "degC")
+    folder = Path(state)
+    engine = open_engine(Path(artefact), options.engine, folder / "engine")
+    facts = engine.facts
+    channels = read_channels(None if options.channels is None else Path(options.channels), facts)
+    incoming = open_source(source, options.speed, channels)
+    sinks = [open_sink(text, facts, options.form, channels) for text in out]
+    publisher = Publisher(sinks, neutral(facts, options.form), options.form, limits, patience)
+    clock = RealClock(incoming.speed) if incoming.speed else RecordClock()
+    intake = Intake(engine, limits_of(facts, channels.limits), initial, incoming.numbered)
+    return Runtime(intake, incoming, publisher, clock, Keeping(folder, options.journal << 20))
+
+
+def open_sink(text: str, facts: Facts, form: Literal["grid", "polynomial"], channels: Channels) -> Sink:
+    """The output that `text` names: kind:place. Raises TwinError for other kinds."""
+    kind, colon, place = text.partition(":")
+    if colon and place and kind == "file":
+        from twin.live.sinks import FileSink
+
+        return FileSink(facts, form, Path(place))
+    if colon and place and kind == "ring":
+        from twin.live.sinks import RingSink
+
+        return RingSink(facts, form, Path(place))
+    if colon and place and kind == "opcua":
+        from twin.live.opcua import OpcUaSink
+
+        return OpcUaSink(facts, place, channels)
+    raise TwinError(f"'{text}' names no output", "--out", "write file:FILE, ring:FILE or opcua:opc.tcp://HOST:PORT")

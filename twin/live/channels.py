@@ -1,0 +1,82 @@
+"""The channels file: where signals are on an OPC UA server, what a value cannot be, where corrections go. TOML."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from twin.errors import TwinError
+from twin.live.facts import Facts
+from twin.units import parse_unit, to_si
+
+_KEYS = {"opcua", "channels", "outputs"}
+_CHANNEL = {"node", "unit", "low", "high", "rate"}
+_OPCUA = {"interval", "certificate", "key", "user", "password_file", "heartbeat"}
+_OUTPUTS = {"offsets", "count", "good_until", "mode"}
+
+
+@dataclass(frozen=True)
+class Channels:
+    """A channels file as read; of none, everything is empty."""
+
+    folder: Path = Path(".")
+    opcua: dict[str, Any] = field(default_factory=dict)
+    nodes: dict[str, tuple[str, str]] = field(default_factory=dict)  # column -> node, unit
+    limits: dict[str, dict[str, float]] = field(default_factory=dict)  # column -> low, high, rate in SI
+    outputs: dict[str, str] = field(default_factory=dict)
+
+
+def read_channels(path: Path | None, facts: Facts) -> Channels:
+    """The file, its limits in SI. Raises TwinError for unknown keys, columns and units."""
+    if path is None:
+        return Channels()
+    remedy = "docs/live.md has an example"
+    try:
+        told = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as e:
+        raise TwinError(f"cannot read: {e}", str(path), "check the path") from e
+    except tomllib.TOMLDecodeError as e:
+        raise TwinError(f"not valid TOML: {e}", str(path), remedy) from e
+    _known(told, _KEYS, path, "")
+    _known(told.get("opcua", {}), _OPCUA, path, "opcua")
+    _known(told.get("outputs", {}), _OUTPUTS, path, "outputs")
+    units = {c.column: c.unit for c in facts.channels} | dict.fromkeys(facts.sensors, "degC")
+    nodes, limits = {}, {}
+    for column, own in told.get("channels", {}).items():
+        if column not in units:
+            raise TwinError(f"no channel '{column}'", str(path), f"channels are: {', '.join(units)}")
+        _known(own, _CHANNEL, path, f"channels.{column}")
+        where, unit = f"{path}: channels.{column}", units[column]
+        if "node" in own:
+            nodes[column] = (str(own["node"]), str(own.get("unit", unit)))
+            _checked(own.get("unit", unit), unit, where)
+        limits[column] = {k: _si(own[k], unit, k, where) for k in ("low", "high", "rate") if k in own}
+    return Channels(path.parent, told.get("opcua", {}), nodes, limits, told.get("outputs", {}))
+
+
+def _known(table: dict[str, Any], keys: set[str], path: Path, name: str) -> None:
+    unknown = [k for k in table if k not in keys]
+    if unknown:
+        raise TwinError(
+            f"unknown keys: {', '.join(unknown)}", f"{path}: {name}", f"keys are: {', '.join(sorted(keys))}"
+        )
+
+
+def _checked(text: Any, unit: str, where: str) -> None:
+    try:
+        found = parse_unit(str(text)).si
+    except ValueError as e:
+        raise TwinError(str(e), where, f"write a unit of {unit}") from e
+    if found != unit:
+        raise TwinError(f"unit {text} is not of {unit}", where, f"write a unit of {unit}")
+
+
+def _si(value: Any, unit: str, key: str, where: str) -> float:
+    """A limit; a rate is a number in SI per second."""
+    try:
+        return float(value) if key == "rate" else to_si(value, unit)
+    except (ValueError, TypeError) as e:
+        remedy = f"write a number in {unit}/s" if key == "rate" else f"write a number in {unit}, or one with its unit"
+        raise TwinError(f"{key}: {e}", where, remedy) from e

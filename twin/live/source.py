@@ -1,0 +1,73 @@
+"""Where blocks come from: one small interface, and what a user writes to name one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from twin.errors import TwinError
+from twin.live.block import Block
+from twin.live.channels import Channels
+from twin.logs.resolver import Damaged
+
+
+@dataclass(frozen=True)
+class Mark:
+    """The last block that is in the journal."""
+
+    stream: int
+    sequence: int
+
+
+class Source(Protocol):
+    """Blocks of load records, in any order, perhaps twice or not at all."""
+
+    numbered: bool  # the numbers of blocks show whether one is missing
+    speed: float  # times real time; 0: as fast as they are taken
+    ended: bool  # nothing more will come
+
+    def resume(self, mark: Mark | None) -> None:
+        """Go on after the last block of the journal, as far as what came since is stored; None: from the beginning.
+
+        Called once, before `poll`.
+        """
+
+    def poll(self, wait: float) -> Sequence[Block | Damaged]:
+        """What has arrived since, after `wait` [s] at the latest; a source that is away gives nothing."""
+
+    def fetch(self, stream: int, numbers: Sequence[int]) -> Sequence[Block]:
+        """Those of these blocks that are stored at the source."""
+
+    def close(self) -> None: ...
+
+
+KINDS = "csv:LOADS.CSV, replay:RUN, ring:FILE, opcua:opc.tcp://HOST:PORT"
+
+
+def open_source(text: str, speed: float, channels: Channels) -> Source:
+    """The source that `text` names: kind:place. channels: of the channels file, for OPC UA.
+
+    Raises TwinError for other kinds, and LogError for files that cannot be read.
+    """
+    kind, colon, place = text.partition(":")
+    if not colon or not place:
+        raise TwinError(f"'{text}' names no source", "--source", f"write one of {KINDS}")
+    if kind == "csv":
+        from twin.live.csv_source import CsvSource
+
+        return CsvSource(Path(place))
+    if kind == "replay":
+        from twin.live.csv_source import replay_of
+
+        return replay_of(Path(place), speed)
+    if kind == "ring":
+        from twin.live.ring_source import RingSource
+
+        return RingSource(Path(place))
+    if kind == "opcua":
+        from twin.live.opcua import OpcUaSource
+
+        return OpcUaSource(place, channels)
+    raise TwinError(f"no source '{kind}'", "--source", f"write one of {KINDS}")
