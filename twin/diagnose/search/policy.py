@@ -113,6 +113,9 @@ class SearchPolicy:
         "prior standard deviations",
     )
     outside: float = _rule(1.0, DERIVED, "the declared tolerance itself", "prior standard deviations")
+    alone: float = _rule(
+        0.5, LUMPED, "of its limit that the settled calibration moves a number of which the other fit alone is sure"
+    )
     nearly: float = _rule(
         0.75, LUMPED, "from which the surrogate of the settled calibration says little of a size", "of a bound"
     )

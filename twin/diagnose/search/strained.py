@@ -71,15 +71,16 @@ def loose_ones(detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.nd
     """The FAR declared numbers farthest out of their tolerance, by two calibrations; settled (n,).
 
     Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
-    by the settled calibration, or by the fit that finds causes. The former takes a channel of a run for one number and
-    knows next to nothing of films of heavy bodies; the latter knows how they warm up and cool down.
+    by the settled calibration, or by the fit that finds causes where the other goes half as far. The former takes a
+    channel of a run for one number and is sure of no film of a heavy body; the latter knows how bodies warm up and cool
+    down, and takes for that what else differs there.
     """
-    strain = detector.pulls.strain(fitted.x, settled)
+    strain, by_settling = detector.pulls.strain(fitted.x, settled), detector.pulls.settled.strain(settled)
     found = []
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
         x, covariance = settled_alone(detector.fitter, y, (j,))
         estimates = ((float(x[j]), float(np.sqrt(covariance[j, j])), True), (*_untied(fitted, j), False))
-        for value, sigma, by_settled in estimates:
+        for value, sigma, by_settled in estimates[: 2 if by_settling[j] >= detector.policy.alone else 1]:
             if np.sign(fitted.x[j]) * value > max(detector.policy.outside, detector.policy.sure * sigma):
                 rivals = _signals(detector, j, value, sigma, float(strain[j]) ** 2)
                 found.append(Loose(j, value, sigma, float(strain[j]), rivals, by_settled))
