@@ -14,7 +14,7 @@ from benchmarks.steel_profile import HELD_OUT, OMEGA, largest, transfer
 from benchmarks.steel_profile_model import profile
 from twin.build.frequency_training import drawn_films
 from twin.build.matrices.files import Matrices, read_matrices
-from twin.build.matrices.model import MatrixOptions, model_of, outputs
+from twin.build.matrices.model import MatrixOptions, as_given, model_of, outputs
 from twin.build.pipeline import BuildOptions
 from twin.build.rich_basis import RichOptions
 from twin.build.scenario import draw, theta_bounds
@@ -44,12 +44,8 @@ def write(folder: Path, refinements: int) -> list[Path]:
 
 def with_outputs(model: MachineModel, matrices: Matrices, options: MatrixOptions) -> AffineBody:
     """The body with the outputs that were given, in place of the two sides of each difference."""
-    body, rows, at = model.bodies[0], [], 0
-    for output in outputs(matrices, options):
-        sides = body.C[at : at + len(output.sensors)]
-        rows.append(sides[0] if len(sides) == 1 else output.scale * (sides[0] - sides[1]))
-        at += len(sides)
-    return replace(body, C=np.array(rows))
+    body = model.bodies[0]
+    return replace(body, C=as_given(outputs(matrices, options), body.C))
 
 
 def stepped(model: MachineModel, body: AffineBody, seed: int) -> np.ndarray:

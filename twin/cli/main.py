@@ -22,7 +22,7 @@ from twin.threads import one_thread_each
 
 # name -> what `twin --help` says about it; the command object is twin.cli.NAME.command (twin.cli.NAME_ of a keyword)
 COMMANDS = {
-    "new": "Propose a machine from nothing but a log.",
+    "new": "Begin a machine from a template, or from nothing but a log.",
     "import": "Reduce matrices that another program assembled.",
     "check": "Find mistakes in a machine description or a run folder.",
     "unpack": "Turn a file of load blocks into a run folder.",

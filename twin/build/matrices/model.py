@@ -53,6 +53,16 @@ def outputs(matrices: Matrices, options: MatrixOptions) -> tuple[Output, ...]:
     return tuple(found)
 
 
+def as_given(watched: Sequence[Output], C: np.ndarray) -> np.ndarray:
+    """(n_outputs, n): the outputs that were given, of the rows C of their sensors in any coordinates."""
+    rows, at = [], 0
+    for output in watched:
+        sides = C[at : at + len(output.sensors)]
+        rows.append(sides[0] if len(sides) == 1 else output.scale * (sides[0] - sides[1]))
+        at += len(sides)
+    return np.array(rows)
+
+
 def model_of(name: str, matrices: Matrices, options: MatrixOptions) -> MachineModel:
     """The full model, sparse. The self-tests have passed; what files round is made exact: symmetry, and K 1 = 0.
 
