@@ -76,7 +76,18 @@ def test_mesh_in_millimetres_read_as_metres(tmp_path):
 def test_mesh_scaled_down_twice(tmp_path):
     write_plate(tmp_path / "plate.msh")
     problems = findings(tmp_path, (PLATE_BOX, 'mesh = "plate.msh"\nmesh_unit = "mm"'))
-    assert any("measures" in p.what and "already in m" in p.remedy for p in problems)
+    assert any("measures" in p.what and 'mesh_unit = "m" makes it 0.12 x 0.12 x 0.03 m' in p.remedy for p in problems)
+
+
+@pytest.mark.parametrize(("unit", "length"), [("mm", 1e-3), ("inch", 0.0254)])
+def test_the_unit_of_a_mesh_is_found_by_size_and_sensors(tmp_path, unit, length):
+    """Read as metres, the plate is 120 m or 4.7 m long: the first is too long, the other's sensor lies beside it."""
+    write_plate(tmp_path / "plate.msh", 1.0 / length)
+    sensor = '[sensors.plate_top]\npart = "plate"\nposition = [0.05, 0.05, 0.23]\n\n[tcp.tool]'
+    problems = findings(tmp_path, (PLATE_BOX, 'mesh = "plate.msh"'), ("[tcp.tool]", sensor))
+    found = next(p for p in problems if "measures" in p.what)
+    assert f'mesh_unit = "{unit}"' in found.remedy
+    assert "or mesh_unit" not in found.remedy  # the sensor leaves one unit only
 
 
 def test_empty_named_surface(tmp_path):

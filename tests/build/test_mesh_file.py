@@ -200,13 +200,14 @@ def test_inner_faces_are_refused(tmp_path: Path):
     assert "1 of 29 triangles of surface 'top' are no outer faces" in fault(mesh, tmp_path / "c.msh")
 
 
-def test_surface_meshes_and_hexahedra_are_refused(tmp_path: Path):
+def test_surface_meshes_and_geometries_are_refused(tmp_path: Path):
     mesh = cylinder(quadratic=False)
     data = {k: v[1:] for k, v in mesh.cell_data.items()}
     shell = meshio.Mesh(mesh.points, mesh.cells[1:], cell_data=data, field_data=mesh.field_data)
-    assert fault(shell, tmp_path / "c.msh") == "the mesh has no tetrahedra"
-    cube = meshio.Mesh(np.random.default_rng(0).random((8, 3)), [("hexahedron", np.arange(8)[None])])
-    assert "other solids: hexahedron" in fault(cube, tmp_path / "c.msh")
+    assert fault(shell, tmp_path / "c.msh") == "the mesh has no solids, only triangle"
+    (tmp_path / "c.step").write_text("ISO-10303-21;")
+    with pytest.raises(DescriptionError, match="is a geometry and no mesh"):
+        load_part_mesh("part", Part(material="steel", mesh="c.step"), tmp_path)
 
 
 @pytest.mark.parametrize(

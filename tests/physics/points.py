@@ -84,6 +84,7 @@ FILMS = {
     "mixed_horizontal_down": {"speed": -0.6, "length": 0.3, "area_over_perimeter": 0.1, **TEMPERATURES},
     "mixed_cylinder": {"speed": -0.6, "diameter": 0.05, **TEMPERATURES},
     "mixed_rotating_cylinder": {"speed": -5.0, "diameter": 0.05, **TEMPERATURES},
+    "logged_film": {"coefficient": 6.0},
     "switched_film": {"switch": 0.5, "natural": 6.0},
     "enclosed_gap": {"conductance": 2.0},
     "coolant_channel": {"flow": 5e-5, "diameter": 0.01, "channel_length": 2.0, "area": 0.06, "still": 1.0, **WATER},

@@ -38,5 +38,9 @@ def test_gradients_exist_at_rest():
     assert gradient["natural"] == 1.0
 
 
+def test_a_logged_film_is_what_was_logged():
+    np.testing.assert_array_equal(films.logged_film(np.array([2.0, 40.0])), [2.0, 40.0])
+
+
 def test_a_switched_film_is_off_on_or_on_for_a_share():
     np.testing.assert_allclose(films.switched_film(np.array([0.0, 0.25, 1.0]), 80.0), [0.0, 20.0, 80.0])

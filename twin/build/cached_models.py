@@ -14,7 +14,7 @@ from twin.build.rich_basis import RichOptions, basis_of, sample_responses
 from twin.build.rich_check import SHARE, rich_error
 from twin.build.scenario import theta_bounds
 from twin.build.stored_model import restored, stored
-from twin.machine.description import Machine
+from twin.machine.description import Limits, Machine
 from twin.progress import Progress, silent
 from twin.rom.model import AffineBody, MachineModel
 
@@ -41,22 +41,27 @@ def rich_model(
         if machine.lumped:  # small already: the rich model is the full one, in coordinates with E = 1
             own = (project(body, np.diag(body.E.diagonal() ** -0.5)) for body in model.bodies)
             return replace(model, bodies=tuple(own))
-        low, high = theta_bounds(model.load_model)
-        bodies = []
-        with progress("rich basis", options.samples * len(model.bodies)) as advance:
-            for body in model.bodies:
-                responses = sample_responses(body, low, high, options, advance)
-                tolerance = options.tolerance
-                rich = _projected(body, responses, tolerance)
-                while tolerance > FINEST and (
-                    rich.n < FREE or not rich_error(body, rich, low, high, machine.limits) <= SHARE
-                ):
-                    tolerance /= 2.0
-                    rich = _projected(body, responses, tolerance)
-                bodies.append(rich)
-        return replace(model, bodies=tuple(bodies))
+        return on_rich_bases(model, options, machine.limits, progress)
 
     return cached("rich", __name__, (machine_hash(machine), options), make)
+
+
+def on_rich_bases(
+    model: MachineModel, options: RichOptions, limits: Limits, progress: Progress = silent
+) -> MachineModel:
+    """A sparse model projected on the rich bases of its bodies, fine enough for the limits; not cached."""
+    low, high = theta_bounds(model.load_model)
+    bodies = []
+    with progress("rich basis", options.samples * len(model.bodies)) as advance:
+        for body in model.bodies:
+            responses = sample_responses(body, low, high, options, advance)
+            tolerance = options.tolerance
+            rich = _projected(body, responses, tolerance)
+            while tolerance > FINEST and (rich.n < FREE or not rich_error(body, rich, low, high, limits) <= SHARE):
+                tolerance /= 2.0
+                rich = _projected(body, responses, tolerance)
+            bodies.append(rich)
+    return replace(model, bodies=tuple(bodies))
 
 
 def _projected(body: AffineBody, responses: Sequence[np.ndarray], tolerance: float) -> AffineBody:

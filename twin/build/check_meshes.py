@@ -13,6 +13,7 @@ from twin.build.lumped import lumped_ports
 from twin.build.lumped_body import count
 from twin.build.mechanism import mechanisms
 from twin.build.mesh import BodyMesh, PartMesh, body_mesh, load_part_mesh
+from twin.build.part_size import size_problems, volume
 from twin.build.ports import ContactPorts, contact_ports
 from twin.build.surface import Patch, patch
 from twin.errors import Problem, TwinError
@@ -22,9 +23,6 @@ from twin.machine.description import Machine
 from twin.machine.kinematics import direction, linear_axes, moving_contacts
 from twin.machine.surfaces import film_surfaces, unknown_surface
 
-LARGEST = 50.0  # m; nothing on a machine tool is longer
-SMALLEST = 1e-3  # m
-HEAVIEST = 5e5  # kg of one part
 SENSOR_GAP = 5e-3  # m between a sensor and its part
 PLANE_GAP = 1e-3  # m between the planes of a pad and its rail
 
@@ -49,7 +47,7 @@ def check_meshes(machine: Machine) -> MeshReport:
     if machine.lumped:
         return _check_lumped(machine)
     parts, problems = _load(machine)
-    problems += [p for part in parts.values() for p in _size(machine, part)]
+    problems += [p for part in parts.values() for p in size_problems(machine, part)]
     if len(parts) == len(machine.parts):
         bodies = bodies_of(machine)
         meshes = tuple(body_mesh(b.name, tuple(parts[p] for p in b.parts)) for b in bodies)
@@ -67,7 +65,7 @@ def check_meshes(machine: Machine) -> MeshReport:
         parts=len(machine.parts),
         bodies=len(bodies_of(machine)),
         nodes=sum(p.n for p in parts.values()),
-        mass=sum(_volume(p) * machine.materials[machine.parts[n].material].density for n, p in parts.items()),
+        mass=sum(volume(p) * machine.materials[machine.parts[n].material].density for n, p in parts.items()),
     )
 
 
@@ -91,30 +89,6 @@ def _load(machine: Machine) -> tuple[dict[str, PartMesh], list[Problem]]:
         except TwinError as e:
             problems += e.problems
     return parts, problems
-
-
-def _volume(part: PartMesh) -> float:
-    """m^3; edges taken as straight."""
-    corner = part.mesh.p[:, part.mesh.t[:4]]
-    edges = corner[:, 1:] - corner[:, :1]
-    return float(np.abs(np.einsum("in,in->n", edges[:, 0], np.cross(edges[:, 1], edges[:, 2], axis=0))).sum() / 6.0)
-
-
-def _size(machine: Machine, part: PartMesh) -> Iterator[Problem]:
-    """Meshes in millimetres that were read as metres, and the reverse."""
-    entry = machine.parts[part.name]
-    extent = np.ptp(part.nodes, axis=0)
-    mass = _volume(part) * machine.materials[entry.material].density
-    shown = f"{' x '.join(f'{e:.4g}' for e in extent)} m and {mass:.3g} kg"
-    where = f"parts.{part.name}"
-    if extent.max() > LARGEST or mass > HEAVIEST:
-        remedy = (
-            'box sizes are in m: write "800 mm"' if entry.box else 'the mesh is in millimetres: write mesh_unit = "mm"'
-        )
-        yield Problem(f"part '{part.name}' measures {shown}", where, remedy)
-    elif extent.max() < SMALLEST:
-        remedy = f'is the mesh already in m? mesh_unit is "{entry.mesh_unit}"' if entry.mesh else "box sizes are in m"
-        yield Problem(f"part '{part.name}' measures {shown}", where, remedy)
 
 
 def _surfaces(machine: Machine, parts: dict[str, PartMesh]) -> list[Problem]:

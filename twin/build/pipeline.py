@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from twin.build.compress import Tolerances, balanced, galerkin, trajectories
 from twin.build.rich_basis import RichOptions
 from twin.build.scenario import Scenario, draw
 from twin.build.workers import LONG
-from twin.machine.description import Limits, Machine
+from twin.machine.description import Limits
 from twin.progress import Progress, silent
 from twin.rom.following import FOLLOW, difference_place
 from twin.rom.load_model import LoadModel
@@ -46,6 +46,15 @@ class BuildOptions:
     hours: float = 2.0  # of every held-out scenario; its steady state comes on top
     step: float = 60.0  # s
     substeps: int | None = None  # of a step, in the certificate and by `twin run`; None: as few as hold the limits
+    # Whether environments are unlike each other, as of films that matrices come with: not the zones of one hall.
+    air_apart: bool = field(default=False, repr=False)
+
+
+class Limited(Protocol):
+    """What has limits of errors: a machine, or matrices."""
+
+    @property
+    def limits(self) -> Limits: ...
 
 
 def training_scenarios(load: LoadModel, options: BuildOptions, still: bool = False) -> list[Scenario]:
@@ -54,11 +63,11 @@ def training_scenarios(load: LoadModel, options: BuildOptions, still: bool = Fal
     still: with all axes at rest in mid-stroke.
     """
     kinds = [(4.0, 2 * options.step)] * 2 + [(1.0, options.step / 4)]
-    return [draw(load, TRAINING_SEED + i, *kinds[i % 3], still) for i in range(options.training)]
+    return [draw(load, TRAINING_SEED + i, *kinds[i % 3], still, options.air_apart) for i in range(options.training)]
 
 
 def compact_model(
-    machine: Machine, rich: MachineModel, options: BuildOptions, progress: Progress = silent
+    machine: Limited, rich: MachineModel, options: BuildOptions, progress: Progress = silent
 ) -> MachineModel:
     """The rich model compressed to `options.states` states; itself where it has no more than that."""
     if rich.n <= options.states:
@@ -72,7 +81,10 @@ def compact_model(
 
 
 def held_out(model: MachineModel, options: BuildOptions, seed: int) -> list[Scenario]:
-    return [draw(model.load_model, seed + i, options.hours, options.step) for i in range(options.held_out)]
+    apart = options.air_apart
+    return [
+        draw(model.load_model, seed + i, options.hours, options.step, air_apart=apart) for i in range(options.held_out)
+    ]
 
 
 def enough_substeps(model: MachineModel, limits: Limits, options: BuildOptions) -> int:
@@ -82,7 +94,7 @@ def enough_substeps(model: MachineModel, limits: Limits, options: BuildOptions) 
     choice would not be held out.
     """
     hours = options.hours / SHORTER
-    scenarios = [draw(model.load_model, TRAINING_SEED + i, hours, options.step) for i in range(CHOICE)]
+    scenarios = held_out(model, replace(options, hours=hours, held_out=CHOICE), TRAINING_SEED)
     ways = [Way(model, FINER), Way(model), Way(model, 2)]
     for substeps, found in zip((1, 2), compare_ways(ways, [(0, 1), (0, 2)], scenarios), strict=True):
         T, u = (e.max(initial=0.0) for e in found.scaled(limits))
@@ -154,7 +166,7 @@ def chosen_for_full(load: LoadModel, scenarios: Sequence[Scenario], count: int) 
 
 
 def certificate(
-    machine: Machine,
+    machine: Limited,
     rich: MachineModel,
     compact: MachineModel,
     full: MachineModel | None,

@@ -101,6 +101,12 @@ def machine_of(artefact: Artefact, machine_path: Path | None, where: str) -> Mac
 
     where: the artefact's name in messages. Raises ArtefactError where the machine is gone, or another one.
     """
+    if "matrices" in artefact.provenance and not machine_path:
+        raise ArtefactError(
+            "was imported from matrices, and certified against them then",
+            where,
+            "twin info shows its certificate; twin import makes it again",
+        )
     origin = Path(machine_path or artefact.provenance.get("machine", ""))
     if not origin.exists():
         raise ArtefactError(f"its machine description is not at {origin}", where, "name it with --machine")

@@ -28,10 +28,13 @@ class Scenario:
     start: float  # degC, uniform initial temperature
 
 
-def draw(load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still: bool = False) -> Scenario:
+def draw(
+    load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still: bool = False, air_apart: bool = False
+) -> Scenario:
     """One scenario of `hours` at steps `dt` [s]: axes hold or sweep, loads follow one pattern, films and air another.
 
-    still: all axes stay in the middle of their strokes (to show what a basis trained at one pose is worth).
+    still: all axes stay in the middle of their strokes (to show what a basis trained at one pose is worth). air_apart:
+    every environment has a course of its own; else all share one with small deviations, as the zones of a hall.
     """
     rng = np.random.default_rng([seed, 20231])
     pattern, film, ambient = rng.choice(LOADS), rng.choice(FILMS), rng.choice(AMBIENTS)
@@ -47,8 +50,9 @@ def draw(load: LoadModel, seed: int, hours: float = 4.0, dt: float = 60.0, still
             axis = positions[signal.name]
             moved = _position(rng, time, axis.low, axis.high)
             signals[signal.name] = np.full_like(time, (axis.low + axis.high) / 2) if still else moved
+        elif signal.name in air and air_apart:
+            signals[signal.name] = _ambient(rng, time, signal.low, signal.high, ambient)
         elif signal.name in air:
-            # all zones share one course with small deviations, as in a hall
             centre = centre if centre is not None else _ambient(rng, time, signal.low, signal.high, ambient)
             signals[signal.name] = np.clip(centre + rng.uniform(-0.5, 0.5), signal.low, signal.high)
         else:

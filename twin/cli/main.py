@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import importlib
+import keyword
 import os
 import signal
 import sys
@@ -19,9 +20,10 @@ from twin.errors import TwinError
 from twin.progress import interrupt
 from twin.threads import one_thread_each
 
-# name -> what `twin --help` says about it; the command object is twin.cli.NAME.command
+# name -> what `twin --help` says about it; the command object is twin.cli.NAME.command (twin.cli.NAME_ of a keyword)
 COMMANDS = {
-    "new": "Propose a machine from nothing but a log.",
+    "new": "Begin a machine from a template, or from nothing but a log.",
+    "import": "Reduce matrices that another program assembled.",
     "check": "Find mistakes in a machine description or a run folder.",
     "unpack": "Turn a file of load blocks into a run folder.",
     "losses": "Show the heat of every source, every film coefficient, and where they come from.",
@@ -56,7 +58,8 @@ class LazyGroup(click.Group):
         if name not in COMMANDS:
             return None
         one_thread_each()
-        command: click.Command = importlib.import_module(f"twin.cli.{name}").command
+        module = f"twin.cli.{name}_" if keyword.iskeyword(name) else f"twin.cli.{name}"
+        command: click.Command = importlib.import_module(module).command
         if command.epilog and not command.epilog.startswith("\b"):
             command.epilog = f"\b\n{command.epilog}"  # an example that is wrapped cannot be pasted
         return command

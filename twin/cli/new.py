@@ -1,4 +1,4 @@
-"""twin new: a machine from nothing but a log."""
+"""twin new: a machine from a template, or from nothing but a log."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ def _pairs(context: click.Context, option: click.Parameter, given: tuple[str, ..
     return {name: value for name, _, value in (s.rpartition("=") for s in given)}
 
 
-@click.command(epilog="Example: twin new out/lathe --from-log day_1.csv day_2.csv --sealed day_3.csv")
+@click.command(epilog="Example: twin new out/mill --template three_axis")
 @click.argument("folder", type=click.Path())
-@click.option("--from-log", "logs", multiple=True, cls=Several, required=True, type=click.Path(),
+@click.option("--template", help="box: a bed and a column; three_axis: a machining centre of boxes; lumped: no mesh")
+@click.option("--from-log", "logs", multiple=True, cls=Several, type=click.Path(),
               help="CSV or XLSX files, or run folders")  # fmt: skip
 @click.option(
     "--sealed", multiple=True, cls=Several, type=click.Path(), help="logs that are scored and never fitted to"
@@ -28,15 +29,34 @@ def _pairs(context: click.Context, option: click.Parameter, given: tuple[str, ..
 @click.option("--axis", "axes", multiple=True, callback=_pairs, metavar="dx=COLUMN",
               help="column that measures a displacement; repeat")  # fmt: skip
 def command(
-    folder: str, logs: tuple[str, ...], sealed: tuple[str, ...], units: dict[str, str], axes: dict[str, str]
+    folder: str,
+    template: str | None,
+    logs: tuple[str, ...],
+    sealed: tuple[str, ...],
+    units: dict[str, str],
+    axes: dict[str, str],
 ) -> None:
-    """Propose a machine in FOLDER that predicts the displacements of logs: a lumped network, its runs and a page.
+    """Begin a machine in FOLDER from a template, or propose one that predicts the displacements of logs.
+
+    --template: a description whose comments teach, with a run, which builds, verifies and runs as it is.
+
+    --from-log: a lumped network, its runs and a page.
 
     Columns are taken for what their headers say, else guessed by name and values, and shown. Each node follows a logged
     temperature, or the heat of a logged speed or power, with one time constant; how far each moves the tool is fitted
     to all logs. The page compares it with ridge regression on runs that neither has seen.
     """
     from twin.errors import TwinError
+
+    if (template is None) == (not logs):
+        raise TwinError("give either a template or logs", "twin new", f"twin new {folder} --template box, for example")
+    if template is not None:
+        from twin.face.template import from_template
+
+        if sealed or units or axes:
+            raise TwinError("--sealed, --unit and --axis are of logs", "twin new", "leave them out with --template")
+        click.echo(str(from_template(template, folder)))
+        return
     from twin.face.new import NewOptions, from_log
     from twin.progress import bar
 

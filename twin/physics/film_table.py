@@ -198,6 +198,11 @@ FILMS: dict[str, Law] = {
         f"{_MIXED} of rotating_cylinder and free_horizontal_cylinder",
         Validity(forced_convection.mixed_rotating_cylinder_holds, f"Re < 4.3e5, Ra <= 1e12, {_AIR}"),
     ),
+    "logged_film": Law(
+        films.logged_film, "film", "definition",
+        {"coefficient": Argument("W/(m^2*K)", "logged film coefficient")}, {},
+        formula="h = h_logged",
+    ),
     "switched_film": Law(
         films.switched_film, "film", "assumed: what is switched is proportional to its time on",
         {"switch": Argument("1", "0 off, 1 on", low=0.0, high=1.0)},

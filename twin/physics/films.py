@@ -21,6 +21,11 @@ def forced_film(speed, natural, forced, exponent):
     return natural + forced * jnp.where(v > 0.0, power, 0.0)
 
 
+def logged_film(coefficient):
+    """A film coefficient that is logged or known beforehand: alpha = coefficient. Source: definition."""
+    return jnp.asarray(coefficient)
+
+
 def switched_film(switch, natural):
     """A film that is switched, such as a coolant or a blast of air: alpha = alpha_on s, s = 0 off, 1 on.
 
