@@ -13,6 +13,7 @@ from benchmarks.shared_space import products
 from benchmarks.steel_profile_model import profile
 from twin.build.body_matrix import system_matrix
 from twin.build.compress import Tolerances, balanced, galerkin
+from twin.build.frequency_training import drawn_films, responses
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
 from twin.build.scenario import theta_bounds
@@ -45,28 +46,6 @@ def transfer(body: AffineBody, theta: np.ndarray, omega: np.ndarray) -> np.ndarr
 def largest(H: np.ndarray) -> float:
     """The largest singular value over all frequencies."""
     return float(np.linalg.norm(H, 2, axis=(1, 2)).max())
-
-
-def drawn(low: np.ndarray, high: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
-    rng = np.random.default_rng(seed)
-    return [low * (high / low) ** rng.random(len(low)) for _ in range(count)]
-
-
-def responses(body: AffineBody, thetas: list[np.ndarray]) -> np.ndarray:
-    """Snapshots (n, m) of the states for every input over frequency, all decades alike.
-
-    The largest error over all frequencies counts. A root of the controllability Gramian, whose snapshots have
-    sqrt(omega) as a further weight, is for errors squared and summed over time: with it `galerkin` has four times
-    the error.
-    """
-    columns = []
-    for theta in thetas:
-        rate, U = np.linalg.eigh(system_matrix(body, theta, 0.0))
-        B = U.T @ (body.M * theta[list(body.theta)])
-        for w in np.logspace(-6, 2, 20):
-            Z = U @ (B / (rate + 1j * w)[:, None])
-            columns += [Z.real, Z.imag]
-    return np.column_stack(columns)
 
 
 def hankel(body: AffineBody, theta: np.ndarray) -> np.ndarray:
@@ -103,7 +82,7 @@ def grows(body: AffineBody, high: np.ndarray) -> tuple[float, np.ndarray] | None
 
 def training(model: MachineModel) -> list[np.ndarray]:
     """The films that snapshots are made at, and matrices fitted at."""
-    return drawn(*theta_bounds(model.load_model), TRAINING, 5)
+    return drawn_films(*theta_bounds(model.load_model), TRAINING, 5)
 
 
 Method = Callable[..., MachineModel]  # (rich, snapshots, states, unit) -> reduced
@@ -124,7 +103,7 @@ def errors(
     rich_body = project(full, rich_basis(full, low, high, TIGHT))
     rich: MachineModel = replace(machine, bodies=(rich_body,))
     snapshots = [responses(rich_body, training(rich))]
-    films = drawn(low, high, HELD_OUT, FRESH)
+    films = drawn_films(low, high, HELD_OUT, FRESH)
     exact = [transfer(full, theta, OMEGA) for theta in films]
 
     def worst(body: AffineBody) -> float:

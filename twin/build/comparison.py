@@ -22,6 +22,9 @@ from twin.rom.poses import pose_weights
 from twin.rom.tcp import elastic_rows, inputs, is_exact
 
 TINY = 1e-12  # K or m: an output that does not move at all has no relative error
+# Of the largest scenario: one in which less happens is scaled as if it were that large. Loads drawn near zero are no
+# smaller case of the same machine, but next to none: an error of 1 mK in 4 mK says nothing of 10 K. A judgement.
+IDLE = 0.01
 # Steps of the reference within one: of a method of second order a quarter of the step leaves a sixteenth of its error,
 # where the step resolves what moves. `step_halved` says how much it leaves.
 FINER = 4
@@ -64,13 +67,15 @@ class Comparison:
 
         Exact for scenarios with given films, because the models are linear in loads and air temperatures then: the
         scenario with all of them scaled has all responses and errors scaled. An estimate where films follow the
-        surface: scaled loads have other films, in both models alike.
+        surface: scaled loads have other films, in both models alike. Scenarios in which next to nothing happens (IDLE)
+        are scaled as larger ones.
         """
-        T = self.temperature_error * (limits.at_temperature_range / np.maximum(self.temperature_case, TINY))[:, None]
-        u = (
-            self.displacement_error
-            * (limits.at_displacement_range / np.maximum(self.displacement_case, TINY))[:, None, None]
+        T_size, u_size = (
+            np.maximum(case, max(IDLE * case.max(initial=0.0), TINY))
+            for case in (self.temperature_case, self.displacement_case)
         )
+        T = self.temperature_error * (limits.at_temperature_range / T_size)[:, None]
+        u = self.displacement_error * (limits.at_displacement_range / u_size)[:, None, None]
         return T.max(axis=0), u.max(axis=0)
 
     def times(self, factor: float) -> Comparison:

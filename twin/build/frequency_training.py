@@ -1,7 +1,9 @@
 """Snapshots for the compression of a body whose inputs are all alike unknown: responses over frequency and films.
 
 Scenarios of loads stand for what a machine meets; of bare matrices nobody knows what they will meet, so every input
-counts by itself, at its range, over all frequencies: a root of the controllability Gramian, averaged over films.
+counts by itself, at its range, over all frequencies, and all decades alike: it is the largest error over them that
+counts. A root of the controllability Gramian, whose snapshots have the root of the frequency as a further weight, is
+for errors squared and summed over time: with it `galerkin` has four times the error (`benchmarks steel_profile`).
 """
 
 from __future__ import annotations
@@ -32,6 +34,6 @@ def responses(body: AffineBody, thetas: Sequence[np.ndarray], heat: float = 0.0)
         rate, U = np.linalg.eigh(system_matrix(body, theta, 0.0))
         B = U.T @ np.column_stack([body.M * theta[list(body.theta)], heat * body.B])
         for w in FREQUENCIES:
-            Z = U @ (B / (rate + 1j * w)[:, None]) * np.sqrt(w)  # d omega = omega d(log omega)
+            Z = U @ (B / (rate + 1j * w)[:, None])
             columns += [Z.real, Z.imag]
     return np.column_stack(columns)
