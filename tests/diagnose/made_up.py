@@ -9,7 +9,7 @@ import numpy as np
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival, Series, Unknown, Verdict, Window
 from twin.diagnose.result.place import Network, Scene, Shell, Support
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
-from twin.pictures.trace import Trace
+from twin.logs.trace import Trace
 
 FAMILIES = ("heat_source", "film_gain", "forced_convection", "joint", "zone", "sensor", "signal", "coolant", "sun")
 

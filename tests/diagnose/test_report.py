@@ -39,7 +39,7 @@ from twin.diagnose.search.gain import gains
 from twin.diagnose.search.verdict import pulls_of, verdict_of
 from twin.errors import TwinError
 
-SECTIONS = {"evidence", "gain", "residuals", "decision", "pulls", "unknown", "limits", "notes"}
+SECTIONS = {"channels", "evidence", "gain", "residuals", "decision", "pulls", "unknown", "limits", "notes"}
 VOID = {"meta", "br", "img", "hr", "link", "input"}
 
 

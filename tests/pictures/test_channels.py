@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from twin.logs.trace import Trace
 from twin.pictures.channels import ASIDE, channel_figure, shown, write_channels
-from twin.pictures.trace import Trace
 
 TIME = np.arange(0.0, 7200.0, 300.0)
 

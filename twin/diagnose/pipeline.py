@@ -44,10 +44,10 @@ from twin.diagnose.search.support import support_of
 from twin.diagnose.search.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.errors import ArtefactError, LogError
 from twin.logs.run import Run
+from twin.logs.trace import Trace
 from twin.machine.description import Machine
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
-from twin.pictures.trace import Trace
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from twin.calibrate.fit.fit import Iteration, Stop
     from twin.calibrate.fit.options import Options
     from twin.logs.run import Run
-    from twin.pictures.trace import Trace
+    from twin.logs.trace import Trace
     from twin.rom.artefact import Artefact
     from twin.rom.parameter import Parameter
 

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from twin.atomic import atomic_path
+from twin.logs.trace import Trace
 from twin.pictures.style import INK, MUTED, RC, figure
-from twin.pictures.trace import Trace
 
 COLUMNS = 4
 MOST = 40  # panels: channels with something wrong first, then displacements, then those that are met worst

@@ -10,7 +10,7 @@ import numpy as np
 
 from twin.calibrate.channels.judge import Judgement, words
 from twin.logs.run import Run
-from twin.pictures.trace import Trace
+from twin.logs.trace import Trace
 
 
 def channel_rows(traces: Sequence[Trace], judgement: Judgement, names: Sequence[str]) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ from twin.calibrate.fit.channel_table import TCP
 from twin.calibrate.fit.fit import Fit
 from twin.calibrate.fit.measured import BIN, Measured
 from twin.logs.run import Run
-from twin.pictures.trace import Trace
+from twin.logs.trace import Trace
 
 
 def traces_of(fit: Fit, runs: Sequence[Run], judgement: Judgement | None = None) -> tuple[Trace, ...]:

@@ -19,7 +19,7 @@ from twin.calibrate.score.compare import TCP, LeftOut, channels, left_out
 from twin.calibrate.score.metrics import Figures, figures
 from twin.calibrate.score.pieces import Piece, Rows, input_names, members, rows_of, split
 from twin.logs.run import Run, Segment
-from twin.pictures.trace import Trace
+from twin.logs.trace import Trace
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
 from twin.run.replay import replay

@@ -12,8 +12,8 @@ import numpy as np
 
 from twin.diagnose.result.place import Scene, Support
 from twin.diagnose.result.plan import Plan
+from twin.logs.trace import Trace
 from twin.machine.effects.effect import Window
-from twin.pictures.trace import Trace
 
 Verdict = Literal["named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing", "too_poor"]
 VERDICTS: tuple[Verdict, ...] = (
