@@ -7,6 +7,7 @@ formats that it knows, mapdl-archive the Ansys archive, meshio the VTU file. Nee
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import gmsh
@@ -101,7 +102,8 @@ def main() -> None:
             gmsh.option.setNumber("Mesh.SaveElementTagType", 2 if ending in ("bdf", "vtk") else 1)
             gmsh.option.setNumber("Mesh.MshFileVersion", 2.2 if ending == "msh22" else 4.1)
             stem = f"{name}_22.msh" if ending == "msh22" else f"{name}.{ending}"
-            gmsh.write(str(HERE / stem))
+            with contextlib.chdir(HERE):  # an Abaqus file begins with the path that it was given
+                gmsh.write(stem)
         gmsh.finalize()
         archive(name)
     tagged("tetra2")
