@@ -56,11 +56,7 @@ def judged(
         f"withdrawn: {names}. It explains the runs that were looked at, and on the sealed run it makes {len(worse)} of "
         f"the {len(moved)} channels that it moves worse beyond chance"
     )
-    # a number that was only a little far off, beside which nothing passes its threshold, leaves nothing to be explained
-    thresholds = found.detector.thresholds
-    misfit = any(statistic > thresholds[name] for name, statistic in found.steps[0].observed.items())
-    left = tuple(c for c in causes if c not in extension)
-    return Judged("unknown" if misfit or left else "nothing", left, (), table, note)
+    return Judged("unknown", tuple(c for c in causes if c not in extension), (), table, note)
 
 
 def _noise(detector: Detector, m: Measured) -> tuple[np.ndarray, np.ndarray]:
