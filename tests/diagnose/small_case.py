@@ -129,3 +129,13 @@ def made_detector() -> Detector:
     instruments = instruments_of(study(), NOISE, TCP_NOISE)
     form = Form(steep=form_of(machine()).steep)  # a lumped machine, with contacts as uncertain as a mesh's
     return make_detector(study(), FAMILIES, instruments, POLICY, form, counts=(24, 40))
+
+
+def source_off(pull: float) -> tuple[int, np.ndarray]:
+    """The first source's place among the parameters, and outputs (m,) without noise with it so many prior standard
+    deviations from its described value."""
+    own = study()
+    x = np.zeros(len(own.probed.parameters))
+    j = next(i for i, p in enumerate(own.probed.parameters) if p.kind == "source")
+    x[j] = pull
+    return j, np.concatenate([own.outputs(k, x) for k in own.fitted])

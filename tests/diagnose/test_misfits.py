@@ -120,10 +120,7 @@ def test_what_is_named_beside_another_cause_is_well_above_its_threshold():
 def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(stays, monkeypatch):
     """Also where that is too weak to be named beside another cause."""
     detector = small_case.made_detector()
-    study = detector.study
-    x = np.zeros(len(study.probed.parameters))
-    x[next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")] = 4.5
-    y = np.concatenate([study.outputs(k, x) for k in study.fitted])
+    _, y = small_case.source_off(4.5)
     fitted = detector.fitter(y)
     x0, _ = settled(detector, y, ())
     declared = declared_candidates(detector, y, fitted)
@@ -145,10 +142,7 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
 def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
     """A joint in windows scores by its derivative, and removes next to nothing when it is refitted."""
     detector = small_case.made_detector()
-    study = detector.study
-    x = np.zeros(len(study.probed.parameters))
-    x[next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")] = 4.5
-    y = np.concatenate([study.outputs(k, x) for k in study.fitted])
+    _, y = small_case.source_off(4.5)
     fitted = detector.fitter(y)
     x0, _ = settled(detector, y, ())
     loose = loose_ones(detector, y, fitted, x0)
@@ -170,12 +164,7 @@ def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
 def test_without_its_tolerance_a_number_is_what_the_data_alone_say():
     """Of the fit that finds causes: as with a prior a hundred times as wide, but for its bounds."""
     detector = small_case.made_detector()
-    study = detector.study
-    n = len(study.probed.parameters)
-    j = next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")
-    x = np.zeros(n)
-    x[j] = 0.3
-    y = np.concatenate([study.outputs(k, x) for k in study.fitted])
+    j, y = small_case.source_off(0.3)
     fitted = detector.fitter(y)
     value, sigma = _untied(fitted, j)
     N, white = fitted.projector.N, detector.whiten(fitted.residual)
@@ -184,3 +173,17 @@ def test_without_its_tolerance_a_number_is_what_the_data_alone_say():
     covariance = np.linalg.inv(np.diag(precision) + N.T @ N)
     assert value == pytest.approx((covariance @ (N.T @ white))[j], rel=1e-3)
     assert sigma == pytest.approx(np.sqrt(covariance[j, j]), rel=1e-3)
+
+
+def test_a_number_that_one_fit_alone_is_sure_of_is_moved_by_the_other_too(monkeypatch):
+    detector = small_case.made_detector()
+    j, y = small_case.source_off(4.5)
+    fitted, n = detector.fitter(y), len(detector.study.probed.parameters)
+    unsure = lambda *_: (np.zeros(n), np.eye(n))  # noqa: E731
+    monkeypatch.setattr(sys.modules[loose_ones.__module__], "settled_alone", unsure)
+    limit = detector.pulls.settled.sigma * detector.pulls.settled.limit
+    moved = np.where(np.arange(n) == j, np.sign(fitted.x) * limit, 0.0)
+    found = {own.index: own for own in loose_ones(detector, y, fitted, 0.6 * moved)}
+    assert not found[j].settled
+    assert found[j].x > 1.96 * found[j].sigma
+    assert j not in {own.index for own in loose_ones(detector, y, fitted, 0.4 * moved)}

@@ -6,8 +6,6 @@ import twin.run.jax_setup  # noqa: F401  isort: skip
 
 import sys
 
-import numpy as np
-
 from tests.diagnose import small_case
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Gain
@@ -18,10 +16,7 @@ from twin.diagnose.search.verdict import verdict_of
 
 def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     detector = small_case.made_detector()
-    study = detector.study
-    x = np.zeros(len(study.probed.parameters))
-    x[next(i for i, p in enumerate(study.probed.parameters) if p.kind == "source")] = 4.5
-    found = search(detector, np.concatenate([study.outputs(k, x) for k in study.fitted]))
+    found = search(detector, small_case.source_off(4.5)[1])
     verdict, causes = verdict_of(found, FAMILIES)
     assert verdict == "out_of_tolerance"
     (cause,) = causes
@@ -30,7 +25,7 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
         """gain: share of a sensor's error that the cause takes from it in the sealed run."""
         table = (Gain("sealed", "housing", "K", 1.0, 1.0, 1.0 - gain, (gain - 0.1, gain + 0.1), True),)
         monkeypatch.setattr(sys.modules[judged.__module__], "gains", lambda *_: table)
-        told = judged(found, verdict, causes, FAMILIES, [study.runs[2].measured], 1)
+        told = judged(found, verdict, causes, FAMILIES, [detector.study.runs[2].measured], 1)
         return told.verdict, len(told.extension), told.note
 
     assert opened(0.5)[:2] == ("out_of_tolerance", 1)

@@ -48,7 +48,7 @@ class Facts:
     reference_temperature: float  # degC
     channels: tuple[Channel, ...]
     axis_channels: tuple[int, ...]  # of every linear axis: its position
-    strokes: tuple[tuple[float, float], ...]  # m, likewise
+    strokes: tuple[tuple[float, float], ...]  # m, of the same axes: lowest and highest position
     air: int  # channel of the temperature a machine at rest has; -1: `air_temperature` at all times
     air_temperature: float  # degC
     sensors: tuple[str, ...]

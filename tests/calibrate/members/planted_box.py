@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from tests.calibrate.members import planted
+
 TEXT = """
 [machine]
 name = "small_box"
@@ -71,28 +73,8 @@ point = [0.075, 0.075, 0.45]
 [tcp.work]
 surface = "column.z_min"
 """
-HIDDEN = """
-[signals.wall]
-unit = "degC"
-range = [0.0, 50.0]
-
-[environment.wall]
-signal = "wall"
-
-[nodes.holder]
-capacity = "2.4 kJ/K"
-area = "0.1 m^2"
-
-[films.holder]
-law = "constant_film"
-surfaces = ["holder"]
-environment = "wall"
-emissivity = 0.0
-parameters = { natural = "10 W/(m^2*K)" }
-
-[tcp.expansion]
-holder = ["0 um/K", "6 um/K", "-4 um/K"]
-"""
+# the body that `planted` has at the wall, under another name
+HIDDEN = f"{planted.HIDDEN}\n[tcp.expansion]\n{planted.MOVES}".replace("column", "holder")
 
 
 def hidden() -> str:
