@@ -24,7 +24,7 @@ from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.forward import search
+from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.look import Search
@@ -80,7 +80,7 @@ def judged(detector: Detector, trial: Trial) -> dict[str, Any]:
     plans = plans_of(detector, trial)
     own = emptied(detector, plans)
     y = measured_of(with_measured(detector.study, plans))
-    found = search(own, y)
+    found, _ = searched(own, y)
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     unknown = unknown_of(found) if verdict == "unknown" else None
     seconds = time.perf_counter() - began

@@ -29,7 +29,7 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
-from twin.diagnose.search.forward import search
+from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.sealed import judged as on_sealed
 from twin.diagnose.search.verdict import verdict_of, with_faults
@@ -99,8 +99,8 @@ def answer(row: Row) -> str:
     kind, place, size = row["hidden"]
     if kind == "nothing":
         return "nothing" if row["verdict"] == "nothing" else "false alarm"
-    if row["verdict"] in ("nothing", "unknown"):
-        return {"nothing": "missed", "unknown": "unknown"}[row["verdict"]]
+    if row["verdict"] in ("nothing", "too_poor", "unknown"):
+        return "unknown" if row["verdict"] == "unknown" else "missed"
     family = {"factor": "signal"}.get(kind, "sensor" if kind in IN_LOG else kind)
     sought = {_pair(f"{place}<>{size.removeprefix('sensors.')}")} if kind == "swapped" else {place}
     named = [(c[0], _pair(c[1]) if "<>" in c[1] else c[1]) for c in row["causes"]]
@@ -273,7 +273,7 @@ def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     ]
     stuck += broken_sensors(usable, study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
     own = emptied(detector, plans)
-    found = search(own, measured_of(with_measured(study, plans)))
+    found, _ = searched(own, measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     opened = on_sealed(found, verdict, causes, FAMILIES, plans[2:], 1)
     verdict, causes = opened.verdict, opened.causes

@@ -19,6 +19,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -63,9 +64,9 @@ def main() -> None:
     for half in halves:
         rows: list[Row] = []
         days = [p.stem for p in lathe_days()[half::2]]
-        rng = np.random.default_rng(half)
-        for k in range(pairs):
-            chosen = [days[int(i)] for i in rng.choice(len(days), 2, replace=False)]
+        every = list(combinations(days, 2))
+        order = np.random.default_rng(half).permutation(len(every))[:pairs]
+        for k, chosen in enumerate(every[int(i)] for i in order):
             path = OUT / f"{half}_{k}.jsonl"
             if not path.exists():
                 made = rows_of(artefact, chosen, faults, np.random.default_rng([half, k]))

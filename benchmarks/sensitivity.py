@@ -23,7 +23,7 @@ from twin.diagnose.faults.table import FAMILIES
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.forward import search
+from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.policy import POLICY, SearchPolicy, rules
 from twin.diagnose.search.verdict import verdict_of, with_faults
@@ -74,7 +74,7 @@ def said(trial: str, policies: list[SearchPolicy]) -> list[Said]:
     y, own = measured_of(with_measured(study, plans)), emptied(made, plans)
     result = []
     for policy in policies:
-        verdict, causes = with_faults(*verdict_of(search(replace(own, policy=policy), y), FAMILIES), faults)
+        verdict, causes = with_faults(*verdict_of(searched(replace(own, policy=policy), y)[0], FAMILIES), faults)
         result.append((verdict, tuple((c.family, c.place) for c in causes)))
     return result
 

@@ -13,9 +13,11 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import exchanged
+from twin.diagnose.search.dispersion import raised, searched
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import predicted
-from twin.diagnose.search.verdict import limits_of, pulls_of, verdict_of
+from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.verdict import limits_at, limits_of, pulls_of, verdict_of
 
 
 def measured(kind="", place="", size=0.0, seed=0, levels=(1.0,)):
@@ -111,3 +113,50 @@ def test_limits_are_sizes_that_would_pass():
     )
     by = {(limit.family, limit.unit): limit.size for limit in limits}
     assert all(limit.size >= by[limit.family, limit.unit] for limit in limits_of(wide))
+
+
+# --- thresholds grow with what a model that is wrong in its form leaves, but not with what a cause explains
+
+
+def slow_discrepancy(size: float) -> np.ndarray:
+    """(m,) what no cause does: every channel swings slowly in its own way, by size [K], and the tool by as many um."""
+    study, parts, phase = small_case.study(), [], 0.0
+    for k in study.fitted:
+        (b, s), (rows, _) = study.runs[k].shapes
+        for n, channels, unit in ((b, s, 1.0), (rows, 3, 1e-6)):
+            hours = np.linspace(0.0, small_case.HOURS, n)[:, None]
+            lasts = np.linspace(1.1, 2.3, channels)
+            parts.append((size * unit * np.sin(2 * np.pi * hours / lasts + lasts * (7.0 + phase))).ravel())
+        phase += 3.0
+    return np.concatenate(parts)
+
+
+def test_noise_alone_leaves_a_dispersion_of_hardly_one():
+    _, own = searched(small_case.made_detector(), measured(seed=1))
+    assert own.share == pytest.approx(0.8, abs=0.2)
+
+
+def test_what_a_cause_explains_does_not_raise_thresholds():
+    detector = small_case.made_detector()
+    found, own = searched(detector, measured("heat", "housing", 200.0, seed=3))
+    assert found.accepted[0].hypothesis.name == "housing"
+    assert own.share < POLICY.dispersed
+    assert found.detector.thresholds == detector.thresholds
+
+
+def test_nothing_is_named_in_a_model_that_is_wrong_in_its_form():
+    detector, y = small_case.made_detector(), measured(seed=4) + slow_discrepancy(0.3)
+    found, own = searched(detector, y)
+    assert own.share > POLICY.dispersed
+    assert verdict_of(found, FAMILIES) == ("too_poor", ())
+    assert all(threshold >= own.left for threshold in found.detector.thresholds.values())
+    before, after = limits_at(detector), limits_at(raised(detector, own))
+    assert all(after[place] >= size for place, size in before.items())
+    assert np.median([after[p] / before[p] for p in before]) > 3.0
+
+
+def test_a_cause_that_explains_more_than_all_that_is_left_is_named_all_the_same():
+    y = measured("heat", "housing", 400.0, seed=3) + slow_discrepancy(0.12)
+    found, own = searched(small_case.made_detector(), y)
+    assert own.share > POLICY.dispersed
+    assert [(a.hypothesis.family, a.hypothesis.name) for a in found.accepted] == [("heat_source", "housing")]

@@ -20,7 +20,7 @@ from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.result.diagnosis import Cause, Verdict
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.forward import search
+from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.verdict import unknown_of, verdict_of, with_faults
 from twin.machine.load import load_machine
@@ -67,7 +67,7 @@ def said(settings: Settings, name: str) -> Said:
         for run, p in zip([*usable, runs[2]], study.runs, strict=True)
     ]
     stuck += broken_sensors(usable, study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
-    found = search(emptied(detector, plans), measured_of(with_measured(study, plans)))
+    found, _ = searched(emptied(detector, plans), measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     states, coarse = STATES.get(name), None
     if states:

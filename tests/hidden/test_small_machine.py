@@ -14,7 +14,7 @@ from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.result.diagnosis import Cause, Verdict
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.forward import search
+from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.verdict import verdict_of
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
@@ -59,7 +59,7 @@ def said(detector: Detector, runs: list[Path]) -> tuple[Verdict, tuple[Cause, ..
         measured(study.probed.base, read_run(path), p.run.drive, p.run.name)
         for path, p in zip(runs, study.runs, strict=True)
     ]
-    return verdict_of(search(detector, measured_of(with_measured(study, plans))), FAMILIES)
+    return verdict_of(searched(detector, measured_of(with_measured(study, plans)))[0], FAMILIES)
 
 
 def in_machine(folder: Path, family: str) -> list[Path]:

@@ -32,12 +32,12 @@ from twin.diagnose.report.scene import scene_of
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Series, Unknown, Verdict
 from twin.diagnose.result.place import Scene
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
-from twin.diagnose.search.forward import search
+from twin.diagnose.search.dispersion import raised, searched
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
-from twin.diagnose.search.poor import too_poor
+from twin.diagnose.search.poor import poor_note
 from twin.diagnose.search.sealed import judged
 from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.support import support_of
@@ -180,7 +180,9 @@ def diagnose(
         known_family(settings.plan, settings.families)  # now, not after minutes
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     asked = named(settings.plan, detector) if settings.plan else []
-    found = search(detector, measured_of(study))
+    found, dispersion = searched(detector, measured_of(study))
+    if poor := dispersion.share > settings.policy.dispersed:
+        detector = raised(detector, dispersion)  # what was searched with in the end
     verdict, causes = verdict_of(found, settings.families)
     shown = found
     groups = {f.name: f.group for f in settings.families}
@@ -189,11 +191,7 @@ def diagnose(
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
-    poor = too_poor(shown, plans, usable, settings.temperature_sigma)
-    if poor is not None:
-        notes.insert(0, poor.note)
-        verdict, causes, shown = "too_poor", (), _beside_sensors(found, {})
-    searched = causes  # what was seen before any search has no statistic that channels could share
+    beside = causes  # what was seen before any search has no statistic that channels could share
     verdict, causes = with_faults(verdict, causes, faults)
     notes += [
         f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED and not c.rivals
@@ -202,12 +200,17 @@ def diagnose(
     verdict, causes, extension = opened.verdict, opened.causes, opened.extension
     if opened.note:  # what is shown is then the calibration beside faulty channels, as of any unknown
         notes.insert(0, opened.note)
-        shown, searched = _beside_sensors(found, groups), ()
+        shown, beside = _beside_sensors(found, groups), ()
+        verdict = "too_poor" if poor else verdict
+    if poor:
+        notes.insert(0, poor_note(shown, plans, usable, settings.temperature_sigma, dispersion))
     gains, described = opened.gains, ""
     only_read = bool(causes) and all(groups.get(c.family) == "reading" for c in causes)
-    if verdict == "unknown" or only_read:  # a probe that seems to drift may stand on a body that does
+    if verdict in ("unknown", "too_poor") or only_read:  # a probe that seems to drift may stand on a body that does
         missing = missing_members(artefact, shown, plans, usable, sealed, settings.seed, progress)
-        if missing is not None:
+        if missing is not None and poor:  # a member is no name in a model whose temperatures are wrong
+            notes.insert(1, f"what would help first: {missing.note}")
+        elif missing is not None:
             kept = () if only_read else causes
             verdict, causes, described = "named", (*kept, *missing.causes), missing.description
             gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
@@ -250,8 +253,8 @@ def diagnose(
             "window_error_K": study.probed.reduction[0],
             "window_error_m": study.probed.reduction[1],
         },
-        support=support_of(found) if searched and heat is None else None,
-        scene=_scene(machine, study.probed, searched or causes, heat),
+        support=support_of(found) if beside and heat is None else None,
+        scene=_scene(machine, study.probed, beside or causes, heat),
         plan=planned,
         traces=traces,
         channels=tuple(channel_rows(traces, judgement, names[: len(runs)])),

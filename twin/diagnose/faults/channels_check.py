@@ -12,6 +12,8 @@ from twin.calibrate.channels.finding import UNITS
 from twin.calibrate.channels.judge import Judgement, set_aside
 from twin.calibrate.channels.refute import THRESHOLDS, shape_of
 from twin.diagnose.result.diagnosis import Cause, Window
+from twin.logs.faults.breaks import rests_by_rounding
+from twin.logs.faults.series import temperature_series
 from twin.logs.faults.usable import BROKEN, usable
 from twin.logs.run import Run, Table
 from twin.logs.stuck import Standstill, frozen_throughout, standstills
@@ -24,13 +26,22 @@ _SAID = {"leap": "a leap", "offset": "an offset", "drift": "a drift", "swapped":
 def stuck_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[str]) -> tuple[list[Run], list[Cause]]:
     """Runs with the frozen stretch of every stuck sensor emptied, and a cause for each."""
     tables = {k: run.temperatures for k, run in enumerate(runs) if run.temperatures is not None}
-    parted = [(k, still) for k, table in tables.items() for still in standstills(table)]
+    parted = [(k, still) for k, table in tables.items() for still in _stuck(runs[k], table)]
     tables, causes = _emptied(tables, parted, sensors, names)
     own = list(tables)
     whole = [(own[i], still) for i, still in frozen_throughout([tables[k] for k in own])]
     tables, more = _emptied(tables, whole, sensors, names)
     causes = sorted([*causes, *more], key=lambda c: names.index(c.windows[0].run))
     return [replace(run, temperatures=tables.get(k)) for k, run in enumerate(runs)], causes
+
+
+def _stuck(run: Run, table: Table) -> list[Standstill]:
+    """The standstills of temperatures, but those of a rounded channel at its maximum."""
+    series = {s.name: s for s in temperature_series(run)}
+    return [
+        still for still in standstills(table)
+        if (s := series.get(still.name)) is None or not rests_by_rounding(s, int(np.searchsorted(s.row, still.last)))
+    ]  # fmt: skip
 
 
 def broken_sensors(runs: Sequence[Run], sensors: Sequence[str], names: Sequence[str]) -> list[Cause]:

@@ -299,7 +299,7 @@ def _limits(d: Diagnosis) -> tuple[str, str]:
         "The smallest size of each effect that would have been named in these data; smaller ones may be there unseen."
     )
     every = f"<p>{text}</p>{limits_table(d)}"
-    if d.verdict != "nothing":
+    if d.verdict not in ("nothing", "too_poor"):
         return "", every
     sizes = _items(map(limit_words, d.detection_limits))
     lead = "At half of all places these data would have shown, in 95 of 100 cases:"

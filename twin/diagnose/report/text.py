@@ -325,7 +325,7 @@ def summary_lines(diagnosis: Diagnosis) -> list[str]:
     far = beyond(d.pulls, 2.0)
     if far and d.verdict != "out_of_tolerance":
         lines.append(f"Worth a look: {joined([pull_words(p) for p in far[:2]])}.")
-    if d.detection_limits and d.verdict == "nothing":
+    if d.detection_limits and d.verdict in ("nothing", "too_poor"):
         shown = joined([limit_words(x) for x in d.detection_limits[:5]])
         lines.append(f"At half of all places these data would have shown, in 95 of 100 cases: {shown}.")
     before, after = (np.array([w[k] for w in d.whiteness], dtype=float) for k in (1, 2))

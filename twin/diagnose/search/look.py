@@ -41,7 +41,18 @@ class Search:
     g: np.ndarray  # (n_columns,) after the accepted ones
     heat: Heat  # likewise
     covariance: np.ndarray  # (n, n) of x
+    left: float  # sum of squares of what the last fit leaves, in units of noise and model discrepancy
     loose: tuple[Loose, ...] = ()  # declared numbers out of their tolerance, the farthest first
+
+    @property
+    def measured(self) -> int:
+        """Numbers that were measured in the fitted runs."""
+        return max(int(np.isfinite(self.residual).sum()), 1)
+
+    @property
+    def poor(self) -> bool:
+        """Whether the model is wrong in its form: what is left has many times the variance that it should have."""
+        return self.left > self.detector.policy.dispersed * self.measured
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,8 @@ def _rule(value: float, origin: Origin, meaning: str, unit: str = "") -> Any:
 class SearchPolicy:
     """What a search decides by; without a unit: shares, factors, counts."""
 
-    poor: float = _rule(
-        5.0, JUDGED, "of the rms left at half of the sensors, above which no cause is named", "sigma of a reading"
-    )
-    relieves: float = _rule(
-        0.5,
-        JUDGED,
-        "of what the recalibrated model leaves at half of the sensors: causes that leave less stand",
+    dispersed: float = _rule(
+        2.0, LUMPED, "of what is left per measured number, above which a cause must explain more than all that is left"
     )
     halves: float = _rule(
         0.5,
@@ -48,7 +43,6 @@ class SearchPolicy:
         0.7, JUDGED, "of what the model alone leaves of stretches left out: missing members leave less of them"
     )
     rows: int = _rule(24, JUDGED, "of displacements, four hours of one in ten minutes, that missing members need")
-    sensors: int = _rule(3, JUDGED, "of which a model may be too poor: of fewer nobody knows which is wrong")
     worst: int = _rule(3, JUDGED, "sensors that are told where a model is too poor")
     causes: int = _rule(3, JUDGED, "at most that are named together")
     tries: int = _rule(3, FIVE_AXIS, "rounds of candidates that the exact model refuses")

@@ -1,8 +1,7 @@
-"""A model too poor to diagnose: what its best fit leaves is far above noise at most sensors, so it is form.
+"""A model too poor to diagnose (`twin.diagnose.search.dispersion`): what would help.
 
-Then a cause that fits is a cause among many, and none is named. The useful answer is where the model fits worst, when,
-and which piece would help first: of all bodies that follow one logged column with one lag, the one that resembles most
-what is left there.
+The useful answer is where the model fits worst, when, and which piece would help first: of all bodies that follow one
+logged column with one lag, the one that resembles most what is left there.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import numpy as np
 from twin.calibrate.fit.measured import Measured
 from twin.calibrate.members.driver import drivers_of
 from twin.calibrate.members.responses import Candidate, candidates, responses
+from twin.diagnose.search.dispersion import Dispersion
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.look import Search
 from twin.logs.run import Run
@@ -31,43 +31,31 @@ class Piece:
     by: Candidate | None  # None where nothing was logged
     share: float  # of the mean square that is left, which a body that follows it would explain
 
-
-@dataclass(frozen=True)
-class Poor:
-    """How poor a model is."""
-
-    median: float  # over sensors: rms that is left, in standard deviations of one reading
-    pieces: tuple[Piece, ...]
-
     @property
-    def note(self) -> str:
-        told = []
-        for p in self.pieces:
-            help_ = "" if p.by is None else f": a body that {p.by.words} would explain {p.share:.0%} of it"
-            told.append(f"{p.sensor} {p.rms:.2g} K (worst from {p.hour:.0f} h of {p.run}){help_}")
-        left = f"at half of its sensors it leaves {self.median:.0f} times the noise of a reading, or more"
-        return f"the model is too poor to name a cause: {left}; fits worst: {'; '.join(told)}"
+    def words(self) -> str:
+        help_ = "" if self.by is None else f": a body that {self.by.words} would explain {self.share:.0%} of it"
+        return f"{self.sensor} {self.rms:.2g} K (worst from {self.hour:.0f} h of {self.run}){help_}"
 
 
-def too_poor(found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float) -> Poor | None:
-    """None where half of the sensors are left with less than policy.poor sigma [K], or causes explain most of it."""
-    policy = found.detector.policy
+def poor_note(
+    found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float, dispersion: Dispersion
+) -> str:
+    """In words, with the sensors that fit worst and what would help there; sigma [K] of one reading."""
+    told = (
+        f"the model is too poor to name a cause that explains less than all that is left, {dispersion.share:.2g} times "
+        "the variance that noise and model discrepancy have"
+    )
     sensors = plans[0].sensors
-    if len(sensors) < policy.sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
-        return None
-    before: list[np.ndarray] = []
-    errors: list[np.ndarray] = []
+    if not sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
+        return told
+    errors = []
     for k, m in enumerate(plans[: len(runs)]):
-        models = predicted(found, k)
-        for into, flat in ((before, models.recalibrated), (errors, models.extended)):
-            into.append(m.temperature - found.detector.study.runs[k].split(flat)[0])
-    rms = _rms(errors)
-    median = float(np.nanmedian(rms)) / sigma
-    explained = bool(np.nanmedian(rms) < policy.relieves * np.nanmedian(_rms(before)))
-    if explained or not median > policy.poor:
-        return None
-    order = np.argsort(-np.nan_to_num(rms))[: policy.worst]
-    return Poor(median, tuple(_piece(sensors[i], int(i), float(rms[i]), errors, plans, runs) for i in order))
+        flat = predicted(found, k).extended
+        errors.append(m.temperature - found.detector.study.runs[k].split(flat)[0])
+    rms = np.nan_to_num(_rms(errors))
+    worst = [int(i) for i in np.argsort(-rms)[: found.detector.policy.worst] if rms[i] > sigma]
+    pieces = [_piece(sensors[i], i, float(rms[i]), errors, plans, runs).words for i in worst]
+    return f"{told}; fits worst: {'; '.join(pieces)}" if pieces else told
 
 
 def _rms(errors: Sequence[np.ndarray]) -> np.ndarray:

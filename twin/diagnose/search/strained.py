@@ -64,7 +64,10 @@ def closed(
         amplitude=np.array([amplitude]), covariance=np.array([[variance]]),
     )  # fmt: skip
     x, covariance = settled(detector, y, (one,))
-    return Search(detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance, loose)
+    return Search(
+        detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
+        misfit(detector, fitted), loose,
+    )  # fmt: skip
 
 
 def loose_ones(detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.ndarray) -> tuple[Loose, ...]:

@@ -112,7 +112,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     if not causes:
         strained = strained_of(found)
         if not strained:
-            return "nothing", ()
+            return "too_poor" if found.poor else "nothing", ()
         return "ambiguous" if strained[0].rivals else "out_of_tolerance", strained
     lead, chosen = causes[0], found.accepted[0]
     for other, cosine in chosen.rivals:
