@@ -155,6 +155,19 @@ def test_nothing_is_named_in_a_model_that_is_wrong_in_its_form():
     assert np.median([after[p] / before[p] for p in before]) > 3.0
 
 
+def test_what_is_left_beyond_noise_must_be_explained_by_less_than_a_cause():
+    detector = small_case.made_detector()
+    found, own = searched(detector, measured(seed=4) + slow_discrepancy(0.07))
+    assert 1.3 < own.share < POLICY.dispersed
+    assert verdict_of(found, FAMILIES)[0] != "too_poor"
+    excess = own.left - own.measured
+    assert found.detector.least == excess > 36.0
+    assert min(found.detector.thresholds.values()) == pytest.approx(max(excess, min(detector.thresholds.values())))
+    named, same = searched(detector, measured("heat", "housing", 400.0, seed=3) + slow_discrepancy(0.07))
+    assert same.share < POLICY.dispersed
+    assert [a.hypothesis.name for a in named.accepted] == ["housing"]
+
+
 def test_a_cause_that_explains_more_than_all_that_is_left_is_named_all_the_same():
     y = measured("heat", "housing", 400.0, seed=3) + slow_discrepancy(0.12)
     found, own = searched(small_case.made_detector(), y)

@@ -32,7 +32,7 @@ from twin.diagnose.report.scene import scene_of
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Series, Unknown, Verdict
 from twin.diagnose.result.place import Scene
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
-from twin.diagnose.search.dispersion import raised, searched
+from twin.diagnose.search.dispersion import raised, searched, wrong_temperatures
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.missing import missing_members
@@ -181,8 +181,8 @@ def diagnose(
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     asked = named(settings.plan, detector) if settings.plan else []
     found, dispersion = searched(detector, measured_of(study))
-    if poor := dispersion.share > settings.policy.dispersed:
-        detector = raised(detector, dispersion)  # what was searched with in the end
+    detector = raised(detector, dispersion)  # what was searched with in the end
+    poor = dispersion.share > settings.policy.dispersed
     verdict, causes = verdict_of(found, settings.families)
     shown = found
     groups = {f.name: f.group for f in settings.families}
@@ -202,16 +202,17 @@ def diagnose(
         notes.insert(0, opened.note)
         shown, beside = _beside_sensors(found, groups), ()
         verdict = "too_poor" if poor else verdict
-    if poor:
+    if dispersion.least(settings.policy):
         notes.insert(0, poor_note(shown, plans, usable, settings.temperature_sigma, dispersion))
     gains, described = opened.gains, ""
     only_read = bool(causes) and all(groups.get(c.family) == "reading" for c in causes)
-    if verdict in ("unknown", "too_poor") or only_read:  # a probe that seems to drift may stand on a body that does
+    refused = verdict in ("nothing", "out_of_tolerance") and dispersion.heat  # since the model leaves more than that
+    if verdict in ("unknown", "too_poor") or refused or only_read:  # a probe that seems to drift may be on a body
         missing = missing_members(artefact, shown, plans, usable, sealed, settings.seed, progress)
-        if missing is not None and poor:  # a member is no name in a model whose temperatures are wrong
+        if missing is not None and wrong_temperatures(found):
             notes.insert(1, f"what would help first: {missing.note}")
         elif missing is not None:
-            kept = () if only_read else causes
+            kept = () if only_read or refused else causes
             verdict, causes, described = "named", (*kept, *missing.causes), missing.description
             gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
             notes.insert(0, missing.note)

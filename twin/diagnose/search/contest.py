@@ -28,8 +28,13 @@ from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 def misfit(detector: Detector, fitted: Fitted) -> float:
     """Sum of squares of what a fit leaves, in units of noise and model discrepancy."""
+    return float(misfit_of_each(detector, fitted).sum())
+
+
+def misfit_of_each(detector: Detector, fitted: Fitted) -> np.ndarray:
+    """(m,) what each number has in that sum."""
     white = detector.whiten(fitted.residual)
-    return float(white @ fitted.projector(white))
+    return np.asarray(white * fitted.projector(white))
 
 
 def worth(h: Hypothesis, policy: SearchPolicy = POLICY) -> float:

@@ -67,6 +67,7 @@ class Detector:
     lost: Lost
     pulls: Pulls
     policy: SearchPolicy  # that it is searched with: no number of its own depends on it
+    least: float = 0.0  # statistic that any cause needs, where the model is wrong in its form (`dispersion`)
 
     @property
     def whiten(self) -> Whitener:

@@ -21,7 +21,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, exchanged
-from twin.diagnose.search.contest import beginning, judged, misfit, proof, tried
+from twin.diagnose.search.contest import beginning, judged, misfit_of_each, proof, tried
 from twin.diagnose.search.declared import declared_candidates, declared_exactly, misplaced_candidates
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.growth import chilled, grown
@@ -97,7 +97,7 @@ def search(described: Detector, y: np.ndarray) -> Search:
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     return Search(
         detector, start.x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance,
-        misfit(detector, fitted), loose,
+        misfit_of_each(detector, fitted), loose,
     )  # fmt: skip
 
 

@@ -41,18 +41,19 @@ class Search:
     g: np.ndarray  # (n_columns,) after the accepted ones
     heat: Heat  # likewise
     covariance: np.ndarray  # (n, n) of x
-    left: float  # sum of squares of what the last fit leaves, in units of noise and model discrepancy
+    left: np.ndarray  # (m,) of the last fit: what each number has in the sum of squares, in units of all discrepancy
     loose: tuple[Loose, ...] = ()  # declared numbers out of their tolerance, the farthest first
-
-    @property
-    def measured(self) -> int:
-        """Numbers that were measured in the fitted runs."""
-        return max(int(np.isfinite(self.residual).sum()), 1)
 
     @property
     def poor(self) -> bool:
         """Whether the model is wrong in its form: what is left has many times the variance that it should have."""
-        return self.left > self.detector.policy.dispersed * self.measured
+        return self.dispersion() > self.detector.policy.dispersed
+
+    def dispersion(self, among: np.ndarray | None = None) -> float:
+        """Of what is left, per measured number; among (m,) bool: of these alone, 0 where none of them is measured."""
+        good = np.isfinite(self.residual)
+        good = good if among is None else good & among
+        return float(self.left[good].sum()) / max(int(good.sum()), 1)
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,9 @@ def _rule(value: float, origin: Origin, meaning: str, unit: str = "") -> Any:
 class SearchPolicy:
     """What a search decides by; without a unit: shares, factors, counts."""
 
+    chance: float = _rule(
+        3.0, DERIVED, "by which what is left is more than noise and model discrepancy", "standard deviations"
+    )
     dispersed: float = _rule(
         2.0, LUMPED, "of what is left per measured number, above which a cause must explain more than all that is left"
     )

@@ -41,10 +41,12 @@ def poor_note(
     found: Search, plans: Sequence[Measured], runs: Sequence[Run], sigma: float, dispersion: Dispersion
 ) -> str:
     """In words, with the sensors that fit worst and what would help there; sigma [K] of one reading."""
-    told = (
-        f"the model is too poor to name a cause that explains less than all that is left, {dispersion.share:.2g} times "
-        "the variance that noise and model discrepancy have"
-    )
+    policy = found.detector.policy
+    variance = f"{dispersion.share:.2g} times the variance that noise and model discrepancy have"
+    if dispersion.share > policy.dispersed:
+        told = f"the model is too poor to name a cause that explains less than all that is left, {variance}"
+    else:
+        told = f"even the best explanation leaves {variance}: a cause must explain more than this excess to be named"
     sensors = plans[0].sensors
     if not sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
         return told
@@ -53,7 +55,7 @@ def poor_note(
         flat = predicted(found, k).extended
         errors.append(m.temperature - found.detector.study.runs[k].split(flat)[0])
     rms = np.nan_to_num(_rms(errors))
-    worst = [int(i) for i in np.argsort(-rms)[: found.detector.policy.worst] if rms[i] > sigma]
+    worst = [int(i) for i in np.argsort(-rms)[: policy.worst] if rms[i] > sigma]
     pieces = [_piece(sensors[i], i, float(rms[i]), errors, plans, runs).words for i in worst]
     return f"{told}; fits worst: {'; '.join(pieces)}" if pieces else told
 

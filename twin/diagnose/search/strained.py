@@ -20,7 +20,7 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.loss_law import is_source
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns
-from twin.diagnose.search.contest import beginning, bent, exact, misfit
+from twin.diagnose.search.contest import beginning, bent, exact, misfit, misfit_of_each
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search, Step, look
 from twin.diagnose.search.refit import refit
@@ -66,7 +66,7 @@ def closed(
     x, covariance = settled(detector, y, (one,))
     return Search(
         detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
-        misfit(detector, fitted), loose,
+        misfit_of_each(detector, fitted), loose,
     )  # fmt: skip
 
 
@@ -84,7 +84,8 @@ def loose_ones(detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.nd
         x, covariance = settled_alone(detector.fitter, y, (j,))
         estimates = ((float(x[j]), float(np.sqrt(covariance[j, j])), True), (*_untied(fitted, j), False))
         for value, sigma, by_settled in estimates[: 2 if by_settling[j] >= detector.policy.alone else 1]:
-            if np.sign(fitted.x[j]) * value > max(detector.policy.outside, detector.policy.sure * sigma):
+            sure = max(detector.policy.sure, np.sqrt(detector.least))
+            if np.sign(fitted.x[j]) * value > max(detector.policy.outside, sure * sigma):
                 rivals = _signals(detector, j, value, sigma, float(strain[j]) ** 2)
                 found.append(Loose(j, value, sigma, float(strain[j]), rivals, by_settled))
                 break
@@ -270,4 +271,4 @@ def _freed(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> 
     if fault_of(h).conducts:  # as a logarithm: derivatives at many times a film say little of the film itself
         change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
     statistic = (change / sigma) ** 2
-    return (fitted, replace(one, statistic=statistic)) if statistic >= one.threshold else None
+    return (fitted, replace(one, statistic=statistic)) if statistic >= max(one.threshold, detector.least) else None

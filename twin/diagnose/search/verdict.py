@@ -110,9 +110,11 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
     if not causes:
+        if found.poor:  # whose parameters go wherever they hide its form
+            return "too_poor", ()
         strained = strained_of(found)
         if not strained:
-            return "too_poor" if found.poor else "nothing", ()
+            return "nothing", ()
         return "ambiguous" if strained[0].rivals else "out_of_tolerance", strained
     lead, chosen = causes[0], found.accepted[0]
     for other, cosine in chosen.rivals:
