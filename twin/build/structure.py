@@ -110,10 +110,8 @@ class Structure(ElasticStructure):
 
     def _port_displacements(self, positions: Positions, fields: Sequence[np.ndarray]) -> np.ndarray:
         """w = H T + F p + R a (P,) of all bodies, with every nut as the datum of its axis."""
-        J = self.system.gap_rows(positions)
         HT = np.concatenate([b.H @ T for b, T in zip(self.bodies, fields, strict=True)])
-        f, a = self._solve(J, J @ HT, np.zeros(6 * len(self.bodies)))
-        return HT - self._flexibility @ (J.T @ f) + self._motions @ a
+        return self.port_displacements(positions, HT)
 
     def solve(self, positions: Positions, fields: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Spring forces (s,) [N], positive where the gap opens, in the order of `system.names`, and rigid motions

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from twin.errors import TwinError
 from twin.face.inputs import Quantity, positive
 
@@ -99,6 +97,7 @@ class Plot:
             poses=n.poses,
             tcp=n.tcp,
             tcp_actual=n.tcp_actual,
-            outside=np.concatenate([[False], n.flags.any(axis=1)]),
+            flags=n.flags,
+            flag_names=n.flag_names,
             states=n.states,
         )

@@ -26,8 +26,14 @@ class Drawn:
     poses: np.ndarray  # (n_poses, n_pose_axes) m
     tcp: np.ndarray  # (n + 1, n_poses, 3) m
     tcp_actual: np.ndarray  # (n + 1, 3) m
-    outside: np.ndarray  # (n + 1,) bool: the step that ends here was flagged
+    flags: np.ndarray  # (n, n_flags) bool: the step was outside what was certified
+    flag_names: tuple[str, ...]
     states: np.ndarray  # (n + 1, N) artefact coordinates
+
+    @property
+    def outside(self) -> np.ndarray:
+        """(n + 1,) bool: the step that ends here was flagged."""
+        return np.concatenate([[False], self.flags.any(axis=1)])
 
     def at(self, hours: float) -> int:
         """The edge nearest to a time [h]."""
@@ -62,7 +68,8 @@ def read_result(folder: Path, artefact: Artefact) -> Drawn:
                 poses=f["pose_position"][...],
                 tcp=f["tcp"][...],
                 tcp_actual=f["tcp_actual"][...],
-                outside=np.concatenate([[False], f["flags"][...].any(axis=1)]),
+                flags=f["flags"][...].astype(bool),
+                flag_names=strings(f["flag"]),
                 states=f["states"][...],
             )
     except (OSError, KeyError) as e:

@@ -75,6 +75,15 @@ class ElasticStructure:
         f, _ = self._solve(J, -J @ (self._flexibility @ t.T), (t @ self._motions).T)
         return tuple(np.split(t + f.T @ J, self.system.offsets[1:-1], axis=1))
 
+    def port_displacements(self, positions: Positions, heat: np.ndarray) -> np.ndarray:
+        """w = h + F p + R a (P,) of all bodies, with every nut as the datum of its axis.
+
+        heat: h (P,), displacements by heat of the supported bodies' ports. Raises Mechanism where a body moves freely.
+        """
+        J = self.system.gap_rows(positions)
+        f, a = self._solve(J, J @ heat, np.zeros(6 * len(self.bodies)))
+        return np.asarray(heat - self._flexibility @ (J.T @ f) + self._motions @ a)
+
     def refuse_mechanism(self, positions: Positions) -> None:
         """Raises Mechanism where a body can move freely, as `rows` does; displacements are not solved for."""
         J = self.system.gap_rows(positions)

@@ -1,0 +1,65 @@
+"""The front end as a page: with its files beside it from a server, or with everything inside one file."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from twin.atomic import atomic_path
+
+STYLES = ("vendor/uplot.min.css", "page.css")
+SCRIPTS = (
+    "vendor/three.min.js", "vendor/uplot.min.js", "colours.js", "store.js", "stage.js", "surface.js", "workspace.js",
+    "charts.js", "panels.js", "page.js", "live.js", "start.js",
+)  # fmt: skip
+_STRICT = "default-src 'none'; img-src data: blob:; base-uri 'none'; form-action 'none'"
+
+
+@cache
+def text(name: str) -> str:
+    """A file of the front end."""
+    return (resources.files("twin.page") / "front" / name).read_text(encoding="utf-8")
+
+
+def served_page() -> str:
+    """The page whose files a server has."""
+    styles = "\n".join(f'<link rel="stylesheet" href="{name}">' for name in STYLES)
+    scripts = "\n".join(f'<script src="{name}"></script>' for name in SCRIPTS)
+    return _filled(policy="", styles=styles, content="", scripts=scripts)
+
+
+def frozen_page(content: Mapping[str, Any]) -> str:
+    """The page with its content and all it needs within; its policy allows these scripts and nothing from elsewhere."""
+    script, style = "\n".join(text(name) for name in SCRIPTS), "\n".join(text(name) for name in STYLES)
+    policy = f"{_STRICT}; script-src '{_hash(script)}'; style-src '{_hash(style)}'"
+    # within a script element "</" and "<!--" would end it or hide its end
+    data = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return _filled(
+        policy=f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+        styles=f"<style>{style}</style>",
+        content=f'<script type="application/json" id="content">{data}</script>',
+        scripts=f"<script>{script}</script>",
+    )
+
+
+def write_page(path: Path, content: Mapping[str, Any]) -> None:
+    """The frozen page as a file, whole or not at all. Raises TwinError where it cannot be written."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(frozen_page(content), encoding="utf-8", newline="\n")
+
+
+def _filled(**parts: str) -> str:
+    page = text("page.html")
+    for name, part in parts.items():
+        page = page.replace(f"<!--{name}-->", part)
+    return page
+
+
+def _hash(code: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(code.encode("utf-8")).digest()).decode("ascii")
