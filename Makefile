@@ -82,7 +82,7 @@ notebooks: $(READY) ## execute the notebooks and check the numbers they assert
 .PHONY: lock
 lock: ## resolve requirements.lock anew (keeps pins that still hold; UPGRADE=1 moves them)
 	@[ -x .cache/lock/bin/uv ] || { "$(PYTHON)" -m venv .cache/lock && .cache/lock/bin/pip install --quiet uv; }
-	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --extra cluster --extra live --universal \
+	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --extra cluster --extra live --extra serve --universal \
 	    --python-version 3.11 --generate-hashes --no-config --no-emit-index-url --quiet \
 	    --custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o requirements.lock
 

@@ -11,13 +11,13 @@ import click
 def command(artefact: str, output: str) -> None:
     """Draw the result that `twin run ARTEFACT RUN -o OUTPUT` left in OUTPUT.
 
-    Writes temperatures.png, tcp.png, workspace.png, surface.png and index.html beside it.
+    Writes temperatures.png, tcp.png, workspace.png and surface.png beside it, and index.html: the page of `twin serve`,
+    which needs nothing beside it.
     """
     from pathlib import Path
 
-    from twin.pictures.report import write_report
+    from twin.face.report import report
     from twin.progress import bar
-    from twin.rom.artefact import read_artefact
 
-    for path in write_report(read_artefact(Path(artefact)), Path(output), bar):
+    for path in report(artefact, Path(output), bar):
         click.echo(path)

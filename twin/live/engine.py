@@ -39,6 +39,9 @@ class Engine(Protocol):
     def displacements(self) -> list[float]:
         """TCP displacement [m] at the end of the last step, tool minus work: 3 * pose + component."""
 
+    def states(self) -> list[float]:
+        """Coordinates of the artefact at the end of the last step, bodies one after the other."""
+
     def flags(self) -> list[str]:
         """In what the last step was outside what was certified."""
 

@@ -41,6 +41,8 @@ class CEngine:
         self._steps = function("steps", ctypes.c_long, machine)
         self._balance = function("balance", real, machine)
         self._sensors = function("sensors", ctypes.POINTER(real), machine)
+        self._states = function("states", ctypes.POINTER(real), machine)
+        self._state_count = int(function("state_count", ctypes.c_int)())
         self._flags = function("flags", ctypes.POINTER(ctypes.c_ubyte), machine)
         self._poses = function("poses", None, machine, ctypes.POINTER(real))
         self._restore = function("restore", None, machine, ctypes.c_char_p)
@@ -69,6 +71,9 @@ class CEngine:
     def displacements(self) -> list[float]:
         self._poses(self._machine, self._moved)
         return list(self._moved)
+
+    def states(self) -> list[float]:
+        return list(self._states(self._machine)[: self._state_count])
 
     def flags(self) -> list[str]:
         raised = self._flags(self._machine)

@@ -141,6 +141,10 @@ class JaxEngine:
         found: list[float] = (self._G @ self._z).tolist()
         return found
 
+    def states(self) -> list[float]:
+        found: list[float] = self._z.tolist()
+        return found
+
     def flags(self) -> list[str]:
         return list(self._flags)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 FORMAT = "twin live health"
+STEP = "twin live step"
 EVENTS = 1 << 20  # bytes of events.jsonl; one older file is kept
 LATENCIES = 1000  # last blocks that percentiles are of
 
@@ -40,18 +41,27 @@ class Latency:
 
 
 class HealthFiles:
-    """health.json, replaced as a whole, and events.jsonl, a line for every change of mode; bounded."""
+    """health.json and step.json, replaced as a whole, and events.jsonl, a line for every change of mode; bounded."""
 
     def __init__(self, folder: Path):
         self.health, self.events = folder / "health.json", folder / "events.jsonl"
+        self._step = folder / "step.json"
 
     def write(self, told: dict[str, Any]) -> None:
-        part = self.health.with_name(".health.json.part")
-        part.write_text(json.dumps(told, indent=1), encoding="utf-8")
-        os.replace(part, self.health)
+        _replace(self.health, json.dumps(told, indent=1))
+
+    def step(self, told: dict[str, Any]) -> None:
+        """What the model has come to: read by `twin serve`, which draws the machine from it."""
+        _replace(self._step, json.dumps({"format": STEP, **told}))
 
     def event(self, told: dict[str, Any]) -> None:
         if self.events.exists() and self.events.stat().st_size > EVENTS:
             os.replace(self.events, self.events.with_name("events.before.jsonl"))
         with self.events.open("a", encoding="utf-8") as f:
             f.write(json.dumps(told) + "\n")
+
+
+def _replace(path: Path, text: str) -> None:
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, path)

@@ -41,6 +41,8 @@ int twin_live_feed(twin_live *l, int rows, const double *time, const twin_real *
 long twin_live_steps(const twin_live *l) { return l->m.steps; }
 double twin_live_balance(const twin_live *l) { return l->m.balance_error; }
 const twin_real *twin_live_sensors(const twin_live *l) { return l->m.sensor; }
+const twin_real *twin_live_states(const twin_live *l) { return l->m.z; }
+int twin_live_state_count(void) { return TWIN_STATES; }
 const unsigned char *twin_live_flags(const twin_live *l) { return l->m.flag; }
 void twin_live_poses(const twin_live *l, twin_real *displacement) { twin_poses(&l->m, displacement); }
 

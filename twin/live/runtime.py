@@ -60,6 +60,7 @@ class Runtime:
         self._saved = (0.0, 0.0)  # of the machine's time and of real time: the last checkpoint
         self._told = (0.0, "")  # real time of the last health record, mode of the last event
         self._step_time = 0.0
+        self._step = 0  # the last one that was written
         self._began = time.time()
         self._going = False  # past the journal
 
@@ -191,8 +192,27 @@ class Runtime:
         if changed:
             self.files.event({"time": time.time(), "mode": publisher.mode, "words": publisher.words})
         if changed or real - self._told[0] >= self.keeping.health:
+            self._write_step()
             self.files.write(self.health())
             self._told = (real, publisher.mode)
+
+    def _write_step(self) -> None:
+        """The last step of the model, where it is another than the one written; docs/live.md describes it."""
+        engine, line, gate = self.intake.engine, self.intake.timeline, self.intake.gate
+        if self.intake.base is None or engine.steps in (0, self._step) or self.failure:
+            return
+        self._step = engine.steps
+        since = self.intake.base + engine.steps * engine.facts.step
+        self.files.step({
+            "artefact": engine.facts.digest,
+            "step": engine.steps,
+            "time": line.origin - line.shift + since,
+            "temperatures_degC": engine.sensors(),
+            "displacements_m": engine.displacements(),
+            "positions_m": [gate.good[k] for k in engine.facts.axis_channels],
+            "states": engine.states(),
+            "flags": engine.flags(),
+        })  # fmt: skip
 
     def health(self) -> dict[str, Any]:
         """The record as docs/live.md describes it."""
@@ -283,6 +303,7 @@ class Runtime:
     def close(self) -> None:
         """Keep everything; outputs stay where they are, and their readers see that they grow old."""
         self._checkpoint(now=True)
+        self._write_step()
         self.files.write(self.health())
         self.journal.close()
         self.source.close()

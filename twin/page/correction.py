@@ -24,7 +24,9 @@ def correction_told(artefact: Artefact, path: Path) -> dict[str, Any] | None:
     model = artefact.model
     names = tuple(a.name for a in correction.polynomial.axes)
     if names != model.pose_axes:
-        raise TwinError(f"corrects axes {', '.join(names)}, not those of the poses", str(path), "make it again, or move it")
+        raise TwinError(
+            f"corrects axes {', '.join(names)}, not those of the poses", str(path), "make it again, or move it"
+        )
     poses = model.poses[: len(model.poses) - model.scattered]
     errors = correction.polynomial(poses)
     offsets = errors @ correction.offset_per_error.T

@@ -131,4 +131,3 @@ def _facts(artefact: Artefact, result: Drawn, flagged: int) -> list[str]:
         facts.append(f"largest TCP error {worst:+.1f} µm in {'xyz'[component]} after {result.hours[time]:.2f} h")
     facts.append(f"{flagged} steps outside the certified box")
     return facts
-

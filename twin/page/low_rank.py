@@ -1,7 +1,7 @@
 """A field at many times in few modes: what makes every step of a run fit into one file.
 
 field(t) = modes @ weights(t), by the singular value decomposition, as few modes as a stated error allows. Modes are
-stored as 16-bit integers with a scale each. Single pictures at chosen times were rejected: between them there is nothing.
+stored as 16-bit integers with a scale each. Pictures at a few times were rejected: between them there is nothing.
 """
 
 from __future__ import annotations

@@ -55,7 +55,9 @@ def missing(artefact: Artefact, shape: Shape | None) -> list[str]:
         found.append("the artefact has no elastic structure: the surface is drawn undeformed")
     if not artefact.model.moves:
         lumped = any(key in tomllib.loads(artefact.description or "") for key in ("nodes", "bars"))
-        keys = "[tcp.expansion] and no [tcp.screws]" if lumped and not artefact.fields else "[tcp.tool] and no [tcp.work]"
+        keys = (
+            "[tcp.expansion] and no [tcp.screws]" if lumped and not artefact.fields else "[tcp.tool] and no [tcp.work]"
+        )
         found.append(f"no temperature moves the tool: the description has no {keys}")
     return found
 

@@ -6,9 +6,9 @@ its own, which is without stress:
 
     u(r) = alpha (T0 r + (g.r) r - g |r|^2 / 2),    T = T0 + g.r
 
-moved rigidly onto the ports; what then still differs at the ports is spread to their neighbourhood by a Gaussian process.
-alpha is the body's own: what moves its ports when all of it is 1 K warmer. Storing the displacements of the surface in
-the artefact was rejected: three times the memory of everything else for a picture.
+moved rigidly onto the ports; what still differs there is spread to their neighbourhood by a Gaussian process. alpha is
+the body's own: what moves its ports when all of it is 1 K warmer. Storing the displacements of the surface in the
+artefact was rejected: three times the memory of everything else for a picture.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def _covariance(a: np.ndarray, b: np.ndarray, reach: float) -> np.ndarray:
 
 
 def axis_positions(structure: ElasticStructure, axes: Sequence[str], position: np.ndarray) -> np.ndarray:
-    """Positions (n, n_linear) of logged axes (n, n_axes), in the order of the structure's; zero where none is logged."""
+    """Positions (n, n_linear) of logged axes (n, n_axes), in the order of the structure's; else zero."""
     found = np.zeros((len(position), len(structure.axes)))
     for k, axis in enumerate(structure.axes):
         if axis in axes:

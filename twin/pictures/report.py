@@ -1,8 +1,7 @@
-"""All pictures of a result, and a page that shows them."""
+"""All pictures of a result."""
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from matplotlib.figure import Figure
 
 from twin.atomic import atomic_path
 from twin.machine.description import Machine
-from twin.pictures.placed import described, no_tcp, placed_surface, poses_in_space
+from twin.pictures.placed import described, placed_surface, poses_in_space
 from twin.pictures.raster import Camera
 from twin.pictures.result import Drawn, read_result
 from twin.pictures.surface import surface_figure
@@ -20,16 +19,15 @@ from twin.pictures.temperatures import temperature_figure
 from twin.pictures.workspace import workspace_figure
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact
-from twin.rom.certificate_table import table
 
 _SHARES = (1 / 12, 1 / 3, 1 / 2, 1.0)  # of a run: the four times of the surface picture
 
 
-def write_report(artefact: Artefact, folder: Path, progress: Progress = silent) -> list[Path]:
-    """Draw the result in `folder` into it: PNG files and index.html; returns their paths, the page last.
+def write_pictures(artefact: Artefact, folder: Path, progress: Progress = silent) -> list[Path]:
+    """Draw the result in `folder` into it as PNG files; returns their paths.
 
     The surface is left out where the artefact carries no field basis (lumped machines), the workspace where it has a
-    single pose, and all of the TCP where no temperature moves it; the page says so.
+    single pose, and all of the TCP where no temperature moves it.
     Raises TwinError where the folder holds no result of this artefact, or cannot be written.
     """
     result = read_result(folder, artefact)
@@ -51,11 +49,7 @@ def write_report(artefact: Artefact, folder: Path, progress: Progress = silent) 
         for name, (caption, draw) in drawings.items():
             advance(caption)
             written.append(_save(draw(), Path(folder) / f"{name}.png"))
-    page = Path(folder) / "index.html"
-    captions = {path.name: caption for path, (caption, _) in zip(written, drawings.values(), strict=True)}
-    with atomic_path(page) as temporary:
-        temporary.write_text(_page(artefact, result, captions), encoding="utf-8")
-    return [*written, page]
+    return written
 
 
 def surface_of(
@@ -104,47 +98,3 @@ def _save(figure: Figure, path: Path) -> Path:
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="png", metadata={"Software": None})  # equal input, equal bytes
     return path
-
-
-def _page(artefact: Artefact, result: Drawn, captions: dict[str, str]) -> str:
-    worst = np.unravel_index(np.abs(result.tcp).argmax(), result.tcp.shape)
-    facts = [
-        f"{len(result.hours) - 1} steps over {result.hours[-1]:.3g} h",
-        f"{artefact.model.n} states, {len(result.poses)} poses, {len(result.sensors)} sensors",
-        f"largest TCP displacement {1e6 * result.tcp[worst]:+.1f} µm in {'xyz'[worst[2]]} "
-        f"after {result.hours[worst[0]]:.2f} h"
-        if artefact.model.moves
-        else f"no temperature moves the tool: {no_tcp(artefact)}",
-        f"{int(result.outside.sum())} steps outside the certified box",
-    ]
-    if not artefact.fields:
-        facts.append("lumped machine: no surface to draw")
-    items = "\n".join(f"<li>{html.escape(fact)}</li>" for fact in facts)
-    pictures = "\n".join(
-        f'<figure><img src="{name}" alt="{html.escape(caption)}">'
-        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
-        for name, caption in captions.items()
-    )
-    errors = html.escape("\n".join(table(artefact.certificate))) if artefact.certificate else "no certificate"
-    files = ["result.h5", "temperatures.csv", *(["tcp.csv"] if artefact.model.moves else []), "summary.json"]
-    links = ", ".join(f'<a href="{name}">{name}</a>' for name in files)
-    title = html.escape(f"{artefact.model.name}: result")
-    return f"""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
-body {{ font: 15px/1.5 system-ui, sans-serif; color: #22262b; max-width: 1100px; margin: 2rem auto; padding: 0 1rem; }}
-pre {{ overflow-x: auto; font-size: 12px; }}
-figure {{ margin: 2rem 0; }} img {{ max-width: 100%; }} figcaption {{ color: #6a7078; }}
-</style></head><body>
-<h1>{title}</h1>
-<ul>
-{items}
-</ul>
-{pictures}
-<h2>Errors of the model</h2>
-<p>Largest over the held-out scenarios of the certificate, K and um.</p>
-<pre>
-{errors}
-</pre>
-<p>Numbers behind the pictures: {links}.</p>
-</body></html>
-"""

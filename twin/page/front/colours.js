@@ -43,17 +43,18 @@ function bar(element, stops, low, high, unit, more) { // more: whether something
   element.append(strip, ticks);
 }
 
-function percentiles(values, weights, shares) { // smallest values that so large shares of the weight are not above
-  const order = Array.from(values.keys()).sort((a, b) => values[a] - values[b]);
-  let total = 0;
-  for (const w of weights) total += w;
-  const found = [];
-  let sum = 0, k = 0;
-  for (const i of order) {
-    sum += weights[i];
-    while (k < shares.length && sum >= shares[k] * total) { found.push(values[i]); k++; }
+function percentiles(values, weights, shares, least, most) { // values that so large shares of the weight are not above
+  const bins = 4096, sums = new Float64Array(bins), width = Math.max(most - least, 1e-9) / bins; // sorting takes ten times as long
+  let total = 0, sum = 0;
+  for (let i = 0; i < values.length; i++) {
+    sums[Math.min(bins - 1, Math.floor((values[i] - least) / width))] += weights[i];
+    total += weights[i];
   }
-  while (found.length < shares.length) found.push(values[order[order.length - 1]]);
+  const found = [];
+  for (let b = 0; b < bins; b++) {
+    sum += sums[b];
+    while (found.length < shares.length && sum >= shares[found.length] * total) found.push(least + (b + 1) * width);
+  }
   return found;
 }
 

@@ -6,7 +6,8 @@ class Stage {
     this.canvas = canvas; this.vertical = vertical;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
     this.renderer.outputColorSpace = "srgb-linear"; // colours are shown as they are in the bar
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    this.full = Math.min(window.devicePixelRatio || 1, 2); this.ratio = this.full; this.share = 1;
+    this.renderer.setPixelRatio(this.full);
     this.scene = new THREE.Scene();
     this.camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -100, 100);
     this.camera.up.setComponent(vertical, 1);
@@ -17,7 +18,9 @@ class Stage {
     this.scene.add(this.camera);
     this.controls = new THREE.OrbitControls(this.camera, canvas);
     this.controls.enableZoom = true;
-    this.controls.addEventListener("change", () => this.ask());
+    this.controls.addEventListener("change", () => { if (this.turning) this.pace(); this.ask(); });
+    this.controls.addEventListener("start", () => { this.turning = true; this.before = 0; });
+    this.controls.addEventListener("end", () => this.still());
     this.centre = new THREE.Vector3(); this.radius = 1;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
   }
@@ -58,17 +61,36 @@ class Stage {
     this.asked = true;
     requestAnimationFrame(() => { this.asked = false; this.draw(); });
   }
+  pace() { // while it turns, fewer pixels where frames take longer than a thirtieth of a second
+    const now = performance.now(), took = now - this.before;
+    if (this.before && took < 1000) {
+      this.mean = 0.7 * (this.mean || took) + 0.3 * took;
+      if (this.mean > 32 && this.share > 0.45) { this.share *= 0.8; this.mean = 0; this.sharp(this.share); }
+    }
+    this.before = now;
+  }
+  still() { this.turning = false; this.sharp(1); }
+  sharp(share) { // of the pixels in each direction
+    if (this.ratio === this.full * share) return;
+    this.ratio = this.full * share;
+    this.renderer.setPixelRatio(this.ratio);
+    this.ask();
+  }
   draw() { this.renderer.render(this.scene, this.camera); }
-  async spin(frames) { // frames per second of a whole turn
+  async spin(frames) { // frames per second of a whole turn, as by hand
     const start = this.camera.position.clone().sub(this.centre), axis = this.camera.up.clone();
+    this.controls.dispatchEvent({ type: "start" });
     const began = performance.now();
     for (let k = 1; k <= frames; k++) {
       await new Promise((next) => requestAnimationFrame(next));
       this.camera.position.copy(start).applyAxisAngle(axis, (2 * Math.PI * k) / frames).add(this.centre);
       this.controls.update();
-      this.draw();
-      this.renderer.getContext().readPixels(0, 0, 1, 1, 6408, 5121, new Uint8Array(4)); // the picture is there, not only asked for
     }
-    return (1000 * frames) / (performance.now() - began);
+    await new Promise((next) => requestAnimationFrame(next));
+    this.draw();
+    this.renderer.getContext().readPixels(0, 0, 1, 1, 6408, 5121, new Uint8Array(4)); // all is drawn, not only asked for
+    const seconds = (performance.now() - began) / 1000;
+    this.controls.dispatchEvent({ type: "end" });
+    return frames / seconds;
   }
 }

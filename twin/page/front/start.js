@@ -10,7 +10,9 @@ async function start() {
     if (!answer.ok) throw new Error(`the server says ${answer.status}`);
     content = await answer.json();
   }
+  performance.mark('parsed');
   const page = new Page(content);
+  performance.mark('made');
   window.page = page;
   requestAnimationFrame(() => requestAnimationFrame(() => { document.body.dataset.ready = "yes"; performance.mark("drawn"); }));
   if (page.live) followed(page);

@@ -68,7 +68,7 @@ class Surface {
         least = Math.min(least, temperature[i]);
       }
     });
-    [low, high] = percentiles(all, weights, [0.02, 0.98]);
+    [low, high] = percentiles(all, weights, [0.02, 0.98], least, most);
     const clipped = kind === "typical" && most - least > 1.3 * (high - low);
     if (!clipped) { low = least; high = most; }
     if (high - low < 0.1) { const middle = (low + high) / 2; low = middle - 0.05; high = middle + 0.05; } // K

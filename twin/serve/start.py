@@ -1,0 +1,78 @@
+"""Both servers in one event loop, until a signal ends them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import socket
+from collections.abc import Callable
+from ipaddress import ip_address
+
+import uvicorn
+from starlette.applications import Starlette
+
+from twin.errors import TwinError
+from twin.serve.opcua import OpcUaServer
+
+LOOK = 1.0  # s between two looks of the OPC UA server at what is new
+BUSY = 64  # connections at a time: a page needs six
+
+
+def is_loopback(host: str) -> bool:
+    """Whether nobody from outside can reach this address."""
+    if host == "localhost":
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def listening(host: str, port: int) -> socket.socket:
+    """A socket there. Raises TwinError where that cannot be."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        made = socket.socket(family, kind, protocol)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind(address)
+    except (OSError, UnicodeError, OverflowError) as e:
+        what = getattr(e, "strerror", None) or str(e)
+        raise TwinError(
+            f"cannot listen: {what}", f"{host}:{port}", "name another --port, or an address of this computer"
+        ) from e
+    return made
+
+
+def run_until_signal(
+    app: Starlette, place: socket.socket, opcua: OpcUaServer | None, ready: Callable[[], None] = lambda: None
+) -> None:
+    """Serve until SIGTERM or SIGINT; `ready` is called when both answer. Raises TwinError where OPC UA cannot start."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)  # uvicorn raises it again when it has ended: that is no failure
+    asyncio.run(_both(app, place, opcua, ready))
+
+
+async def _both(app: Starlette, place: socket.socket, opcua: OpcUaServer | None, ready: Callable[[], None]) -> None:
+    config = uvicorn.Config(
+        app, log_level="error", access_log=False, server_header=False, proxy_headers=False, ws="none", lifespan="off",
+        limit_concurrency=BUSY, timeout_graceful_shutdown=2,
+    )  # fmt: skip
+    if opcua is not None:
+        await opcua.start()
+    updates = asyncio.create_task(_updates(opcua)) if opcua is not None else None
+    ready()
+    try:
+        await uvicorn.Server(config).serve(sockets=[place])
+    finally:
+        if updates is not None and opcua is not None:
+            updates.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await updates
+            await opcua.stop()
+
+
+async def _updates(opcua: OpcUaServer) -> None:
+    while True:
+        await asyncio.sleep(LOOK)
+        await opcua.update()
