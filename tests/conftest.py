@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from tests.browser import chromium, shown  # noqa: F401 - fixtures
 from tests.golden.pinned import PINNED
 
 # Before numpy is imported anywhere: golden values need the same instruction set on every processor, and on two cores

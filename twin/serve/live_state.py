@@ -65,20 +65,31 @@ class LiveState:
         """Take in what has changed. A file that cannot be read is left for the next time: it is replaced as a whole."""
         if found := self._changed("health.json", "_read", FORMAT):
             self.health = found
-        if not (found := self._changed("step.json", "_seen", STEP)):
+        step = self._step(self._changed("step.json", "_seen", STEP))
+        if step is None:
             return
-        if found["artefact"] != self.artefact.digest:
-            return
-        if self.steps and found["step"] <= self.steps[-1].number:  # started afresh
+        if self.steps and step.number <= self.steps[-1].number:  # started afresh
             self.steps.clear()
         if not self.steps:
-            self._epoch = float(found["time"])
-        count = len(self.artefact.model.poses) - self.artefact.model.scattered
-        self.steps.append(Step(
-            int(found["step"]), float(found["time"]), tuple(found["temperatures_degC"]),
-            np.array(found["displacements_m"], dtype=float).reshape(-1, 3)[:count], tuple(found["positions_m"]),
-            np.array(found["states"], dtype=float), tuple(found["flags"]),
-        ))  # fmt: skip
+            self._epoch = step.time
+        self.steps.append(step)
+
+    def _step(self, found: dict[str, Any] | None) -> Step | None:
+        """None where it is damaged, or of another artefact."""
+        model = self.artefact.model
+        try:
+            if found is None or found["artefact"] != self.artefact.digest:
+                return None
+            tcp = np.array(found["displacements_m"], dtype=float).reshape(len(model.poses), 3)
+            step = Step(
+                int(found["step"]), float(found["time"]), tuple(map(float, found["temperatures_degC"])),
+                tcp[: len(model.poses) - model.scattered], tuple(map(float, found["positions_m"])),
+                np.array(found["states"], dtype=float).reshape(model.n), tuple(map(str, found["flags"])),
+            )  # fmt: skip
+        except (KeyError, TypeError, ValueError):
+            return None
+        sound = len(step.temperatures) == len(model.sensors) + len(model.ambient_sensors)
+        return step if sound and len(step.positions) == len(model.load_model.axes) else None
 
     def _changed(self, name: str, when: str, wanted: str) -> dict[str, Any] | None:
         try:

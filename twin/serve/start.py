@@ -36,6 +36,7 @@ def listening(host: str, port: int) -> socket.socket:
         made = socket.socket(family, kind, protocol)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind(address)
+        made.listen(BUSY)  # who comes before the first answer waits
     except (OSError, UnicodeError, OverflowError) as e:
         what = getattr(e, "strerror", None) or str(e)
         raise TwinError(

@@ -52,10 +52,9 @@ class Surface {
   }
   range(rows, kind) { // low and high of the colours, and what lies beyond: cached, for a slider asks often
     const key = `${kind} ${rows.join()}`;
-    if (this.store.tcpField && this.rangeOf.has(key)) return this.rangeOf.get(key);
-    const found = this.computed(rows, kind);
-    this.rangeOf.set(key, found);
-    return found;
+    if (!this.store.heat) return this.computed(rows, kind); // of a running machine, rows move on
+    if (!this.rangeOf.has(key)) this.rangeOf.set(key, this.computed(rows, kind));
+    return this.rangeOf.get(key);
   }
   computed(rows, kind) {
     let least = Infinity, most = -Infinity, hottest = 0, low = Infinity, high = -Infinity;
