@@ -18,7 +18,7 @@ NAMES = (
     "c_runtime", "fmu", "calibration", "update",
     "spindle_drift", "spindle_diagnosis", "log_faults", "lathe_channels",
     "members", "diagnosis", "recovery", "hidden_certify",
-    "window", "live",
+    "window", "live", "serve",
 )  # fmt: skip
 ASKED = ("sensitivity", "lathe_diagnosis", "lathe_calibration")  # by name alone: a day, and hours
 

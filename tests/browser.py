@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")  # WebGL by software
+# WebGL by software
+FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing", "--no-sandbox")
 
 
 @pytest.fixture(scope="module")  # its driver has an event loop of its own while it runs

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 SIZES = [(1400, 900), (390, 844)]
-CUT = """() => [...document.querySelectorAll("h1, h2, p, li, label, output, figcaption, .ticks span, .legend span, td, th")]
+CUT = """() => [...document.querySelectorAll(
+        "h1, h2, p, li, label, output, figcaption, .ticks span, .legend span, td, th")]
     .filter((e) => e.offsetParent && !e.closest(".scroll"))
     .filter((e) => { const r = e.getBoundingClientRect(); return r.left < 0 || r.right > innerWidth + 0.5; })
     .map((e) => e.textContent)"""
@@ -15,6 +16,11 @@ NARROW = """() => [page.temperatures, page.time, page.alongChart].map((chart) =>
     const widest = Math.max(...axis._values.map((v) => context.measureText(v ?? "").width));
     return axis._size - 8 - widest; // 5 px of gap and a margin
 })"""
+NO_WEBGL = """
+    const get = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+        return kind.startsWith("webgl") ? null : get.call(this, kind, ...more);
+    };"""
 APART = """() => [...document.querySelectorAll(".ticks")].map((bar) => {
     const all = [...bar.children].map((s) => s.getBoundingClientRect());
     return all.slice(1).every((r, k) => r.left >= all[k].right);
@@ -100,8 +106,7 @@ def test_one_hot_spot_takes_the_colours_from_nothing_else(frozen, shown):
 
 
 def test_without_webgl_the_rest_is_drawn(frozen, shown):
-    page = shown(script="const get = HTMLCanvasElement.prototype.getContext; HTMLCanvasElement.prototype.getContext = "
-                        "function (kind, ...a) { return kind.startsWith('webgl') ? null : get.call(this, kind, ...a); };").open(frozen)  # fmt: skip
+    page = shown(script=NO_WEBGL).open(frozen)
     assert "no WebGL" in page.do("document.getElementById('surface').textContent")
     assert page.do("page.time.plot.data[1].length") == page.do("page.store.length")
     assert page.wrong == []

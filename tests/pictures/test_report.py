@@ -8,8 +8,8 @@ import pytest
 
 from twin.cli.main import run
 from twin.errors import TwinError
-from twin.pictures.placed import described, placed_surface, poses_in_space
 from twin.face.report import report
+from twin.pictures.placed import described, placed_surface, poses_in_space
 from twin.pictures.result import read_result
 from twin.rom.artefact import read_artefact
 

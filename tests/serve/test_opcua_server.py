@@ -30,7 +30,7 @@ DAY = datetime.timedelta(days=1)
 
 
 def certificate(folder: Path, name: str, valid=(-DAY, 30 * DAY), use=ExtendedKeyUsageOID.CLIENT_AUTH) -> str:
-    """Key and self-signed certificate of a client, valid from one time to another, from now; for `set_security_string`."""
+    """Key and self-signed certificate of a client, valid between two times from now; for `set_security_string`."""
     key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
     now = datetime.datetime.now(datetime.UTC)
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])

@@ -6,7 +6,7 @@ stored as 16-bit integers with a scale each. Pictures at a few times were reject
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from twin.page.packed import packed
 
 LARGEST = 32767  # of a 16-bit integer
+RMS = 0.25  # of the tolerance: where the search for the number of modes begins
 
 
 @dataclass(frozen=True)
@@ -30,26 +31,23 @@ class LowRank:
 
     def __call__(self) -> np.ndarray:
         """(m, n)"""
-        return self.modes @ self.weights
+        return self.modes.astype(float) @ self.weights
 
 
 def low_rank(field: np.ndarray, tolerance: float) -> LowRank:
     """The field (m, n) within `tolerance` (its unit), as far as 16 bits go."""
+    if not field.size:
+        return LowRank(np.zeros((len(field), 0), dtype=np.int16), np.zeros((0, field.shape[1])), 0.0)
     tall = field.shape[0] >= field.shape[1]
-    _, vectors = np.linalg.eigh(field.T @ field if tall else field @ field.T)  # the smaller of both products
-    vectors = vectors[:, ::-1]
-    left, right = (field @ vectors, vectors.T) if tall else (vectors, vectors.T @ field)
-    modes = np.zeros((len(field), 0), dtype=np.int16)
-    weights = np.zeros((0, field.shape[1]))
-    rest = np.array(field, dtype=float)
-    for k in range(vectors.shape[1]):
-        if not rest.size or np.abs(rest).max() <= tolerance:
-            break
-        largest = float(np.abs(left[:, k]).max())
-        if not largest > 0.0:
-            break
-        mode = np.round(left[:, k] * (LARGEST / largest)).astype(np.int16)
-        weight = right[k] * (largest / LARGEST)
-        rest -= np.outer(mode, weight)
-        modes, weights = np.column_stack([modes, mode]), np.vstack([weights, weight])
-    return LowRank(modes, weights, float(np.abs(rest).max(initial=0.0)))
+    squares, vectors = np.linalg.eigh(field.T @ field if tall else field @ field.T)  # the smaller of both products
+    squares, vectors = np.maximum(squares[::-1], 0.0), vectors[:, ::-1]
+    beyond = np.sqrt(np.append(squares[::-1].cumsum()[::-1], 0.0) / field.size)  # rms of what so many modes leave
+    for count in range(int(np.argmax(beyond <= RMS * tolerance)), len(squares) + 1):
+        kept = vectors[:, :count]
+        left, right = (field @ kept, kept.T) if tall else (kept, kept.T @ field)
+        scale = np.maximum(np.abs(left).max(axis=0), np.finfo(float).tiny) / LARGEST
+        found = LowRank(np.round(left / scale).astype(np.int16), scale[:, None] * right, 0.0)
+        error = float(np.abs(field - found()).max())
+        if error <= tolerance or count == len(squares):
+            return replace(found, error=error)
+    raise AssertionError("the last count returns")
