@@ -5,7 +5,19 @@ import sys
 
 import pytest
 
-WORKSHOP = ("skfem", "meshio", "gmsh", "pydantic", "tomlkit", "pypardiso", "pyamg", "sksparse", "matplotlib")
+WORKSHOP = (
+    "skfem",
+    "meshio",
+    "gmsh",
+    "pydantic",
+    "tomlkit",
+    "pypardiso",
+    "pyamg",
+    "sksparse",
+    "matplotlib",
+    "starlette",
+    "uvicorn",
+)
 BLOCK = f"""
 import importlib, pkgutil, sys
 class Workshop:
@@ -20,7 +32,16 @@ def python(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
 
-PACKAGES = ("twin.run", "twin.rom", "twin.logs", "twin.physics", "twin.calibrate", "twin.live", "twin.face")
+PACKAGES = (
+    "twin.run",
+    "twin.rom",
+    "twin.logs",
+    "twin.physics",
+    "twin.calibrate",
+    "twin.live",
+    "twin.page",
+    "twin.face",
+)
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -39,7 +60,7 @@ def test_the_blocker_blocks():
     assert "not at the edge" in python(BLOCK + "import skfem").stderr
 
 
-@pytest.mark.parametrize("command", ["run", "live", "info", "score", "calibrate", "update", "rtest"])
+@pytest.mark.parametrize("command", ["run", "live", "serve", "info", "score", "calibrate", "update", "rtest"])
 def test_edge_commands_show_their_help_without_the_workshop(command):
     done = python(BLOCK + f"from twin.cli.main import run\nsys.exit(run([{command!r}, '--help']))")
     assert done.returncode == 0, done.stderr
