@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from twin.page.finished import finished_told
+from twin.page.front import write_page
+from twin.rom.artefact import read_artefact
+
 SIZES = [(1400, 900), (390, 844)]
 CUT = """() => [...document.querySelectorAll(
         "h1, h2, p, li, label, output, figcaption, .ticks span, .legend span, td, th")]
@@ -103,6 +107,23 @@ def test_one_hot_spot_takes_the_colours_from_nothing_else(frozen, shown):
     assert after["clipped"]
     assert after["high"] == pytest.approx(before["high"], abs=5.0)  # of 70 K; its nodes are few and large
     assert "the hottest 90.0 °C, on " in page.do("page.surface.words(page.surface.computed([1], 'typical'))")
+
+
+@pytest.mark.parametrize("lacking", [("surface",), ("tcp",), ("surface", "tcp")])
+def test_a_machine_that_lacks_something_is_drawn_without(slide_artefact, slide_result, tmp_path, shown, lacking):
+    """Lumped machines have no surface, thermal problems no TCP."""
+    told = finished_told(read_artefact(slide_artefact), slide_result)
+    for name in lacking:
+        told[name] = None
+        told["machine"][{"tcp": "workspace"}.get(name, name)] = None
+    write_page(tmp_path / "index.html", told)
+    page = shown(390, 844).open((tmp_path / "index.html").as_uri())
+    page.slide("#time", 2)
+    assert [page.do(f"document.getElementById('{i}').hidden") for i in ("surface", "four", "workspace", "tcp", "along")] == [
+        *["surface" in lacking] * 2, *["tcp" in lacking] * 3
+    ]  # fmt: skip
+    assert page.do("page.temperatures.plot.data[1].length") == page.do("page.store.length")
+    assert page.wrong == []
 
 
 def test_without_webgl_the_rest_is_drawn(frozen, shown):

@@ -51,6 +51,7 @@ def test_a_token_opens_the_page_and_nothing_else_does(server, slide_artefact, sl
     assert one.ask("/", Authorization=f"Bearer {TOKEN}").status == 200
     sent = one.ask(f"/?token={TOKEN.replace(' ', '+')}")
     assert (sent.status, sent.headers["Location"]) == (303, "/")
+    assert one.ask(f"//evil.example/?token={TOKEN.replace(' ', '+')}").headers["Location"] == "/"
     assert "HttpOnly" in sent.headers["Set-Cookie"]
     assert "SameSite=strict" in sent.headers["Set-Cookie"]
     page = shown().open(one.url.replace(" ", "+"))

@@ -61,7 +61,7 @@ class Guard:
         if self.token is None:
             return None
         if self._same(parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]):
-            answer = RedirectResponse(scope["path"], 303)  # the token leaves the address bar
+            answer = RedirectResponse("/", 303)  # the token leaves the address bar; never to where a path says
             answer.set_cookie(COOKIE, self.token, httponly=True, samesite="strict", path="/")
             return answer
         if self._same(_bearer(headers)) or self._same(_cookie(headers)):

@@ -139,7 +139,7 @@ class LiveState:
 
     def frame(self, number: int) -> dict[str, Any] | None:
         """The surface at a step; None where the step is none of those kept, or the machine has no surface."""
-        step = next((s for s in self.steps if s.number == number), None)
+        step = next((s for s in list(self.steps) if s.number == number), None)  # `look` may add one meanwhile
         if step is None or not self.artefact.fields:
             return None
         model = self.artefact.model

@@ -93,7 +93,7 @@ class OpcUaServer:
         key, certificate, trusted = folder / "server.pem", folder / "server.der", folder / "trusted"
         options = CertificateValidatorOptions.EXT_VALIDATION | CertificateValidatorOptions.PEER_CLIENT
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             await setup_self_signed_certificate(
                 key, certificate, APPLICATION, socket.gethostname(), [ExtendedKeyUsageOID.SERVER_AUTH],
                 {"commonName": "twin serve"},
@@ -185,9 +185,7 @@ class OpcUaServer:
 
         now = self.source.now()
         if now is None:
-            waiting = ua.StatusCode(ua.StatusCodes.BadWaitingForInitialData)
-            for node in self._nodes.values():
-                await self._server.write_attribute_value(node.nodeid, ua.DataValue(StatusCode=waiting))
+            await self._without(ua.StatusCodes.BadWaitingForInitialData)
             return
         stamp = datetime.fromtimestamp(now.time, UTC) if now.mode != "finished" else datetime.now(UTC)
         old = now.trust.startswith("no")
@@ -199,6 +197,15 @@ class OpcUaServer:
             own = ua.StatusCode(ua.StatusCodes.Good if key.startswith(("health", "correction")) else status)
             data = ua.DataValue(ua.Variant(value, kind), own, SourceTimestamp=stamp.replace(tzinfo=None))
             await self._server.write_attribute_value(node.nodeid, data)
+
+    async def fail(self) -> None:
+        """No value is known: better none than one that stands still and looks good."""
+        await self._without(_ua().StatusCodes.BadInternalError)
+
+    async def _without(self, status: int) -> None:
+        ua = _ua()
+        for node in self._nodes.values():
+            await self._server.write_attribute_value(node.nodeid, ua.DataValue(StatusCode=ua.StatusCode(status)))
 
     async def stop(self) -> None:
         await self._server.stop()

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import signal
 import socket
+import sys
 from collections.abc import Callable
 from ipaddress import ip_address
 
@@ -74,6 +75,13 @@ async def _both(app: Starlette, place: socket.socket, opcua: OpcUaServer | None,
 
 
 async def _updates(opcua: OpcUaServer) -> None:
+    told = ""
     while True:
         await asyncio.sleep(LOOK)
-        await opcua.update()
+        try:
+            await opcua.update()
+        except Exception as e:  # a record of another version, say: the page goes on, and clients see bad values
+            if str(e) != told:
+                told = str(e)
+                print(f"OPC UA: no values: {type(e).__name__} {e}", file=sys.stderr, flush=True)
+            await opcua.fail()

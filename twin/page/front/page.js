@@ -199,7 +199,7 @@ class Page {
     this.corrections.draw(axis.nodes.map((p) => 1000 * p), told.axes.map((name, k) => ({ name: `offset of ${name}`, colour: MARKED[k], points: true, values: poses.map((i) => 1e6 * offsets[n * i + k]) })));
     table(by("correction-table"), told.axes.map((name, k) => [`largest offset of ${name}`, `${told.largest_um[k].toFixed(1)} µm`]));
   }
-  later() { requestIdleCallback ? requestIdleCallback(() => this.fields(), { timeout: 1500 }) : setTimeout(() => this.fields(), 200); }
+  later() { window.requestIdleCallback ? requestIdleCallback(() => this.fields(), { timeout: 1500 }) : setTimeout(() => this.fields(), 200); }
   fields() { // the same camera and colours at four times over the run
     if (!this.surface || this.live) return;
     const last = this.store.length - 1, rows = [1 / 12, 1 / 3, 1 / 2, 1].map((share) => Math.round(share * last));
