@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 CAUTION = (
-    "The certificate compares the model with the full finite-element model, not with the machine itself: twin score does "
-    "that, where measurements exist."
+    "The certificate compares the model with the full finite-element model, not with the machine itself: twin score "
+    "does that, where measurements exist."
 )
 _FLAGS = (
     (r"signals\.(.+) (above|below) (.+)", "{0} was {1} {2}, the end of the range that the certificate covers"),
