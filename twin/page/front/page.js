@@ -196,7 +196,7 @@ class Page {
     const offsets = unpack(told.offsets), axis = this.axesOf()[0], poses = axis ? this.line(axis) : [], n = told.axes.length;
     if (!axis) return;
     this.corrections.xLabel = `${axis.name} in mm`;
-    this.corrections.draw(axis.nodes.map((p) => 1000 * p), told.axes.map((name, k) => ({ name: `offset of ${name}`, colour: MARKED[k], points: true, values: poses.map((i) => 1e6 * offsets[n * i + k]) })));
+    this.corrections.draw(axis.nodes.map((p) => 1000 * p), told.axes.map((name, k) => ({ name: `offset of ${name}`, colour: AXES[k % 3], points: true, values: poses.map((i) => 1e6 * offsets[n * i + k]) })));
     table(by("correction-table"), told.axes.map((name, k) => [`largest offset of ${name}`, `${told.largest_um[k].toFixed(1)} µm`]));
   }
   later() { window.requestIdleCallback ? requestIdleCallback(() => this.fields(), { timeout: 1500 }) : setTimeout(() => this.fields(), 200); }
