@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,12 @@ from scipy.sparse.linalg import spsolve
 from twin.build.displacement_field import DisplacementField
 from twin.build.full_model import assemble
 from twin.build.structure import Structure
+from twin.logs.read import read_run
+from twin.logs.run import Table, Tcp
+from twin.logs.write import write_table, write_tcp
 from twin.machine.load import load_machine
 from twin.page.finished import finished_told
-from twin.page.front import frozen_page
+from twin.page.front import frozen_page, write_page
 from twin.page.low_rank import low_rank
 from twin.page.packed import packed, unpacked
 from twin.page.shape import axis_positions, shape_of
@@ -124,3 +128,28 @@ def test_every_node_of_the_surface_is_displaced(slide_artefact, slide_result):
     moved = shape(result.states[-1:], position)
     assert [u.shape for u in moved] == [(1, len(f.nodes), 3) for f in artefact.fields]
     assert 0.0 < max(np.abs(u).max() for u in moved) < 1e-3
+
+
+def test_what_was_measured_stands_beside_what_was_computed(slide_artefact, slide_result, tmp_path, shown):
+    artefact = read_artefact(slide_artefact)
+    result = read_result(slide_result, artefact)
+    run, folder = (
+        shutil.copytree(f, tmp_path / n) for f, n in ((SLIDE / "runs" / "short", "run"), (slide_result, "out"))
+    )
+    time = read_run(run).loads.time[0] + 3600.0 * result.hours
+    write_table(run / "temperatures.csv", Table(time, {"plate": result.temperature[:, 0] + 1.0}, {"plate": "degC"}))
+    write_tcp(run / "tcp.csv", Tcp(time, result.axes, result.position, result.tcp_actual + 1e-6))
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    (folder / "summary.json").write_text(json.dumps(summary | {"run": str(run)}), encoding="utf-8")
+    told = finished_told(artefact, folder)["measured"]
+    assert [row for row, _ in told["sensors"]["plate"]] == list(range(len(time)))
+    np.testing.assert_allclose([v for _, v in told["sensors"]["plate"]], result.temperature[:, 0] + 1.0, atol=1e-3)
+    np.testing.assert_allclose([v for _, v in told["tcp"][2]], result.tcp_actual[:, 2] + 1e-6, atol=1e-9)
+    write_page(folder / "index.html", finished_told(artefact, folder))
+    page = shown().open((folder / "index.html").as_uri())
+    page.do("() => { page.where.selectedIndex = 1; page.tcpCurves(); }")
+    assert page.do("page.time.plot.series.length") == 1 + 3 + 3
+    assert "Dots: measured." in page.do("document.getElementById('tcp-words').textContent")
+    assert page.wrong == []
+    shutil.rmtree(run)
+    assert finished_told(artefact, folder)["measured"] is None

@@ -11,6 +11,7 @@ import numpy as np
 from twin.page.correction import correction_told
 from twin.page.low_rank import low_rank
 from twin.page.machine import machine_told
+from twin.page.measured import measured_told
 from twin.page.packed import packed
 from twin.page.shape import Shape, axis_positions, shape_of
 from twin.page.words import flag_words, trust
@@ -40,7 +41,7 @@ def finished_told(artefact: Artefact, folder: Path) -> dict[str, Any]:
         "version": VERSION,
         "mode": "finished",
         "title": f"{artefact.model.name}: result",
-        "subtitle": _subtitle(folder),
+        "subtitle": _run(folder),
         "machine": machine,
         "trust": {"level": level, "line": line},
         "hours": packed(result.hours[rows]),
@@ -48,6 +49,7 @@ def finished_told(artefact: Artefact, folder: Path) -> dict[str, Any]:
         "outside": packed(result.outside[rows].astype(float)),
         "tcp": _tcp(artefact, result, rows) if artefact.model.moves else None,
         "surface": _surface(artefact, shape, result, rows) if artefact.fields else None,
+        "measured": measured_told(Path(_run(folder)), result, rows),
         "flags": _flags(result),
         "correction": correction_told(artefact, Path(folder) / "correction.json"),
         "facts": _facts(artefact, result, flagged),
@@ -61,7 +63,7 @@ _FILES = (
 )  # fmt: skip
 
 
-def _subtitle(folder: Path) -> str:
+def _run(folder: Path) -> str:
     """The run that was replayed, as summary.json names it."""
     try:
         told = json.loads((Path(folder) / "summary.json").read_text(encoding="utf-8"))

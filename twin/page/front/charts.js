@@ -21,7 +21,7 @@ class Chart {
         { label: this.xLabel, labelSize: 22, size: 34, stroke: INK, grid: { stroke: "#e6e8eb" }, ticks: { stroke: "#c3c8ce" }, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif" },
         { label: this.yLabel, labelSize: 20, size: (u, values) => this.room(u, values), stroke: INK, grid: { stroke: "#e6e8eb" }, ticks: { stroke: "#c3c8ce" }, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif" },
       ],
-      series: [{}, ...series.map((s) => ({ label: s.name, stroke: s.colour, width: s.width || 2, dash: s.dash, points: { show: s.points || false, size: 7, fill: s.colour } }))],
+      series: [{}, ...series.map((s) => ({ label: s.name, stroke: s.colour, width: s.width || 2, dash: s.dash, points: { show: s.points || s.dots || false, size: s.dots ? 4 : 7, fill: s.colour }, ...(s.dots ? { paths: () => null } : {}) }))],
       hooks: { drawClear: [(u) => this.shade(u)], draw: [(u) => this.mark(u)] },
     };
     const data = [x, ...series.map((s) => s.values)];
@@ -63,7 +63,13 @@ class Chart {
 
 function column(store, value) { return Array.from({ length: store.length }, (_, row) => value(row)); }
 
-function sensorSeries(machine, store) { // those that change most in colour and named, the others grey, air dashed
+function dotted(readings, length) { // [row, value] on the common axis, nothing between
+  const values = new Array(length).fill(null);
+  for (const [row, value] of readings) values[row] = value;
+  return values;
+}
+
+function sensorSeries(machine, store, measured) { // those that change most in colour and named, the others grey, air dashed
   const all = machine.sensors.map((s, i) => {
     const values = column(store, (row) => store.sensor(row, i)), first = values.find((v) => v != null);
     const change = values.reduce((most, v) => (v != null && Math.abs(v - first) > Math.abs(most) ? v - first : most), 0);
@@ -75,6 +81,7 @@ function sensorSeries(machine, store) { // those that change most in colour and 
   return [
     ...rest.map((s, k) => ({ name: k ? s.name : `${rest.length} more`, colour: MUTED, width: 1, values: s.values, quiet: k > 0 })),
     ...loud.map((s, k) => ({ name: named(s), colour: MARKED[k], values: s.values })),
+    ...loud.flatMap((s, k) => (measured && measured.sensors[s.name] ? [{ name: `${s.name} measured`, colour: MARKED[k], dots: true, quiet: true, values: dotted(measured.sensors[s.name], store.length) }] : [])),
     ...all.filter((s) => s.air).map((s) => ({ name: `${s.name}, air`, colour: INK, width: 1.2, dash: [5, 4], values: s.values })),
   ];
 }

@@ -152,7 +152,7 @@ class Page {
   curves() {
     const spans = this.outside();
     this.temperatures.spans = this.time.spans = spans;
-    this.temperatures.draw(this.store.hours, sensorSeries(this.machine, this.store));
+    this.temperatures.draw(this.store.hours, sensorSeries(this.machine, this.store, this.content.measured));
     this.tcpCurves();
   }
   outside() {
@@ -172,10 +172,15 @@ class Page {
       for (let i = 0; i < tcp.length; i++) { low[i % 3] = Math.min(low[i % 3], tcp[i]); high[i % 3] = Math.max(high[i % 3], tcp[i]); }
     }
     for (const select of this.at) select.disabled = actual;
-    this.time.draw(this.store.hours, ["X", "Y", "Z"].map((name, k) => ({ name, colour: AXES[k], values: curves[k] })));
+    const measured = actual && this.content.measured ? this.content.measured.tcp : []; // where the axes were
+    this.time.draw(this.store.hours, [
+      ...["X", "Y", "Z"].map((name, k) => ({ name, colour: AXES[k], values: curves[k] })),
+      ...measured.map((readings, k) => ({ name: `${"XYZ"[k]} measured`, colour: AXES[k], dots: true, quiet: true, values: dotted(readings, this.store.length).map((v) => (v === null ? v : 1e6 * v)) })),
+    ]);
     const range = (k) => `${"XYZ"[k]} ${um(low[k])} to ${um(high[k])}`;
+    const dots = measured.length ? " Dots: measured." : "";
     const grey = this.outside().length ? " Grey: outside what was certified." : "";
-    by("tcp-words").textContent = `Over all poses and times: ${[0, 1, 2].map(range).join(", ")} µm; tool side minus work side.${grey}`;
+    by("tcp-words").textContent = `Over all poses and times: ${[0, 1, 2].map(range).join(", ")} µm; tool side minus work side.${dots}${grey}`;
   }
   line(axis) { // poses along an axis through the chosen one
     const { grid } = this.machine.workspace, at = this.indices(this.pose);
