@@ -66,9 +66,14 @@ def main() -> None:
 
 
 def pages(*urls: str) -> None:
-    from playwright.sync_api import sync_playwright
-
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        sync_playwright = None
     path = shutil.which("chromium") or shutil.which("google-chrome")
+    if sync_playwright is None or path is None:
+        print("   no page is drawn: that needs playwright and Chromium")
+        return
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=path, args=list(FLAGS))
         for url, (width, height) in ((u, s) for u in urls for s in ((1400, 900), (390, 844))):

@@ -37,6 +37,12 @@ def test_a_replay_ends_where_twin_run_ends(engine, kelvin, metres, spindle, stat
     found = json.loads(out.read_text())
     np.testing.assert_allclose(found["offsets"]["x"], expected[0], rtol=0, atol=metres)
     assert found["mode"] == "following"
+    step = json.loads((state / "step.json").read_text())  # what `twin serve` draws the machine from
+    assert step["step"] == len(result.time) - 1
+    scale = np.abs(result.states[-1]).max()  # hundreds: coordinates of modes, not K
+    np.testing.assert_allclose(step["states"], result.states[-1], rtol=0, atol=kelvin * scale)
+    np.testing.assert_allclose(np.reshape(step["displacements_m"], (-1, 3)), result.tcp[-1], rtol=0, atol=metres)
+    np.testing.assert_allclose(step["positions_m"], result.position[-1], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("engine", ["c", "jax"])

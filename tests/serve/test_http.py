@@ -9,6 +9,9 @@ import socket
 import pytest
 
 from twin.cli.main import run
+
+pytest.importorskip("starlette")
+
 from twin.serve.guard import Guard
 
 TOKEN = "a token of the tests 123"
