@@ -126,6 +126,11 @@ def _put_owners(out: Arrays, load: LoadModel, ports: tuple[tuple[int, ...], ...]
     out.integers("pair_pad_local", [owner[p.pad_port][1] for p in load.pairs])
 
 
+def most_reads(load: LoadModel) -> int:
+    """The most signals that one law reads."""
+    return max((len(e.use.signals) for e in (*load.films, *load.sources)), default=0)
+
+
 def put_laws(out: Arrays, load: LoadModel) -> None:
     """The laws as functions, and the functions that call them."""
     place = {s.name: k for k, s in enumerate(load.signals)}
@@ -136,6 +141,11 @@ def put_laws(out: Arrays, load: LoadModel) -> None:
     out.integers("following_film", films)
     out.integers("film_alone", [not load.films[k].use.signals for k in films])
     out.integers("following_loss", losses)
+    for kind, uses in (("film", [load.films[k].use for k in films]), ("loss", [load.sources[k].use for k in losses])):
+        out.integers(f"{kind}_reads", [len(use.signals) for use in uses])
+        reads = [[place[s] for s in use.signals.values()] for use in uses]
+        width = most_reads(load)
+        out.table(f"{kind}_signal", [[*row, *[0] * (width - len(row))] for row in reads], width)
     out.integers("follows", [bool(states_of(s.use)) for s in load.sources])
     of_log, holds = [], []
     for kind, uses in (("source", [s.use for s in load.sources]), ("film", [f.use for f in load.films])):
