@@ -14,7 +14,7 @@ _LOOK = 0.02  # s between two looks
 
 
 def result_h5(path: Path, wait: float = _WAIT) -> Path:
-    """The result.h5 of `path`, a folder of `twin run -o` or the file itself, once it is the one that summary.json names.
+    """The result.h5 of `path`, a folder of `twin run -o` or the file itself, once summary.json names it.
 
     Where no summary.json says which (a file moved elsewhere, results of older versions) it is taken as it is.
     Raises TwinError where the two are still of two results after `wait` [s].

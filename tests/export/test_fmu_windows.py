@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +48,7 @@ def test_a_program_for_windows_gets_what_twin_run_gives(lumped, tmp_path, monkey
     table = inputs(columns, [n for n in reference if n in columns or n.removesuffix("_rate") in columns])
     commands = [f"s {reference['T_initial']} {initial!r}"]
     edges = np.union1d(table["time"][:-1], np.arange(0.0, expected.time[-1] - expected.time[0] + 1.0, 60.0))
-    for k, (begin, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for k, (begin, end) in enumerate(pairwise(edges)):
         row = table[np.searchsorted(table["time"], begin, side="right") - 1]
         own = [n for n in table.dtype.names[1:] if np.isfinite(row[n])]
         straight = {n.removesuffix("_rate") for n in own if n.endswith("_rate")}

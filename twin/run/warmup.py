@@ -24,8 +24,8 @@ import numpy as np
 
 from twin.errors import TwinError
 from twin.rom.hdf5_file import strings
-from twin.together import result_h5
 from twin.run.results import FORMAT
+from twin.together import result_h5
 
 WINDOW = 600.0  # s
 HORIZON = 3600.0  # s

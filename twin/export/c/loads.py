@@ -128,7 +128,8 @@ def _put_owners(out: Arrays, load: LoadModel, ports: tuple[tuple[int, ...], ...]
 
 def most_reads(load: LoadModel) -> int:
     """The most signals that one law reads."""
-    return max((len(e.use.signals) for e in (*load.films, *load.sources)), default=0)
+    uses = [*(f.use for f in load.films), *(s.use for s in load.sources)]
+    return max((len(use.signals) for use in uses), default=0)
 
 
 def put_laws(out: Arrays, load: LoadModel) -> None:
