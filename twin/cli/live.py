@@ -23,8 +23,15 @@ def _options() -> type[Any]:
 @click.command(epilog="Example: twin live out/five_axis.h5 --source replay:models/five_axis/runs/experiment_a "
                "--speed 1000 --out file:out/now.json --state out/live")  # fmt: skip
 @click.argument("artefact", type=click.Path())
-@click.option("--source", required=True, help="csv:FILE that grows, replay:RUN, ring:FILE, opcua:URL")
-@click.option("--out", required=True, multiple=True, help="file:FILE, ring:FILE, opcua:URL; may be given again")
+@click.option(
+    "--source", required=True, help="csv:FILE that grows, replay:RUN, ring:FILE, mqtt:HOST:PORT/TOPIC, opcua:URL"
+)
+@click.option(
+    "--out",
+    required=True,
+    multiple=True,
+    help="file:FILE, ring:FILE, mqtt:HOST:PORT/TOPIC, opcua:URL; may be given again",
+)
 @click.option("--state", required=True, type=click.Path(), help="folder for journal, checkpoint and health record")
 @click.option("--engine", type=click.Choice(["c", "jax"]), default="c", show_default=True,
               help="c: compiled once, starts in a moment; jax: needs no compiler")  # fmt: skip
@@ -41,7 +48,9 @@ def _options() -> type[Any]:
 @click.option("--neutral", type=Quantity("s"), default="600 s", show_default=True,
               help="age from which on it goes to neutral")  # fmt: skip
 @click.option("--journal", type=click.IntRange(1), default=256, show_default=True, help="MB of past blocks to keep")
-@click.option("--channels", type=click.Path(), help="TOML file: nodes of OPC UA, limits of values")
+@click.option(
+    "--channels", type=click.Path(), help="TOML file: nodes of OPC UA, users and certificates, limits of values"
+)
 @click.option("--fresh", is_flag=True, help="forget what is in the state folder")
 @bundled(_options)
 def command(artefact: str, source: str, out: tuple[str, ...], state: str, options: LiveOptions) -> None:

@@ -45,9 +45,9 @@ def live(
 ) -> Runtime:
     """Run beside a machine until the source ends or `stop()` is true: blocks of loads in, axis offsets out.
 
-    source: "csv:FILE", "replay:RUN", "ring:FILE" or "opcua:URL". out: "file:FILE", "ring:FILE", "opcua:URL". state:
-    folder for journal, checkpoint and health record, from which a process that was killed goes on. Returns the closed
-    runtime, whose counts and state can be read. docs/live.md tells all of it.
+    source: "csv:FILE", "replay:RUN", "ring:FILE", "mqtt:HOST:PORT/TOPIC" or "opcua:URL". out: "file:FILE", "ring:FILE",
+    "mqtt:HOST:PORT/TOPIC" or "opcua:URL". state: folder for journal, checkpoint and health record, from which a process
+    that was killed goes on. Returns the closed runtime, whose counts and state can be read; docs/live.md has all of it.
     Raises TwinError for a machine without a TCP, a state of another artefact or in use, and names of no source.
     """
     runtime = wired(artefact, source, out, state, options or LiveOptions())
@@ -105,4 +105,9 @@ def open_sink(text: str, facts: Facts, form: Literal["grid", "polynomial"], chan
         from twin.live.opcua import OpcUaSink
 
         return OpcUaSink(facts, place, channels)
-    raise TwinError(f"'{text}' names no output", "--out", "write file:FILE, ring:FILE or opcua:opc.tcp://HOST:PORT")
+    if colon and place and kind == "mqtt":
+        from twin.live.mqtt import MqttSink
+
+        return MqttSink(facts, form, place, channels)
+    kinds = "file:FILE, ring:FILE, mqtt:HOST:PORT/TOPIC or opcua:opc.tcp://HOST:PORT"
+    raise TwinError(f"'{text}' names no output", "--out", f"write {kinds}")
