@@ -166,25 +166,33 @@ def driven(load: dict, loads: Table, dt: float) -> tuple:
     joint = np.array([conductance(j) for j in load["joints"]]).reshape(-1, cut.n).T
     gamma, heat = np.zeros((cut.n, *[len(load["ports"])] * 2)), np.zeros((cut.n, len(load["ports"])))
     for pair in load["pairs"]:
-        stations, first = np.array(load["rails"][pair["rail"]]["stations"]), load["rails"][pair["rail"]]["first_port"]
-        ports, g = np.array([*(first + np.arange(len(stations))), pair["pad_port"]]), conductance(pair)
         way = np.interp(cut.borders, time, values[load["axes"][pair["axis"]]["position"]])
         way = pair["station"] + (-way if pair["rail_moves"] else way)
         own = [k for k, s in enumerate(load["sources"]) if s["contact"] == pair["contact"]]
+        divisor = sum(e["contact"] == pair["contact"] for e in load["pairs"])
+        q = [np.hstack([np.zeros((len(p[0]), 0)), *(p[k] for k in own)]) / divisor for p in (rows, power)]
         rail_share = np.array([load["sources"][k]["rail_share"] for k in own])
-        q = [np.hstack([p[k] for k in own]) / sum(e["contact"] == pair["contact"] for e in load["pairs"])
-             for p in (rows, power)] if own else [np.zeros((n, 0)) for n in (n_rows, cut.n)]  # fmt: skip
-        for i, (begin, end) in enumerate(pairwise([*cut.first, len(cut.step)])):
-            rests = np.ptp(way[begin : end + 1]) == 0.0
-            for m in range(begin, begin + 1 if rests else end):
-                w, part = facing(stations, pair["assignment"], way[m], way[m + 1])
-                part, now = (part, q[1][i]) if rests else (part * cut.share[m], q[0][cut.row[m]])
-                d = np.vstack([-w, np.ones(len(part))])
-                gamma[np.ix_([i], ports, ports)] += g[i] * (d * part) @ d.T
-                heat[i, ports[:-1]] += rail_share @ now * (w @ part)
-            heat[i, pair["pad_port"]] += (1.0 - rail_share) @ q[1][i]
+        add_pair(load["rails"][pair["rail"]], pair, cut, way, conductance(pair), rail_share, (*q, gamma, heat))
     on_surfaces = [p * (not s["contact"]) for p, s in zip(power, load["sources"], strict=True)]
     return means, on_surfaces, film, joint, gamma, heat
+
+
+def add_pair(
+    rail: dict, pair: dict, cut: Cut, way: np.ndarray, g: np.ndarray, rail_share: np.ndarray, of: tuple
+) -> None:
+    """Add a pair to gamma [W/K] and port heat [W]; of: its heat at the rows and its means, what is added to."""
+    by_row, means, gamma, heat = of
+    stations = np.array(rail["stations"])
+    ports = np.array([*(rail["first_port"] + np.arange(len(stations))), pair["pad_port"]])
+    for i, (begin, end) in enumerate(pairwise([*cut.first, len(cut.step)])):
+        rests = np.ptp(way[begin : end + 1]) == 0.0
+        for m in range(begin, begin + 1 if rests else end):
+            w, part = facing(stations, pair["assignment"], way[m], way[m + 1])
+            part, now = (part, means[i]) if rests else (part * cut.share[m], by_row[cut.row[m]])
+            d = np.vstack([-w, np.ones(len(part))])
+            gamma[np.ix_([i], ports, ports)] += g[i] * (d * part) @ d.T
+            heat[i, ports[:-1]] += rail_share @ now * (w @ part)
+        heat[i, pair["pad_port"]] += (1.0 - rail_share) @ means[i]
 
 
 def facing(stations: np.ndarray, assignment: str, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:

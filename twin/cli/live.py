@@ -51,6 +51,8 @@ def _options() -> type[Any]:
 @click.option(
     "--channels", type=click.Path(), help="TOML file: nodes of OPC UA, users and certificates, limits of values"
 )
+@click.option("--events", type=click.Path(),
+              help="tcp.csv that grows, or folder of such: measured TCP errors that correct the model")  # fmt: skip
 @click.option("--fresh", is_flag=True, help="forget what is in the state folder")
 @bundled(_options)
 def command(artefact: str, source: str, out: tuple[str, ...], state: str, options: LiveOptions) -> None:

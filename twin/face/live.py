@@ -32,6 +32,7 @@ class LiveOptions:
     neutral: Quantity = "600 s"  # from which on it goes to neutral
     journal: int = 256  # MB
     channels: str | Path | None = None  # file with nodes of OPC UA and limits of values
+    events: str | Path | None = None  # file or folder of measured TCP errors, which correct the model
     fresh: bool = False  # forget what is in the state folder
 
 
@@ -86,7 +87,12 @@ def wired(artefact: str | Path, source: str, out: Sequence[str], state: str | Pa
     sinks = [open_sink(text, facts, options.form, channels) for text in out]
     publisher = Publisher(sinks, neutral(facts, options.form), options.form, limits, patience)
     clock = RealClock(incoming.speed) if incoming.speed else RecordClock()
-    intake = Intake(engine, limits_of(facts, channels.limits), initial, incoming.numbered)
+    learning = None
+    if options.events is not None:
+        from twin.live.learning import Learning
+
+        learning = Learning(facts, Path(options.events), folder)
+    intake = Intake(engine, limits_of(facts, channels.limits), initial, incoming.numbered, learning)
     return Runtime(intake, incoming, publisher, clock, Keeping(folder, options.journal << 20))
 
 

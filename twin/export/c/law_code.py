@@ -152,17 +152,23 @@ class _Translation:
                 at, values = (np.asarray(a.val) if hasattr(a, "val") else tables[a] for a in lists)
                 results = [self._table(at, values, read(x))]
             elif inner is not None:
-                body = getattr(inner, "jaxpr", inner)
-                shared = [not hasattr(a, "val") and a in tables for a in equation.invars]
-                known = ["" if s else read(a) for a, s in zip(equation.invars, shared, strict=True)]
-                own = {i: tables[a] for i, a, s in zip(body.invars, equation.invars, shared, strict=True) if s}
-                results = self._inside(body, getattr(inner, "consts", ()), known, own)
+                results = self._called(inner, equation, read, tables)
             else:
                 boolean = equation.outvars[0].aval.dtype == np.bool_
                 value = self._operation(equation.primitive.name, [read(a) for a in equation.invars], equation)
                 results = [self._line(value, "int" if boolean else "real")]
             names |= dict(zip(equation.outvars, results, strict=True))
         return [read(v) for v in jaxpr.outvars]
+
+    def _called(
+        self, inner: Any, equation: Any, read: Callable[[Any], str], tables: dict[Any, np.ndarray]
+    ) -> list[str]:
+        """A function that is called, written in place."""
+        body = getattr(inner, "jaxpr", inner)
+        shared = [not hasattr(a, "val") and a in tables for a in equation.invars]
+        known = ["" if s else read(a) for a, s in zip(equation.invars, shared, strict=True)]
+        own = {i: tables[a] for i, a, s in zip(body.invars, equation.invars, shared, strict=True) if s}
+        return self._inside(body, getattr(inner, "consts", ()), known, own)
 
     def _line(self, value: str, kind: str) -> str:
         name = f"v{next(self.counter)}"
