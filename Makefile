@@ -71,6 +71,12 @@ campaign-machines: $(READY) ## the same in drawn and in other shipped machines (
 	    $(BIN)/python -m pip install -qq --disable-pip-version-check --no-build-isolation -e '.[mesh]'; }
 	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.machines_campaign $(or $(MINUTES),inf) $(or $(FIRST),300) $(KINDS)
 
+.PHONY: wheelhouse
+wheelhouse: $(READY) ## wheels of twin and all that `twin live` needs, for pip install --no-index beside the machine
+	@mkdir -p .cache && sed -e '/--hash/d' -e 's/ *\\$$//' requirements.lock > .cache/constraints.txt
+	$(BIN)/python -m pip wheel -q --disable-pip-version-check -c .cache/constraints.txt -w out/wheelhouse '.[live,mqtt]'
+	@ls out/wheelhouse | wc -l | xargs -I{} echo "out/wheelhouse: {} wheels"
+
 .PHONY: demo
 demo: $(READY) ## build, verify and run the shipped five-axis machine; leaves out/ with pictures
 	@$(BIN)/twin demo -o "$(OUT)"
@@ -82,7 +88,7 @@ notebooks: $(READY) ## execute the notebooks and check the numbers they assert
 .PHONY: lock
 lock: ## resolve requirements.lock anew (keeps pins that still hold; UPGRADE=1 moves them)
 	@[ -x .cache/lock/bin/uv ] || { "$(PYTHON)" -m venv .cache/lock && .cache/lock/bin/pip install --quiet uv; }
-	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --extra cluster --extra live --universal \
+	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --extra cluster --extra live --extra mqtt --universal \
 	    --python-version 3.11 --generate-hashes --no-config --no-emit-index-url --quiet \
 	    --custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o requirements.lock
 
