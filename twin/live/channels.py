@@ -13,7 +13,7 @@ from twin.units import parse_unit, to_si
 
 _KEYS = {"opcua", "mqtt", "channels", "outputs"}
 _CHANNEL = {"node", "unit", "low", "high", "rate"}
-_OPCUA = {"interval", "certificate", "key", "user", "password_file", "heartbeat"}
+_OPCUA = {"interval", "certificate", "key", "server_certificate", "user", "password_file", "heartbeat"}
 _MQTT = {"user", "password_file", "ca", "certificate", "key", "client"}
 _OUTPUTS = {"offsets", "count", "good_until", "mode"}
 
