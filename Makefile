@@ -71,6 +71,11 @@ campaign-machines: $(READY) ## the same in drawn and in other shipped machines (
 	    $(BIN)/python -m pip install -qq --disable-pip-version-check --no-build-isolation -e '.[mesh]'; }
 	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.machines_campaign $(or $(MINUTES),inf) $(or $(FIRST),300) $(KINDS)
 
+.PHONY: fuzz
+fuzz: $(READY) ## 2,000 damaged descriptions, artefacts and run folders, 1,000 flipped bits (FIRST=4000 are others; 4 min)
+	TWIN_FUZZ=500 TWIN_FUZZ_FIRST=$(or $(FIRST),0) $(BIN)/python -m pytest -m "" tests/cli/test_fuzz.py
+	TWIN_FLIPS=1000 $(BIN)/python -m pytest -m "" tests/rom/test_hostile_artefact.py -k flip
+
 .PHONY: wheelhouse
 wheelhouse: $(READY) ## wheels of twin and all that `twin live` needs, for pip install --no-index beside the machine
 	@mkdir -p .cache && sed -e '/--hash/d' -e 's/ *\\$$//' requirements.lock > .cache/constraints.txt
