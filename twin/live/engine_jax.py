@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import twin.run.jax_setup  # noqa: F401  isort: skip  before NumPy
 
+import ctypes
+import gc
 import json
 from array import array
 from dataclasses import replace
@@ -28,6 +30,16 @@ from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalan
 from twin.run.stepping import StepHeat, advance, inputs_of
 from twin.run.system import prepare
 
+_COMPILED = (1, 2)  # steps after which most is compiled
+
+
+def _give_back() -> None:
+    """Give to the system what was freed: compiling leaves 50 MB, which glibc would keep."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
 
 class JaxEngine:
     """A machine read from an artefact; the state between steps is z and the rows since the last one."""
@@ -45,6 +57,8 @@ class JaxEngine:
         self._height = np.asarray(system.film_moment) / np.maximum(np.asarray(system.film_area), 1e-30)
         self._C, self._G = np.asarray(system.C), np.asarray(system.G)
         self.start(self.facts.reference_temperature)
+        self._made = 0  # steps of this process
+        _give_back()
 
     def start(self, temperature: float) -> None:
         self._z = self._prepared.uniform(temperature)
@@ -90,6 +104,9 @@ class JaxEngine:
         self._steps += 1
         self._keep(edge)
         self._judge(drive, jax.tree.map(np.asarray, heat), np.array([begin, edge]), np.stack([before, self._z]))
+        self._made += 1
+        if self._made in _COMPILED:
+            _give_back()
 
     def _keep(self, edge: float) -> None:
         """What stands at the end of a step begins the next one: values hold, axes are on their way."""
