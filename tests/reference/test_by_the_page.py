@@ -59,10 +59,15 @@ def test_a_lumped_machine(tmp_path, apart):
     assert apart(tmp_path / "a.h5", folder / "runs" / "warm_up") < SAME
 
 
+@pytest.fixture(scope="module", params=["ball_screw_axis/mixed_load", "five_axis/experiment_a"])
+def shipped(request, tmp_path_factory):
+    """An artefact and a run of many hours."""
+    machine, run = request.param.split("/")
+    folder, path = ROOT / "models" / machine, tmp_path_factory.mktemp(machine) / "a.h5"
+    twin.build(folder, options=twin.BuildOptions(held_out=1)).save(path)
+    return path, folder / "runs" / run
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["ball_screw_axis/mixed_load", "five_axis/experiment_a"])
-def test_a_shipped_machine_over_many_hours(tmp_path, name, apart):
-    machine, run = name.split("/")
-    folder = ROOT / "models" / machine
-    twin.build(folder, options=twin.BuildOptions(held_out=1)).save(tmp_path / "a.h5")
-    assert apart(tmp_path / "a.h5", folder / "runs" / run) < SAME
+def test_a_shipped_machine_over_many_hours(shipped, apart):
+    assert apart(*shipped) < SAME
