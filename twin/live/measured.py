@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from twin.atomic import atomic_path, telling
 from twin.errors import LogError, TwinError
 from twin.live.csv_rows import GrowingFile, Header
 from twin.live.facts import Facts
@@ -114,8 +115,8 @@ class Store:
         self.used: list[Used] = list(self._read())
 
     def append(self, used: Used) -> None:
-        """Raises OSError."""
-        with self.path.open("a", encoding="utf-8") as f:
+        """Raises TwinError where the disk is full."""
+        with telling(self.path), self.path.open("a", encoding="utf-8") as f:
             f.write(json.dumps(asdict(used)) + "\n")
             f.flush()
             os.fsync(f.fileno())
@@ -126,12 +127,11 @@ class Store:
         return any(u.stamp == row.time and u.position == row.position for u in self.used)
 
     def keep(self, used: list[Used]) -> None:
-        """These alone. Raises OSError."""
+        """These alone. Raises TwinError as `append`."""
         if len(used) < len(self.used):
             self.used = used
-            part = self.path.with_name(f".{self.path.name}.part")
-            part.write_text("".join(json.dumps(asdict(u)) + "\n" for u in used), encoding="utf-8")
-            os.replace(part, self.path)
+            with atomic_path(self.path) as part:
+                part.write_text("".join(json.dumps(asdict(u)) + "\n" for u in used), encoding="utf-8")
 
     def clear(self) -> None:
         self.path.unlink(missing_ok=True)
