@@ -71,6 +71,17 @@ campaign-machines: $(READY) ## the same in drawn and in other shipped machines (
 	    $(BIN)/python -m pip install -qq --disable-pip-version-check --no-build-isolation -e '.[mesh]'; }
 	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.machines_campaign $(or $(MINUTES),inf) $(or $(FIRST),300) $(KINDS)
 
+.PHONY: fuzz
+fuzz: $(READY) ## 2,000 damaged descriptions, artefacts and run folders, 1,000 flipped bits (FIRST=4000 are others; 4 min)
+	TWIN_FUZZ=500 TWIN_FUZZ_FIRST=$(or $(FIRST),0) $(BIN)/python -m pytest -m "" tests/cli/test_fuzz.py
+	TWIN_FLIPS=1000 $(BIN)/python -m pytest -m "" tests/rom/test_hostile_artefact.py -k flip
+
+.PHONY: wheelhouse
+wheelhouse: $(READY) ## wheels of twin and all that `twin live` needs, for pip install --no-index beside the machine
+	@mkdir -p .cache && sed -e '/--hash/d' -e 's/ *\\$$//' requirements.lock > .cache/constraints.txt
+	$(BIN)/python -m pip wheel -q --disable-pip-version-check -c .cache/constraints.txt -w out/wheelhouse '.[live,mqtt]'
+	@ls out/wheelhouse | wc -l | xargs -I{} echo "out/wheelhouse: {} wheels"
+
 .PHONY: demo
 demo: $(READY) ## build, verify and run the shipped five-axis machine; leaves out/ with pictures
 	@$(BIN)/twin demo -o "$(OUT)"
@@ -82,7 +93,7 @@ notebooks: $(READY) ## execute the notebooks and check the numbers they assert
 .PHONY: lock
 lock: ## resolve requirements.lock anew (keeps pins that still hold; UPGRADE=1 moves them)
 	@[ -x .cache/lock/bin/uv ] || { "$(PYTHON)" -m venv .cache/lock && .cache/lock/bin/pip install --quiet uv; }
-	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --extra cluster --extra live --extra serve --universal \
+	.cache/lock/bin/uv pip compile pyproject.toml --extra build --extra dev --extra compare --extra cluster --extra live --extra mqtt --extra serve --universal \
 	    --python-version 3.11 --generate-hashes --no-config --no-emit-index-url --quiet \
 	    --custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o requirements.lock
 

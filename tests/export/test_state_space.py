@@ -116,7 +116,7 @@ def by_hand(path: Path, films: np.ndarray, s: complex) -> np.ndarray:
         s_pad = pair["station"] - AT if pair["rail_moves"] else pair["station"] + AT
         d[rail["first_port"] :][: len(stations)] -= [np.interp(s_pad, stations, e) for e in np.eye(len(stations))]
         gamma += pair["conductance"] * pair["area"] * np.outer(d, d)
-    A = M["A0"] + np.tensordot(theta, M["A"], 1) + M["P"] @ gamma @ M["Po"]
+    A = M["A0"] + np.tensordot(theta, M["A"], 1) + M["P"] @ gamma @ M["P_out"].T
     air = np.zeros((len(A), len(load["environments"])))
     for k, film in enumerate(load["films"]):
         assert film["radiant"] == film["environment"]

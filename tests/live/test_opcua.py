@@ -6,17 +6,27 @@ import asyncio
 import socket
 import threading
 import time
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
 asyncua = pytest.importorskip("asyncua")
 
 from asyncua import ua  # noqa: E402
-from asyncua.crypto.cert_gen import setup_self_signed_certificate  # noqa: E402
+from asyncua.crypto.cert_gen import (  # noqa: E402
+    dump_private_key_as_pem,
+    generate_private_key,
+    setup_self_signed_certificate,
+)
 from asyncua.crypto.permission_rules import User, UserRole  # noqa: E402
-from cryptography.x509.oid import ExtendedKeyUsageOID  # noqa: E402
+from cryptography import x509  # noqa: E402
+from cryptography.hazmat.primitives import hashes  # noqa: E402
+from cryptography.hazmat.primitives.serialization import Encoding  # noqa: E402
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID  # noqa: E402
 
 from tests.live.scripted import FACTS, NAMES, Kept, runtime  # noqa: E402
+from twin.errors import TwinError  # noqa: E402
 from twin.live.channels import Channels, read_channels  # noqa: E402
 from twin.live.opcua import OpcUaSink, OpcUaSource  # noqa: E402
 from twin.live.sinks import Sent  # noqa: E402
@@ -57,8 +67,8 @@ class Manager:
 class Control:
     """A server in a thread of its own, with encryption and passwords."""
 
-    def __init__(self, folder):
-        self.folder, self.loop = folder, asyncio.new_event_loop()
+    def __init__(self, folder, days=365):
+        self.folder, self.days, self.loop = folder, days, asyncio.new_event_loop()
         with socket.socket() as s:
             s.bind(("127.0.0.1", 0))
             self.url = f"opc.tcp://127.0.0.1:{s.getsockname()[1]}"
@@ -76,7 +86,10 @@ class Control:
         )  # fmt: skip
 
     async def _start(self):
-        await self._certificate("server", ExtendedKeyUsageOID.SERVER_AUTH)
+        if self.days < 0:
+            certificate(self.folder, "server", self.days)
+        else:
+            await self._certificate("server", ExtendedKeyUsageOID.SERVER_AUTH)
         await self._certificate("client", ExtendedKeyUsageOID.CLIENT_AUTH)
         self.server = asyncua.Server(user_manager=Manager())
         await self.server.init()
@@ -156,6 +169,57 @@ def test_a_wrong_password_is_refused_and_nothing_arrives(control):
             source._connection.client()
     finally:
         source.close()
+
+
+def certificate(folder, name, days):
+    """A key and a certificate of its own making that ends so many days from now, or ended so many ago."""
+    key, who = generate_private_key(), x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+    end = datetime.now(UTC) + timedelta(days=days)
+    builder = x509.CertificateBuilder(who, who, key.public_key(), x509.random_serial_number())
+    builder = builder.not_valid_before(end - timedelta(days=400)).not_valid_after(end)
+    names = x509.SubjectAlternativeName([x509.UniformResourceIdentifier(f"urn:twin:{name}")])
+    made = builder.add_extension(names, False).sign(key, hashes.SHA256())
+    (folder / f"{name}.pem").write_bytes(dump_private_key_as_pem(key))
+    (folder / f"{name}.der").write_bytes(made.public_bytes(Encoding.DER))
+
+
+def test_a_client_certificate_that_has_expired_is_refused_at_once(control):
+    channels = channels_of(control)
+    expired = control.folder / "expired"
+    expired.mkdir()
+    certificate(expired, "client", -1)
+    own = channels.opcua | {"certificate": "expired/client.der", "key": "expired/client.pem"}
+    with pytest.raises(TwinError, match=r"certificate: valid from .* which is not now"):
+        OpcUaSource(control.url, replace(channels, opcua=own))
+    (expired / "client.der").write_bytes(b"none")
+    with pytest.raises(TwinError, match="no certificate"):
+        OpcUaSource(control.url, replace(channels, opcua=own))
+
+
+def test_another_server_than_the_pinned_one_is_refused(control):
+    channels = channels_of(control)
+    certificate(control.folder, "other", 365)
+    for name, blocks in (("server", 1), ("other", 0)):
+        source = OpcUaSource(
+            control.url, replace(channels, opcua=channels.opcua | {"server_certificate": f"{name}.der"})
+        )
+        try:
+            assert len(polled(source, 1, 10.0 if blocks else 3.0)) == blocks
+        finally:
+            source.close()
+
+
+def test_a_server_whose_certificate_has_expired_is_refused(tmp_path):
+    control = Control(tmp_path, days=-1)
+    source = OpcUaSource(control.url, channels_of(control))
+    try:
+        assert polled(source, 1, 3.0) == []
+        source._connection._tried = -1e9
+        with pytest.raises(ConnectionError, match="BadCertificateTimeInvalid"):
+            source._connection.client()
+    finally:
+        source.close()
+        control.stop()
 
 
 def test_offsets_are_written_and_read_back(control):

@@ -1,6 +1,8 @@
 """An artefact stepped by what docs/artefact.md says, with h5py and NumPy; of `twin` only the laws and the log's reader.
 
-Written from the page alone, not from `twin.run`: where both agree, the page suffices.
+Written from the page alone, not from `twin.run`: where both agree, the page suffices. What makes it long is what a log
+may do: rows anywhere in a step, laws that read a temperature, contacts that move. The same in Octave:
+`tests/reference/exports/step_log.m`.
 """
 
 from __future__ import annotations
@@ -12,131 +14,203 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from tests.reference.log_by_the_page import drive, states_of
 from twin.logs.read import read_run
+from twin.logs.run import Table
+from twin.physics.laws import LAWS
 
-GAMMA, LAST = 0.3345, (17.3493, -13.6346, 3.6868)
-SIGMA, ZERO = 5.670374419e-8, 273.15
+DIFFERENCES = np.sign(np.arange(-32, 33)) * (np.arange(-32, 33) / 32) ** 4 * 100.0  # K, of films
+TEMPERATURES = np.linspace(-50.0, 250.0, 121)  # degC, of losses
+GAMMA, SIGMA = 0.3345, 5.670374419e-8
 
 
 def sensors_over(path: Path, folder: Path, dt: float = 60.0) -> np.ndarray:
     """Structural sensors (n + 1, n_sensors) [degC] at the edges of the steps."""
     with h5py.File(path) as f:
-        load = json.loads(f["load_model"].asstr()[()])
-        certificate = json.loads(f["certificate/json"].asstr()[()])
-        reference = float(f["reference_temperature"][()])
+        load, certificate = (json.loads(f[name].asstr()[()]) for name in ("load_model", "certificate/json"))
+        reference, n_sensors = float(f["reference_temperature"][()]), len(f["sensor"])
         bodies = [{k: v[...] for k, v in f[f"bodies/{name}"].items()} for name in f["body"].asstr()[...]]
-        n_sensors = len(f["sensor"])
-    M = assembled(load, bodies, n_sensors)
-    run = read_run(folder)
-    D = drive(load, run, dt)
+    run, films = read_run(folder), load["films"]
+    M, (b, ahead) = assembled(load, bodies, n_sensors), tableau()
+    air, power, film, joint, gamma, port_heat = driven(load, run.loads, dt)
+    around = [load["environments"][j["environment"]] for j in films]
+    gradient, height, emissivity = np.array(
+        [(e["gradient"], e["height"], j["emissivity"]) for e, j in zip(around, films, strict=True)]
+    ).T
+    left = np.linalg.solve(M["E"].T, M["energy"])
+    area = left @ M["M"] + (left @ M["M"] <= 0.0)
+    mean_height, rows = left @ M["H"] / area, left @ M["A"][: len(films)]
     x = (run.initial_temperature - reference) * M["one"]
-    b, ahead = tableau()
-    result, held, inverse = [reference + M["C"] @ x], np.zeros(0), np.zeros((0, 0))
-    substeps = int(certificate.get("substeps", 1))
+    result, held, substeps = [reference + M["C"] @ x], np.array([-1.0]), int(certificate.get("substeps", 1))
     r = substeps / (GAMMA * dt)
-    n_films, film = len(load["films"]), load["films"]
-    follows = [k for k, s in enumerate(load["sources"]) if states_of(s["use"])]
-    for n in range(len(D["power"])):
-        # films at the surface temperatures of the step's start
-        environment, h = D["environment"][n], D["film"][n].copy()
-        at, gradient, height = (np.array([of(load, j, key) for j in film]) for key in ("at", "gradient", "height"))
-        radiant = environment[[j["radiant"] for j in film]]
-        surface = reference + (M["rows"] @ x) / M["area"]
-        air = environment[at.astype(int)] + gradient * (M["moment"] / M["area"] - height)
-        for k, table in D["film_table"].items():
-            h[k] = read(table[n], difference_place(surface[k] - air[k]))
-        emissivity = np.array([j["emissivity"] for j in film])
-        s, t = surface + ZERO, radiant + ZERO
-        hr = emissivity * SIGMA * (s**2 + t**2) * (s + t)
-        at_zero = environment[at.astype(int)] - gradient * height
-        share = hr / np.where(h + hr > 0.0, h + hr, 1.0)
-        rise = at_zero + share * (radiant - at_zero) - reference
-        theta = np.concatenate([h + hr, D["joint"][n]])
-
-        def powers(state: np.ndarray, n: int = n) -> np.ndarray:
-            q = D["power"][n].copy()
-            for k in follows:
-                place = np.clip((reference + M["Bo"][k] @ state + 50.0) / 2.5, 0.0, 120.0)
-                q[k] = read(D["power_table"][k][n], place)
-            return q
-
-        # the factor is kept while contacts stay and no coefficient has left it by a fifth, for 64 steps at most
-        stays = n % 64 > 0 and np.array_equal(D["gamma"][n], D["gamma"][n - 1])
-        if not stays or np.any(np.abs(theta - held) > 0.2 * held):
+    for n in range(len(air)):
+        surface, radiant = reference + rows @ x / area, air[n, [j["radiant"] for j in films]]
+        at_zero = air[n, [j["environment"] for j in films]] - gradient * height
+        difference = surface - at_zero - gradient * mean_height
+        large = np.maximum(np.abs(difference), 1e-6)
+        place = 32.0 * (1.0 + difference / large * (large / 100.0) ** 0.25)
+        h = np.array([read(table[n], place[k]) for k, table in enumerate(film)])
+        s, t = surface + 273.15, radiant + 273.15
+        radiation = emissivity * SIGMA * (s**2 + t**2) * (s + t)
+        total = h + radiation
+        outer = at_zero + radiation / (total + (total <= 0.0)) * (radiant - at_zero)
+        theta = np.concatenate([total, joint[n]])
+        if n % 64 == 0 or not np.array_equal(gamma[n], gamma[n - 1]) or np.any(np.abs(theta - held) > 0.2 * held):
             held = theta
-            A = M["A0"] + np.tensordot(held, M["A"], 1) + M["P"] @ D["gamma"][n] @ M["Po"]
-            inverse = np.linalg.inv(r * M["E"] + A)
-        rest = np.tensordot(theta - held, M["A"], 1)
-        twice = np.any(np.abs(theta - held) > 0.1 * held)
-        forcing = M["M"] @ (theta[:n_films] * rise) + M["H"] @ (h * gradient) + M["P"] @ D["port_heat"][n]
+            S = r * M["E"] + M["A0"] + np.tensordot(held, M["A"], 1) + M["P"] @ gamma[n] @ M["P_out"].T
+            inverse = np.linalg.inv(S)
+        rest, twice = np.tensordot(theta - held, M["A"], 1), np.any(np.abs(theta - held) > 0.1 * held)
+        forcing = M["M"] @ (total * (outer - reference)) + M["H"] @ (h * gradient) + M["P"] @ port_heat[n]
         for _ in range(substeps):
             new = earlier = y = x
             for k, weight in enumerate(b):
-                f = forcing + M["B"] @ powers(y + ahead[k] * (y - earlier)) + r * M["E"] @ y
-                made = inverse @ (f - rest @ y)
+                winding = reference + M["B_out"].T @ (y + ahead[k] * (y - earlier))
+                q = [read(table[n], (winding[s] + 50.0) / 2.5) for s, table in enumerate(power)]
+                known = forcing + M["B"] @ q + r * M["E"] @ y
+                made = inverse @ (known - rest @ y)
                 if twice:
-                    made = inverse @ (f - rest @ made)
-                new = new + weight / GAMMA * (made - y)
-                earlier, y = y, made
+                    made = inverse @ (known - rest @ made)
+                new, earlier, y = new + weight / GAMMA * (made - y), y, made
             x = new
         result.append(reference + M["C"] @ x)
     return np.array(result)
 
 
+def assembled(load: dict, bodies: list[dict], n_sensors: int) -> dict[str, np.ndarray]:
+    """One machine of all bodies: states one after the other, columns at their global index."""
+    edges = np.cumsum([0, *(len(b["one"]) for b in bodies)])
+    n_theta, N = len(load["films"]) + len(load["joints"]), edges[-1]
+    M = {key: np.zeros((N, N)) for key in ("E", "A0")} | {key: np.zeros(N) for key in ("one", "energy")}
+    M |= {"A": np.zeros((n_theta, N, N)), "C": np.zeros((n_sensors, N))}
+    counts = {"M": ("theta", n_theta), "H": ("theta", n_theta), "B": ("sources", len(load["sources"]))}
+    counts |= {"B_out": counts["B"], "P": ("ports", len(load["ports"])), "P_out": ("ports", len(load["ports"]))}
+    M |= {key: np.zeros((N, n)) for key, (_, n) in counts.items()}
+    for b, (i, j) in zip(bodies, pairwise(edges), strict=True):
+        b = {"B_out": b["B"], "P_out": b["P"], "H": 0.0 * b["M"]} | b
+        for key in ("E", "A0"):
+            M[key][i:j, i:j] = b[key]
+        M["one"][i:j], M["energy"][i:j] = b["one"], b["energy"]
+        M["A"][b["theta"], i:j, i:j], M["C"][b["sensors"], i:j] = b["A"], b["C"]
+        for key, (index, _) in counts.items():
+            M[key][i:j, b[index]] = b[key]
+    return M | {key: M[key][:, : len(load["films"])] for key in ("M", "H")}
+
+
 def tableau() -> tuple[np.ndarray, np.ndarray]:
     """Weights b of the six stages, and by how much of the last change each reads its sources ahead."""
-    i = np.arange(1.0, 7.0)
+    i, last = np.arange(1.0, 7.0), (17.3493, -13.6346, 3.6868)
     conditions = np.stack([i**0, GAMMA * i, GAMMA**2 * i * (i + 1.0)])
-    beta = np.array([*np.linalg.solve(conditions[:, :3], 1.0 - conditions[:, 3:] @ LAST), *LAST])
-    b = GAMMA * beta[::-1].cumsum()[::-1]
-    c = np.where(i == 1.0, 0.0, GAMMA * i)
+    beta = np.array([*np.linalg.solve(conditions[:, :3], 1.0 - conditions[:, 3:] @ last), *last])
+    b, c = GAMMA * beta[::-1].cumsum()[::-1], np.where(i == 1.0, 0.0, GAMMA * i)
     most = np.argmax(np.abs(b))
     c[most] += (0.5 - b @ c) / b[most]
     return b, np.array([0.0, *(c[1:] / GAMMA - i[:-1])])
 
 
-def assembled(load: dict, bodies: list[dict], n_sensors: int) -> dict[str, np.ndarray]:
-    """One machine of all bodies: states one after the other, columns and rows at their global index."""
-    sizes = [len(b["one"]) for b in bodies]
-    N, ends = sum(sizes), np.cumsum([0, *sizes])
-    count = {"theta": len(load["films"]) + len(load["joints"]), "ports": len(load["ports"])}
-    count |= {"sources": len(load["sources"]), "films": len(load["films"])}
-    M = {key: np.zeros((N, N)) for key in ("E", "A0")} | {"A": np.zeros((count["theta"], N, N))}
-    M |= {"M": np.zeros((N, count["films"])), "H": np.zeros((N, count["films"])), "B": np.zeros((N, count["sources"]))}
-    M |= {"P": np.zeros((N, count["ports"])), "Po": np.zeros((count["ports"], N)), "C": np.zeros((n_sensors, N))}
-    M |= {"Bo": np.zeros((count["sources"], N)), "one": np.zeros(N), "rows": np.zeros((count["films"], N))}
-    M |= {"area": np.zeros(count["films"]), "moment": np.zeros(count["films"])}
-    for b, (i, j) in zip(bodies, pairwise(ends), strict=True):
-        s = slice(i, j)
-        left = b["one"] if "P_out" not in b else np.linalg.solve(b["E"].T, b["energy"])
-        M["E"][s, s], M["A0"][s, s], M["one"][s] = b["E"], b["A0"], b["one"]
-        M["B"][s, b["sources"]], M["Bo"][b["sources"], s] = b["B"], b.get("B_out", b["B"]).T
-        M["P"][s, b["ports"]], M["Po"][b["ports"], s] = b["P"], b.get("P_out", b["P"]).T
-        M["C"][b["sensors"], s] = b["C"]
-        for column, k in enumerate(b["theta"]):
-            M["A"][k, s, s] = b["A"][column]
-            if k < count["films"]:
-                M["M"][s, k] = b["M"][:, column]
-                M["rows"][k, s] = left @ b["A"][column]
-                M["area"][k] += left @ b["M"][:, column]
-                if "H" in b:
-                    M["H"][s, k] = b["H"][:, column]
-                    M["moment"][k] += left @ b["H"][:, column]
-    M["area"][M["area"] <= 0.0] = 1.0
-    return M
+class Cut:
+    """The time of a log cut at all rows and step edges."""
+
+    def __init__(self, time: np.ndarray, dt: float):
+        self.n = max(1, int(np.ceil(time[-1] / dt - 1e-9)))
+        edges = dt * np.arange(self.n + 1)
+        self.borders = np.union1d(time[time < edges[-1]], edges)
+        self.step = np.searchsorted(edges, self.borders[:-1], side="right") - 1
+        self.row = np.searchsorted(time, self.borders[:-1], side="right") - 1  # that holds
+        self.share, self.first = np.diff(self.borders) / dt, np.searchsorted(self.step, np.arange(self.n))
+
+    def mean(self, v: np.ndarray) -> np.ndarray:
+        """Over the steps (n, ...) of rows (n_rows, ...); what is constant stays so to the last digit."""
+        base, share = v[self.row[self.first]], self.share.reshape(-1, *[1] * (v.ndim - 1))
+        return base + np.add.reduceat((v[self.row] - base[self.step]) * share, self.first)
 
 
-def of(load: dict, film: dict, key: str) -> float:
-    environment = load["environments"][film["environment"]]
-    return film["environment"] if key == "at" else environment[key]
+def signals(load: dict, columns: dict[str, np.ndarray], n_rows: int) -> dict[str, np.ndarray]:
+    values = {}
+    for s in load["signals"]:
+        v = (
+            columns.get(s["column"], np.full(n_rows, s["default"]))
+            * s["factor"]
+            / (2**0.5 if s["kind"] == "peak" else 1)
+        )
+        last = np.maximum.accumulate(np.where(np.isfinite(v), np.arange(n_rows), -1))  # a gap holds what was before it
+        values[s["name"]] = v[np.where(last < 0, np.argmax(np.isfinite(v)), last)]
+    return values
+
+
+def law(entry: dict, values: dict[str, np.ndarray], air: np.ndarray) -> np.ndarray:
+    """Gain times a law at rows, (n_rows, 1), or its table over the temperature that it reads; air (n_rows,) degC."""
+    row, use = LAWS[entry["use"]["law"]], entry["use"]
+    grid = {"temperature": TEMPERATURES[None, :], "surface": air[:, None] + DIFFERENCES, "ambient": air[:, None]}
+    given = {name: grid[name] for name in row.states} | {name: values[s][:, None] for name, s in use["signals"].items()}
+    fixed = {name: p.default for name, p in row.parameters.items() if p.default is not None} | use["parameters"]
+    found = np.atleast_1d(entry["gain"] * np.asarray(row.function(**given, **fixed)))
+    return np.broadcast_to(found, (len(air), found.shape[-1]))
+
+
+def driven(load: dict, loads: Table, dt: float) -> tuple:
+    """What the log drives, step by step: air, losses, films, joints, contacts (n, ports, ports) and their heat."""
+    time, n_rows = loads.time - loads.time[0], len(loads.time)
+    cut, values = Cut(time, dt), signals(load, loads.columns, n_rows)
+    air = np.stack([(values[e["signal"]] if e["signal"] else np.full(n_rows, e["temperature"])) + e["offset"]
+                    + e["switched_offset"] * (values[e["switch"]] if e["switch"] else 0.0)
+                    for e in load["environments"]], axis=1)  # fmt: skip
+    means = cut.mean(air)
+    film = [cut.mean(law(j, values, air[:, j["environment"]])) if j["use"]["signals"]  # else only the air can vary
+            else law(j, values, means[:, j["environment"]]) for j in load["films"]]  # fmt: skip
+    rows = [law(s, values, air[:, 0]) for s in load["sources"]]
+    power = [cut.mean(p) for p in rows]
+
+    def conductance(e: dict) -> np.ndarray:
+        on = cut.mean(np.clip(values[e["switch"]], 0.0, 1.0)) if e["switch"] else np.zeros(cut.n)
+        return e.get("area", 1.0) * e["conductance"] * (1.0 + (e["switched"] - 1.0) * on)
+
+    joint = np.array([conductance(j) for j in load["joints"]]).reshape(-1, cut.n).T
+    gamma, heat = np.zeros((cut.n, *[len(load["ports"])] * 2)), np.zeros((cut.n, len(load["ports"])))
+    for pair in load["pairs"]:
+        way = np.interp(cut.borders, time, values[load["axes"][pair["axis"]]["position"]])
+        way = pair["station"] + (-way if pair["rail_moves"] else way)
+        own = [k for k, s in enumerate(load["sources"]) if s["contact"] == pair["contact"]]
+        divisor = sum(e["contact"] == pair["contact"] for e in load["pairs"])
+        q = [np.hstack([np.zeros((len(p[0]), 0)), *(p[k] for k in own)]) / divisor for p in (rows, power)]
+        rail_share = np.array([load["sources"][k]["rail_share"] for k in own])
+        add_pair(load["rails"][pair["rail"]], pair, cut, way, conductance(pair), rail_share, (*q, gamma, heat))
+    on_surfaces = [p * (not s["contact"]) for p, s in zip(power, load["sources"], strict=True)]
+    return means, on_surfaces, film, joint, gamma, heat
+
+
+def add_pair(
+    rail: dict, pair: dict, cut: Cut, way: np.ndarray, g: np.ndarray, rail_share: np.ndarray, of: tuple
+) -> None:
+    """Add a pair to gamma [W/K] and port heat [W]; of: its heat at the rows and its means, what is added to."""
+    by_row, means, gamma, heat = of
+    stations = np.array(rail["stations"])
+    ports = np.array([*(rail["first_port"] + np.arange(len(stations))), pair["pad_port"]])
+    for i, (begin, end) in enumerate(pairwise([*cut.first, len(cut.step)])):
+        rests = np.ptp(way[begin : end + 1]) == 0.0
+        for m in range(begin, begin + 1 if rests else end):
+            w, part = facing(stations, pair["assignment"], way[m], way[m + 1])
+            part, now = (part, means[i]) if rests else (part * cut.share[m], by_row[cut.row[m]])
+            d = np.vstack([-w, np.ones(len(part))])
+            gamma[np.ix_([i], ports, ports)] += g[i] * (d * part) @ d.T
+            heat[i, ports[:-1]] += rail_share @ now * (w @ part)
+        heat[i, pair["pad_port"]] += (1.0 - rail_share) @ means[i]
+
+
+def facing(stations: np.ndarray, assignment: str, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the segments (stations, m) at points of a straight path, and the shares of its time: exact for w^2."""
+    straight = assignment == "interpolated"
+    cuts = stations if straight else (stations[1:] + stations[:-1]) / 2
+    borders = np.unique(np.clip([start, end, *cuts], min(start, end), max(start, end)))
+    s, part = borders, np.ones(1)
+    if start != end:
+        middle, half = (borders[1:] + borders[:-1]) / 2, np.diff(borders) / 2
+        s = np.concatenate([middle - half / np.sqrt(3.0), middle + half / np.sqrt(3.0)])
+        part = np.tile(half, 2) / abs(end - start)
+    every = np.eye(len(stations))
+    return np.array([np.interp(s, stations, e) for e in every]) if straight else every[
+        :, np.searchsorted(cuts, s)
+    ], part
 
 
 def read(table: np.ndarray, place: float) -> float:
-    i = min(int(place), len(table) - 2)
-    return float(table[i] + (place - i) * (table[i + 1] - table[i]))
-
-
-def difference_place(difference: float) -> float:
-    size = max(abs(difference), 1e-6)
-    return float(np.clip(32.0 * (1.0 + difference / size * (size / 100.0) ** 0.25), 0.0, 64.0))
+    """A table at a place, held at its ends; of one number that."""
+    return float(np.interp(place, np.arange(len(table)), table)) if len(table) > 1 else float(table[0])

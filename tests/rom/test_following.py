@@ -354,3 +354,20 @@ def test_a_surface_as_warm_as_its_air_has_a_derivative():
     places = [float(difference_place(np, np.float64(d))) for d in (-1e-3, -1e-9, 0.0, 1e-9, 1e-3)]
     assert places == sorted(places)
     assert places[2] == 32.0
+
+
+def test_values_that_hold_through_many_rows_make_the_same_tables():
+    """A log at 100 times the rate whose values change as rarely: each is evaluated once."""
+    film = Film("plate", MIXED, 0, 0, 0.0, 50.0)
+    load = plate([film], [Source("motor", WINDING, 1.0, "", 0.5)]).load_model
+    time, random = np.arange(0.0, 600.0, 7.0), np.random.default_rng(1)
+    rare = {"air": 20.0 + random.standard_normal(len(time)), "speed": random.uniform(0.0, 2.0, len(time)),
+            "current": random.uniform(0.0, 20.0, len(time))}  # fmt: skip
+    often = np.arange(0.0, 602.0, 0.07)
+    row = np.searchsorted(time, often + 1e-9, side="right") - 1
+    few = evaluate(load, time, rare, 60.0, 9)
+    many = evaluate(load, often, {name: v[row] for name, v in rare.items()}, 60.0, 9)
+    for a, b in ((few.films, many.films), (few.losses, many.losses)):
+        assert np.ptp(a.value) > 0.1
+        assert b.value == pytest.approx(a.value, rel=1e-12)
+        assert (b.outside == a.outside).all()

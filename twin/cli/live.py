@@ -20,11 +20,30 @@ def _options() -> type[Any]:
     return LiveOptions
 
 
-@click.command(epilog="Example: twin live out/five_axis.h5 --source replay:models/five_axis/runs/experiment_a "
+_GIVEN = "twin.cli.live.given"
+
+
+class _Remembering(click.Command):
+    """A command that keeps its arguments as they were written."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        ctx.meta[_GIVEN] = list(args)
+        return super().parse_args(ctx, args)
+
+
+@click.command(cls=_Remembering,
+               epilog="Example: twin live out/five_axis.h5 --source replay:models/five_axis/runs/experiment_a "
                "--speed 1000 --out file:out/now.json --state out/live")  # fmt: skip
 @click.argument("artefact", type=click.Path())
-@click.option("--source", required=True, help="csv:FILE that grows, replay:RUN, ring:FILE, opcua:URL")
-@click.option("--out", required=True, multiple=True, help="file:FILE, ring:FILE, opcua:URL; may be given again")
+@click.option(
+    "--source", required=True, help="csv:FILE that grows, replay:RUN, ring:FILE, mqtt:HOST:PORT/TOPIC, opcua:URL"
+)
+@click.option(
+    "--out",
+    required=True,
+    multiple=True,
+    help="file:FILE, ring:FILE, mqtt:HOST:PORT/TOPIC, opcua:URL; may be given again",
+)
 @click.option("--state", required=True, type=click.Path(), help="folder for journal, checkpoint and health record")
 @click.option("--engine", type=click.Choice(["c", "jax"]), default="c", show_default=True,
               help="c: compiled once, starts in a moment; jax: needs no compiler")  # fmt: skip
@@ -41,14 +60,27 @@ def _options() -> type[Any]:
 @click.option("--neutral", type=Quantity("s"), default="600 s", show_default=True,
               help="age from which on it goes to neutral")  # fmt: skip
 @click.option("--journal", type=click.IntRange(1), default=256, show_default=True, help="MB of past blocks to keep")
-@click.option("--channels", type=click.Path(), help="TOML file: nodes of OPC UA, limits of values")
+@click.option(
+    "--channels", type=click.Path(), help="TOML file: nodes of OPC UA, users and certificates, limits of values"
+)
+@click.option("--events", type=click.Path(),
+              help="tcp.csv that grows, or folder of such: measured TCP errors that correct the model")  # fmt: skip
 @click.option("--fresh", is_flag=True, help="forget what is in the state folder")
+@click.option("--print-unit", is_flag=True, help="print the systemd unit of this command, and do nothing else")
 @bundled(_options)
-def command(artefact: str, source: str, out: tuple[str, ...], state: str, options: LiveOptions) -> None:
+def command(
+    artefact: str, source: str, out: tuple[str, ...], state: str, print_unit: bool, options: LiveOptions
+) -> None:
     """Run ARTEFACT beside the machine: load blocks in, axis offsets out, until the source ends or a signal comes.
 
     Killed at any moment it goes on where it was. STATE/health.json says how it is.
     """
+    if print_unit:
+        from twin.live.install.unit import unit_of
+
+        given = click.get_current_context().meta[_GIVEN]
+        click.echo(unit_of([a for a in given if a not in ("--print-unit", "--fresh")], options.engine), nl=False)
+        return
     from twin.face.live import live
 
     stopped: list[int] = []

@@ -21,6 +21,8 @@ from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
 from twin.rom.tcp import by_body
 
+UNDEFORMED = "undeformed, as the artefact holds no displacements of its surface; --field has them"
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -39,6 +41,7 @@ class Frames:
     cells: np.ndarray  # (c, k) numbers of points
     count: int
     frames: Iterator[Frame]
+    note: str = ""  # what is not in it
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def _surface(artefact: Artefact, stored: _Stored) -> Frames:
             temperature = artefact.model.reference_temperature + np.concatenate(warm)
             yield Frame(float(stored.time[row] - stored.time[0]), points, {"temperature": temperature})
 
-    return Frames("triangle", triangles, len(stored.chosen), made())
+    return Frames("triangle", triangles, len(stored.chosen), made(), UNDEFORMED)
 
 
 def _volume(artefact: Artefact, stored: _Stored) -> Frames:

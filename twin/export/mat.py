@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from scipy.io import savemat
 
 from twin.atomic import atomic_path
+from twin.export.c.law_code import law_lines
 from twin.export.matrices import body_arrays, described, machine_arrays, state_space_arrays
 from twin.export.operating_point import OperatingPoint, chosen
 from twin.export.options import ExportOptions
@@ -24,7 +26,8 @@ def export_mat(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[
 
 
 def write_mat(path: Path, artefact: Artefact, point: OperatingPoint) -> StateSpace:
-    """Write `path`: E, A, B, C, D with names and units, `machine`, and a cell array `affine` of the bodies' structs.
+    """Write `path`: E, A, B, C, D with names and units, `machine`, cells `affine` with a struct per body, and `log`:
+    what a log drives the machine with, as JSON, and its laws as lines of Octave.
 
     Names are cell arrays, indices count from 1. Raises TwinError if the file cannot be written.
     """
@@ -32,6 +35,13 @@ def write_mat(path: Path, artefact: Artefact, point: OperatingPoint) -> StateSpa
     content = {name: _cells(value) for name, value in state_space_arrays(space).items()}
     content["machine"] = {name: _cells(value) for name, value in machine_arrays(artefact, point).items()}
     content["affine"] = np.array([_body(body.name, body_arrays(body)) for body in artefact.model.bodies], dtype=object)
+    load = artefact.model.load_model
+    content["log"] = {
+        "load_model": json.dumps(load.to_json()),
+        "source_laws": _cells(np.array([law_lines(source.use) for source in load.sources])),
+        "film_laws": _cells(np.array([law_lines(film.use) for film in load.films])),
+        "substeps": float(artefact.certificate.get("substeps", 1)),
+    }
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         savemat(file, content, oned_as="column", long_field_names=True)
     return space

@@ -81,6 +81,7 @@ def body_arrays(body: AffineBody) -> dict[str, np.ndarray]:
         "C": body.C,
         "G": body.G,  # (pose, 3, n) m/K
         "one": body.one,
+        "energy": body.energy,
         "theta": np.array(body.theta, dtype=np.int64),
         "sources": np.array(body.sources, dtype=np.int64),
         "ports": np.array(body.ports, dtype=np.int64),

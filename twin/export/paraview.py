@@ -28,10 +28,11 @@ def export_vtk(artefact: Artefact, folder: Path, options: ExportOptions) -> tupl
             mesh = meshio.Mesh(frame.points, [(series.cell_type, series.cells)], point_data=frame.data)
             mesh.write(temporary / name, file_format="vtu")
             entries.append(f"<DataSet timestep={quoteattr(repr(frame.time))} part='0' file={quoteattr(name)}/>")
-        lines = ["<?xml version='1.0'?>", "<VTKFile type='Collection' version='0.1'>", "<Collection>"]
+        note = [f"<!-- {series.note.replace('--', '')} -->"] if series.note else []
+        lines = ["<?xml version='1.0'?>", *note, "<VTKFile type='Collection' version='0.1'>", "<Collection>"]
         text = "\n".join([*lines, *entries, "</Collection>", "</VTKFile>", ""])
         (temporary / "series.pvd").write_text(text, encoding="ascii")
-    what = ", ".join(frame.data)
+    what = ", ".join([*frame.data, *([series.note] if series.note else [])])
     return (f"{folder}/series.pvd: {series.count} times, {len(series.cells)} cells ({series.cell_type}), {what}",)
 
 

@@ -24,12 +24,16 @@ def export_vtkhdf(artefact: Artefact, path: Path, options: ExportOptions) -> tup
     series = frames_of(artefact, options)
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as f:  # default library version: VTK reads no later
         _write(f, series)
-    return (f"{path}: {series.count} times, {len(series.cells)} cells ({series.cell_type})",)
+    return (
+        f"{path}: {series.count} times, {len(series.cells)} cells ({series.cell_type})"
+        + (f", {series.note}" if series.note else ""),
+    )
 
 
 def _write(f: h5py.File, series: Frames) -> None:
     n, cells, corners = series.count, *series.cells.shape
     root = f.create_group("VTKHDF")
+    f.attrs["note"] = series.note  # beside what VTK reads
     root.attrs["Version"] = np.array([2, 0])
     root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", len("UnstructuredGrid")))
     root["NumberOfCells"] = [cells]

@@ -32,6 +32,7 @@ class LiveOptions:
     neutral: Quantity = "600 s"  # from which on it goes to neutral
     journal: int = 256  # MB
     channels: str | Path | None = None  # file with nodes of OPC UA and limits of values
+    events: str | Path | None = None  # file or folder of measured TCP errors, which correct the model
     fresh: bool = False  # forget what is in the state folder
 
 
@@ -45,9 +46,9 @@ def live(
 ) -> Runtime:
     """Run beside a machine until the source ends or `stop()` is true: blocks of loads in, axis offsets out.
 
-    source: "csv:FILE", "replay:RUN", "ring:FILE" or "opcua:URL". out: "file:FILE", "ring:FILE", "opcua:URL". state:
-    folder for journal, checkpoint and health record, from which a process that was killed goes on. Returns the closed
-    runtime, whose counts and state can be read. docs/live.md tells all of it.
+    source: "csv:FILE", "replay:RUN", "ring:FILE", "mqtt:HOST:PORT/TOPIC" or "opcua:URL". out: "file:FILE", "ring:FILE",
+    "mqtt:HOST:PORT/TOPIC" or "opcua:URL". state: folder for journal, checkpoint and health record, from which a process
+    that was killed goes on. Returns the closed runtime, whose counts and state can be read; docs/live.md has all of it.
     Raises TwinError for a machine without a TCP, a state of another artefact or in use, and names of no source.
     """
     runtime = wired(artefact, source, out, state, options or LiveOptions())
@@ -86,7 +87,12 @@ def wired(artefact: str | Path, source: str, out: Sequence[str], state: str | Pa
     sinks = [open_sink(text, facts, options.form, channels) for text in out]
     publisher = Publisher(sinks, neutral(facts, options.form), options.form, limits, patience)
     clock = RealClock(incoming.speed) if incoming.speed else RecordClock()
-    intake = Intake(engine, limits_of(facts, channels.limits), initial, incoming.numbered)
+    learning = None
+    if options.events is not None:
+        from twin.live.learning import Learning
+
+        learning = Learning(facts, Path(options.events), folder)
+    intake = Intake(engine, limits_of(facts, channels.limits), initial, incoming.numbered, learning)
     return Runtime(intake, incoming, publisher, clock, Keeping(folder, options.journal << 20))
 
 
@@ -105,4 +111,9 @@ def open_sink(text: str, facts: Facts, form: Literal["grid", "polynomial"], chan
         from twin.live.opcua import OpcUaSink
 
         return OpcUaSink(facts, place, channels)
-    raise TwinError(f"'{text}' names no output", "--out", "write file:FILE, ring:FILE or opcua:opc.tcp://HOST:PORT")
+    if colon and place and kind == "mqtt":
+        from twin.live.mqtt import MqttSink
+
+        return MqttSink(facts, form, place, channels)
+    kinds = "file:FILE, ring:FILE, mqtt:HOST:PORT/TOPIC or opcua:opc.tcp://HOST:PORT"
+    raise TwinError(f"'{text}' names no output", "--out", f"write {kinds}")

@@ -1,4 +1,4 @@
-"""The channels file: where signals are on an OPC UA server, what a value cannot be, where corrections go. TOML."""
+"""The channels file, TOML: nodes of OPC UA servers, users, what a value cannot be, where corrections go."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from twin.errors import TwinError
 from twin.live.facts import Facts
 from twin.units import parse_unit, to_si
 
-_KEYS = {"opcua", "channels", "outputs"}
+_KEYS = {"opcua", "mqtt", "channels", "outputs"}
 _CHANNEL = {"node", "unit", "low", "high", "rate"}
-_OPCUA = {"interval", "certificate", "key", "user", "password_file", "heartbeat"}
+_OPCUA = {"interval", "certificate", "key", "server_certificate", "user", "password_file", "heartbeat"}
+_MQTT = {"user", "password_file", "ca", "certificate", "key", "client"}
 _OUTPUTS = {"offsets", "count", "good_until", "mode"}
 
 
@@ -23,6 +24,7 @@ class Channels:
 
     folder: Path = Path(".")
     opcua: dict[str, Any] = field(default_factory=dict)
+    mqtt: dict[str, Any] = field(default_factory=dict)
     nodes: dict[str, tuple[str, str]] = field(default_factory=dict)  # column -> node, unit
     limits: dict[str, dict[str, float]] = field(default_factory=dict)  # column -> low, high, rate in SI
     outputs: dict[str, str] = field(default_factory=dict)
@@ -41,6 +43,7 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
         raise TwinError(f"not valid TOML: {e}", str(path), remedy) from e
     _known(told, _KEYS, path, "")
     _known(told.get("opcua", {}), _OPCUA, path, "opcua")
+    _known(told.get("mqtt", {}), _MQTT, path, "mqtt")
     _known(told.get("outputs", {}), _OUTPUTS, path, "outputs")
     units = {c.column: c.unit for c in facts.channels} | dict.fromkeys(facts.sensors, "degC")
     nodes, limits = {}, {}
@@ -53,7 +56,7 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
             nodes[column] = (str(own["node"]), str(own.get("unit", unit)))
             _checked(own.get("unit", unit), unit, where)
         limits[column] = {k: _si(own[k], unit, k, where) for k in ("low", "high", "rate") if k in own}
-    return Channels(path.parent, told.get("opcua", {}), nodes, limits, told.get("outputs", {}))
+    return Channels(path.parent, told.get("opcua", {}), told.get("mqtt", {}), nodes, limits, told.get("outputs", {}))
 
 
 def _known(table: dict[str, Any], keys: set[str], path: Path, name: str) -> None:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import twin.run.jax_setup  # noqa: F401  isort: skip  before NumPy
 
+import ctypes
+import gc
 import json
-import math
 from array import array
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,16 @@ from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalan
 from twin.run.stepping import StepHeat, advance, inputs_of
 from twin.run.system import prepare
 
+_COMPILED = (1, 2)  # steps after which most is compiled
+
+
+def _give_back() -> None:
+    """Give to the system what was freed: compiling leaves 50 MB, which glibc would keep."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
 
 class JaxEngine:
     """A machine read from an artefact; the state between steps is z and the rows since the last one."""
@@ -46,35 +57,41 @@ class JaxEngine:
         self._height = np.asarray(system.film_moment) / np.maximum(np.asarray(system.film_area), 1e-30)
         self._C, self._G = np.asarray(system.C), np.asarray(system.G)
         self.start(self.facts.reference_temperature)
+        self._made = 0  # steps of this process
+        _give_back()
 
     def start(self, temperature: float) -> None:
         self._z = self._prepared.uniform(temperature)
         self._steps = 0
-        self._times: list[float] = []
-        self._rows: list[list[float]] = []
+        self._times = np.zeros(0)
+        self._rows = np.zeros((0, len(self.facts.channels)))  # since the last step
         self._air = [temperature] * len(self._model.ambient_sensors)
         self._flags: list[str] = []
         self._balance = 0.0
 
     def feed(self, times: array[float], rows: array[float]) -> int:
-        s, before = len(self.facts.channels), self._steps
-        for i, t in enumerate(times):
-            row = rows[i * s : (i + 1) * s].tolist()
-            if not self._rows:
-                row = [c.default if math.isnan(v) and c.default is not None else v
-                       for v, c in zip(row, self.facts.channels, strict=True)]  # fmt: skip
-            if self._times and t <= self._times[-1]:
-                raise EngineFailure("time does not increase", "engine", "look at the log with `twin check`")
-            self._times.append(t)
-            self._rows.append(row)
-            while t >= (self._steps + 1) * self.facts.step - 1e-9 * self.facts.step:
+        before, small = self._steps, 1e-9 * self.facts.step
+        time, row = np.array(times), np.array(rows).reshape(len(times), -1)
+        if not len(self._times) and len(time):
+            default = np.array([np.nan if c.default is None else c.default for c in self.facts.channels])
+            row[0] = np.where(np.isnan(row[0]), default, row[0])
+        if np.any(np.diff(np.append(self._times[-1:], time)) <= 0.0):
+            raise EngineFailure("time does not increase", "engine", "look at the log with `twin check`")
+        at = 0
+        while at < len(time):  # up to the row that completes a step, and so on
+            edge = (self._steps + 1) * self.facts.step
+            end = min(int(np.searchsorted(time, edge - small)) + 1, len(time))
+            self._times = np.append(self._times, time[at:end])
+            self._rows = np.concatenate([self._rows, row[at:end]])
+            while self._times[-1] >= (self._steps + 1) * self.facts.step - small:
                 self._step()
+            at = end
         return self._steps - before
 
     def _step(self) -> None:
         dt = self.facts.step
         begin, edge = self._steps * dt, (self._steps + 1) * dt
-        time, values = np.array(self._times), np.array(self._rows)
+        time, values = self._times, self._rows
         signals = {
             c.name: as_meant(c, values[:, k])
             for k, c in enumerate(self._load.signals)
@@ -87,24 +104,28 @@ class JaxEngine:
         self._steps += 1
         self._keep(edge)
         self._judge(drive, jax.tree.map(np.asarray, heat), np.array([begin, edge]), np.stack([before, self._z]))
+        self._made += 1
+        if self._made in _COMPILED:
+            _give_back()
 
     def _keep(self, edge: float) -> None:
         """What stands at the end of a step begins the next one: values hold, axes are on their way."""
-        first = next((i for i, t in enumerate(self._times) if t >= edge - 1e-9 * self.facts.step), len(self._times))
-        held = list(self._rows[0])
-        for row in self._rows[1:first]:
-            held = [h if math.isnan(v) else v for h, v in zip(held, row, strict=True)]
-        if first < len(self._times) and self._times[first] <= edge + 1e-9 * self.facts.step:
-            held = [h if math.isnan(v) else v for h, v in zip(held, self._rows[first], strict=True)]
+        small = 1e-9 * self.facts.step
+        first = int(np.searchsorted(self._times, edge - small))
+        there = first < len(self._times) and self._times[first] <= edge + small  # a row at the edge itself
+        past = self._rows[: first + there]
+        last = np.where(np.isnan(past), -1, np.arange(len(past))[:, None]).max(axis=0)  # -1: no value yet
+        held = past[np.maximum(last, 0), np.arange(past.shape[1])]
+        if there:
             first += 1
         elif first < len(self._times):
-            there = self._times[first - 1]
-            part = (edge - there) / (self._times[first] - there)
-            for k in self._positions:
-                to = self._rows[first][k]
-                held[k] = held[k] if math.isnan(to) else held[k] + part * (to - held[k])
-        self._times = [edge, *self._times[first:]]
-        self._rows = [held, *self._rows[first:]]
+            before = self._times[first - 1]
+            part, to = (edge - before) / (self._times[first] - before), self._rows[first]
+            moved = np.array(sorted(self._positions), dtype=int)
+            known = moved[~np.isnan(to[moved])]
+            held[known] += part * (to[known] - held[known])
+        self._times = np.append(edge, self._times[first:])
+        self._rows = np.concatenate([held[None], self._rows[first:]])
 
     def _judge(self, drive: Drive, heat: StepHeat, time: np.ndarray, states: np.ndarray) -> None:
         """Flags, air and balance of a step; raises EngineFailure for what cannot be."""
@@ -152,7 +173,7 @@ class JaxEngine:
         return self._balance
 
     def saved(self) -> bytes:
-        told = {"steps": self._steps, "times": self._times, "rows": self._rows, "air": self._air,
+        told = {"steps": self._steps, "times": self._times.tolist(), "rows": self._rows.tolist(), "air": self._air,
                 "flags": self._flags, "balance": self._balance}  # fmt: skip
         return json.dumps(told).encode() + b"\n" + np.ascontiguousarray(self._z, dtype="<f8").tobytes()
 
@@ -165,5 +186,7 @@ class JaxEngine:
                 raise ValueError("another number of states")
         except ValueError as e:
             raise TwinError("the state is of another engine", "state", "start afresh with --fresh") from e
-        self._z, self._steps, self._times, self._rows = z, told["steps"], told["times"], told["rows"]
+        self._z, self._steps = z, told["steps"]
+        self._times = np.array(told["times"])
+        self._rows = np.array(told["rows"]).reshape(len(self._times), -1)
         self._air, self._flags, self._balance = told["air"], told["flags"], told["balance"]

@@ -15,6 +15,7 @@ from twin.live.condense import condense
 from twin.live.drift import Drift
 from twin.live.engine import Engine
 from twin.live.gate import Gate, Limits
+from twin.live.learning import Learning
 from twin.live.timeline import Timeline
 
 NAN = math.nan
@@ -23,8 +24,16 @@ NAN = math.nan
 class Intake:
     """The engine and all that is between a block and it."""
 
-    def __init__(self, engine: Engine, limits: tuple[Limits, ...], initial: float | None, numbered: bool):
+    def __init__(
+        self,
+        engine: Engine,
+        limits: tuple[Limits, ...],
+        initial: float | None,
+        numbered: bool,
+        learning: Learning | None = None,
+    ):
         """initial [degC]: of the whole machine; None: of the air around it, as first logged."""
+        self.learning = learning
         self.engine, self.initial, self.numbered = engine, initial, numbered
         self.timeline, self.gate, self.drift = Timeline(), Gate(engine.facts, limits), Drift()
         self.base: float | None = None  # s, of the timeline: when the machine was started; None: not yet
@@ -109,6 +118,8 @@ class Intake:
                     self.measured, dict(zip(engine.facts.sensors, engine.sensors(), strict=True)), done * step
                 )
                 self.measured = {}
+                if self.learning is not None:
+                    self.learning.step(engine.steps, engine.displacements())
                 each_step()
 
     def _map(self, block: Block) -> None:
@@ -126,11 +137,17 @@ class Intake:
             elif name in facts.sensors and unit == "degC":
                 self._sensors.append((name, column))
 
+    def displacements(self) -> list[float]:
+        """TCP errors at the poses [m], with what was learnt."""
+        moved = self.engine.displacements()
+        return moved if self.learning is None else self.learning.corrected(moved)
+
     def stored(self) -> dict[str, Any]:
         return {
             "timeline": self.timeline.stored(), "gate": self.gate.stored(), "drift": self.drift.stored(),
             "base": self.base, "records": self.records, "dropped": self.dropped, "measured": self.measured,
             "worst_balance": self.worst_balance,
+            "learning": None if self.learning is None else self.learning.stored(),
         }  # fmt: skip
 
     def restore(self, told: dict[str, Any]) -> None:
@@ -140,3 +157,5 @@ class Intake:
         self.drift.restore(told["drift"])
         self.base, self.records, self.dropped = told["base"], told["records"], told["dropped"]
         self.measured, self.worst_balance = dict(told["measured"]), told["worst_balance"]
+        if self.learning is not None and told.get("learning"):
+            self.learning.restore(told["learning"])

@@ -12,6 +12,8 @@ import time
 from array import array
 from collections.abc import Sequence
 from concurrent.futures import CancelledError
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from twin.errors import TwinError
@@ -44,9 +46,12 @@ class Connection:
         self._client: Any = None
         self._tried = -math.inf
         own = channels.opcua
-        for key in ("certificate", "key", "password_file"):
+        for key in ("certificate", "key", "password_file", "server_certificate"):
             if key in own and not (channels.folder / own[key]).is_file():
                 raise TwinError(f"{key}: no file '{own[key]}'", "opcua", "paths are relative to the channels file")
+        for key in ("certificate", "server_certificate"):
+            if key in own:
+                _refuse_expired(channels.folder / own[key], key)
 
     def client(self) -> Any:
         """Connected, or OSError."""
@@ -59,8 +64,10 @@ class Connection:
         own = self.channels.opcua
         try:
             if "certificate" in own:
-                paths = f"{self.channels.folder / own['certificate']},{self.channels.folder / own['key']}"
+                keys = [k for k in ("certificate", "key", "server_certificate") if k in own]
+                paths = ",".join(str(self.channels.folder / own[k]) for k in keys)
                 client.set_security_string(f"Basic256Sha256,SignAndEncrypt,{paths}")
+                client.aio_obj.certificate_validator = _server_validator()
             if "user" in own:
                 client.set_user(own["user"])
                 client.set_password((self.channels.folder / own["password_file"]).read_text("utf-8").strip())
@@ -82,6 +89,29 @@ class Connection:
             client.disconnect()
         except Exception:
             client.tloop.stop()
+
+
+def _server_validator() -> Any:
+    """Of a server's certificate: its time; whose it is says `server_certificate`."""
+    from asyncua.crypto.validator import CertificateValidator, CertificateValidatorOptions
+
+    own = CertificateValidatorOptions.TIME_RANGE | CertificateValidatorOptions.PEER_SERVER
+    return CertificateValidator(own).validate
+
+
+def _refuse_expired(path: Path, key: str) -> None:
+    """Raises TwinError for a file that is no certificate, or one that is not valid now."""
+    from cryptography import x509
+
+    data = path.read_bytes()
+    try:
+        found = (x509.load_pem_x509_certificate if b"-----BEGIN" in data else x509.load_der_x509_certificate)(data)
+    except ValueError as e:
+        raise TwinError(f"{key}: no certificate", str(path), "give one in DER or PEM") from e
+    begin, end, now = found.not_valid_before_utc, found.not_valid_after_utc, datetime.now(UTC)
+    if not begin <= now <= end:
+        what = f"{key}: valid from {begin:%Y-%m-%d} to {end:%Y-%m-%d}, which is not now"
+        raise TwinError(what, str(path), "make a new one, and let the server trust it; or set the clock")
 
 
 class OpcUaSource:

@@ -20,6 +20,7 @@ from twin.live.engine import EngineFailure
 from twin.live.health import FORMAT, HealthFiles, Latency
 from twin.live.intake import Intake
 from twin.live.journal import Journal, Position
+from twin.live.learning import Learning
 from twin.live.offsets import offsets
 from twin.live.publisher import Publisher
 from twin.live.source import Mark, Source
@@ -72,8 +73,12 @@ class Runtime:
         if fresh:
             remove_checkpoint(path)
             self.journal.clear()
+            if self.intake.learning is not None:
+                self.intake.learning.clear()
         else:
             self._restore(read_checkpoint(path), path)
+        if self.intake.learning is not None:
+            self.intake.learning.begun()
         self.source.resume(self._mark)
         if self.intake.base is not None and not self.failure:
             if self.intake.engine.steps:
@@ -157,13 +162,22 @@ class Runtime:
         self._step_time = time.perf_counter() - began
 
     def _stepped(self) -> None:
+        if self.intake.learning is not None and self._going:
+            self._learn(self.intake.learning)
         self._aim()
         if not self.source.speed and self._going:  # at once: time passes with the records
             self.publisher.tick(self.clock.now())
 
     def _aim(self) -> None:
         engine, form = self.intake.engine, self.publisher.form
-        self.publisher.aim(offsets(engine.facts, engine.displacements(), form))
+        self.publisher.aim(offsets(engine.facts, self.intake.displacements(), form))
+
+    def _learn(self, learning: Learning) -> None:
+        """Measured TCP errors that have come."""
+        line, base = self.intake.timeline, self.intake.base or 0.0
+        active = self.publisher.outlets[0].now if self.publisher.outlets else None
+        for told in learning.listen(line.shift - line.origin - base, active, self.publisher.form):
+            self.files.event({"time": time.time(), "measured": told})
 
     # ---- what is kept and told ----
 
@@ -271,6 +285,7 @@ class Runtime:
                 for name, r in intake.drift.of.items()
             },
             "drift": alarms,
+            "learnt": None if intake.learning is None else intake.learning.health(),
             "latency": self.latency.told() | {"last_step_s": self._step_time},
             "memory_bytes": _resident(),
             "journal_bytes": self.journal.bytes,

@@ -8,7 +8,7 @@ import struct
 from array import array
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from twin.errors import TwinError
 from twin.live.block import Block
@@ -46,6 +46,36 @@ class Sink(Protocol):
     def close(self) -> None: ...
 
 
+def told_of(sent: Sent, facts: Facts, form: Form) -> dict[str, Any]:
+    """A correction as JSON values, with all that it takes to evaluate it."""
+    return {
+        "format": FORMAT,
+        "machine": facts.machine,
+        "artefact": facts.digest,
+        "count": sent.count,
+        "block": sent.block,
+        "written": sent.written,
+        "good_until": sent.good_until,
+        "mode": sent.mode,
+        "words": sent.words,
+        "form": form,
+        "unit": "m",
+        "pose_grid_m": {a.name: list(g) for a, g in zip(facts.axes, facts.pose_grid, strict=True)},
+        "axes": [{"name": a.name, "centre_m": a.centre, "half_range_m": a.half_range, "degree": a.degree}
+                 for a in facts.axes],
+        "offsets": {a.name: list(v) for a, v in zip(facts.axes, sent.values, strict=True)},
+    }  # fmt: skip
+
+
+def values_in(told: Any, facts: Facts, form: Form) -> Values | None:
+    """The offsets in what `told_of` made; None of anything else, of other artefacts and forms."""
+    try:
+        same = told["format"] == FORMAT and told["artefact"] == facts.digest and told["form"] == form
+        return tuple(tuple(float(v) for v in told["offsets"][a.name]) for a in facts.axes) if same else None
+    except (ValueError, KeyError, TypeError):
+        return None
+
+
 class FileSink:
     """JSON, replaced as a whole: a reader sees the one before or this one."""
 
@@ -62,32 +92,12 @@ class FileSink:
 
     def last(self) -> Values | None:
         try:
-            told = json.loads(self.path.read_text(encoding="utf-8"))
-            same = told["format"] == FORMAT and told["artefact"] == self.facts.digest and told["form"] == self.form
-            return tuple(tuple(float(v) for v in told["offsets"][a.name]) for a in self.facts.axes) if same else None
-        except (OSError, ValueError, KeyError, TypeError):
+            return values_in(json.loads(self.path.read_text(encoding="utf-8")), self.facts, self.form)
+        except (OSError, ValueError):
             return None
 
     def write(self, sent: Sent) -> None:
-        facts = self.facts
-        told = {
-            "format": FORMAT,
-            "machine": facts.machine,
-            "artefact": facts.digest,
-            "count": sent.count,
-            "block": sent.block,
-            "written": sent.written,
-            "good_until": sent.good_until,
-            "mode": sent.mode,
-            "words": sent.words,
-            "form": self.form,
-            "unit": "m",
-            "pose_grid_m": {a.name: list(g) for a, g in zip(facts.axes, facts.pose_grid, strict=True)},
-            "axes": [{"name": a.name, "centre_m": a.centre, "half_range_m": a.half_range, "degree": a.degree}
-                     for a in facts.axes],
-            "offsets": {a.name: list(v) for a, v in zip(facts.axes, sent.values, strict=True)},
-        }  # fmt: skip
-        self._part.write_text(json.dumps(told), encoding="utf-8")
+        self._part.write_text(json.dumps(told_of(sent, self.facts, self.form)), encoding="utf-8")
         os.replace(self._part, self.path)  # no fsync: after a power failure the control is at neutral anyway
 
     def close(self) -> None:

@@ -43,11 +43,11 @@ class Source(Protocol):
     def close(self) -> None: ...
 
 
-KINDS = "csv:LOADS.CSV, replay:RUN, ring:FILE, opcua:opc.tcp://HOST:PORT"
+KINDS = "csv:LOADS.CSV, replay:RUN, ring:FILE, mqtt:HOST:PORT/TOPIC, opcua:opc.tcp://HOST:PORT"
 
 
 def open_source(text: str, speed: float, channels: Channels) -> Source:
-    """The source that `text` names: kind:place. channels: of the channels file, for OPC UA.
+    """The source that `text` names: kind:place. channels: of the channels file, for OPC UA and MQTT.
 
     Raises TwinError for other kinds, and LogError for files that cannot be read.
     """
@@ -70,4 +70,8 @@ def open_source(text: str, speed: float, channels: Channels) -> Source:
         from twin.live.opcua import OpcUaSource
 
         return OpcUaSource(place, channels)
+    if kind == "mqtt":
+        from twin.live.mqtt import MqttSource
+
+        return MqttSource(place, channels)
     raise TwinError(f"no source '{kind}'", "--source", f"write one of {KINDS}")

@@ -11,6 +11,7 @@ import numpy as np
 from twin.errors import TwinError
 from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
+from twin.together import result_h5
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Drawn:
 
 def read_result(folder: Path, artefact: Artefact) -> Drawn:
     """The result in `folder`. Raises TwinError where there is none, or none of this artefact."""
-    path = Path(folder) / "result.h5"
+    path = result_h5(Path(folder) / "result.h5")
     remedy = "make it with: twin run ARTEFACT RUN -o OUT"
     if not path.is_file():
         raise TwinError("no result here", str(path), remedy)

@@ -15,7 +15,7 @@ from twin.rom.load_model import LawUse
 
 # Samples go through in blocks of one size, so that logs of any length share one compiled function.
 _BLOCK = 4096
-_BLOCK_OF_TABLES = 256  # of a table over states: as many numbers as in the other blocks
+_BLOCKS_OF_TABLES = (64, 256)  # of a table over states: a minute of a log, as many numbers as in the other blocks
 
 
 def parameters_of(use: LawUse) -> dict[str, float]:
@@ -120,6 +120,7 @@ def law_table(
     states: argument -> (n_samples, m) or (1, m) [degC].
     Raises DescriptionError for an unknown law or a missing parameter.
     """
-    blocks = _over_samples([use], signals, n_samples, [states], holds, _BLOCK_OF_TABLES)
+    block = next((b for b in _BLOCKS_OF_TABLES if n_samples <= b), _BLOCKS_OF_TABLES[-1])
+    blocks = _over_samples([use], signals, n_samples, [states], holds, block)
     result = np.concatenate(blocks)[:, 0]
     return result.astype(bool) if holds else result

@@ -50,6 +50,20 @@ class Intervals:
             self.first[begin:end] - self.first[begin],
         )
 
+    def merged(self, group: np.ndarray) -> Intervals:
+        """With samples counted by `group` (n_samples,); neighbours of one group and step are one interval."""
+        of = group[self.sample]
+        begin = np.flatnonzero(np.append(True, (np.diff(of) != 0) | (np.diff(self.step) != 0)))
+        step = self.step[begin]
+        return Intervals(
+            self.start[begin],
+            self.end[np.append(begin[1:], len(of)) - 1],
+            of[begin],
+            step,
+            np.add.reduceat(self.share, begin),
+            np.searchsorted(step, np.arange(self.n_steps)),
+        )
+
     def constant(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """True for steps (n_steps,) in which a path from `start` to `end` (k,) of each interval stays put."""
         low = np.minimum.reduceat(np.minimum(start, end), self.first)

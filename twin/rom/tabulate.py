@@ -63,9 +63,11 @@ def _tabulate(
         end = min(max(end, begin + 1), intervals.n_steps)
         part = intervals.part(begin, end)
         here = slice(first_sample, intervals.sample[last[end - 1]] + 1)
-        signals = {name: values[name][here] for name in use.signals.values()}
-        states = _states(use, None if air is None else air[here])
-        count = here.stop - here.start
+        read = np.stack([*(values[name][here] for name in use.signals.values()), *([] if air is None else [air[here]])])
+        new = np.append(True, (np.diff(read) != 0.0).any(axis=0))  # of samples that hold what was before, one is enough
+        part, count = part.merged(np.cumsum(new) - 1), int(new.sum())
+        signals = {name: values[name][here][new] for name in use.signals.values()}
+        states = _states(use, None if air is None else air[here][new])
         mean = part.mean(gain * law_table(use, signals, count, states))
         outside = np.zeros((1, 1), dtype=bool)
         if judged:

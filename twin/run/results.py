@@ -19,6 +19,7 @@ from twin.logs.run import Table, Tcp
 from twin.logs.write import write_table, write_tcp
 from twin.ordinary import ordinary
 from twin.rom.hdf5_file import image_of, put, put_attributes, scale
+from twin.together import result_h5
 
 FORMAT = "twin result"
 
@@ -177,8 +178,7 @@ def result_file(path: Path, artefact: str, remedy: str) -> Iterator[h5py.File]:
 
     Raises TwinError for other files, for results of other artefacts, and for what is missing while it is read.
     """
-    path = Path(path)
-    path = path / "result.h5" if path.is_dir() else path
+    path = result_h5(path)
     try:
         with h5py.File(ordinary(path), "r") as f:
             if f.attrs.get("format") != FORMAT:

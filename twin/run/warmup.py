@@ -25,6 +25,7 @@ import numpy as np
 from twin.errors import TwinError
 from twin.rom.hdf5_file import strings
 from twin.run.results import FORMAT
+from twin.together import result_h5
 
 WINDOW = 600.0  # s
 HORIZON = 3600.0  # s
@@ -158,8 +159,7 @@ def read_history(path: Path) -> History:
 
     Raises TwinError for other files, and for results of fewer than two steps.
     """
-    path = Path(path)
-    path = path / "result.h5" if path.is_dir() else path
+    path = result_h5(path)
     remedy = "make it with: twin run ARTEFACT RUN -o OUT"
     if not path.is_file():
         raise TwinError("no result here", str(path), remedy)

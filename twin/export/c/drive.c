@@ -43,37 +43,60 @@ static int same_loads(const twin_machine *m, const real *v, const real *air)
     return 1;
 }
 
+/* A law's table is made anew only where what the law reads has changed: one power in a film costs as much as ten rows of
+   a matrix. 1 where it must be. */
+static int read_anew(int count, const int *signal, const real *v, real air, real *known, unsigned char *made)
+{
+    int anew = !*made || known[0] != air;
+    for (int i = 0; i < count; i++)
+        anew |= known[i + 1] != v[signal[i]];
+    known[0] = air;
+    for (int i = 0; i < count; i++)
+        known[i + 1] = v[signal[i]];
+    *made = 1;
+    return anew;
+}
+
+/* The mean of a table over the step: its first one, and what later ones add to it. */
+static void add_table(int first, int n, real gain, real time, const real *now, const unsigned char *off, real *base,
+                      real *sum, unsigned char *outside)
+{
+    for (int i = 0; i < n; i++) {
+        const real value = gain * now[i];
+        if (first)
+            base[i] = value;
+        sum[i] = first ? 0 : sum[i] + (value - base[i]) * time;
+        outside[i] = (unsigned char)((first ? 0 : outside[i]) | off[i]);
+    }
+}
+
 /* The tables with the loads that are pending, for their time. */
 static void tabulate(twin_machine *m)
 {
+    const int first = !m->tabulated;
+    const real time = (real)m->pending_time, *v = m->pending;
     for (int k = 0; k < TWIN_FOLLOWING_FILMS; k++) {
         if (film_alone[k])
             continue;
         const int f = following_film[k];
         const real air = m->pending_air[film_environment[f]];
-        for (int i = 0; i < 65; i++) {
-            const real surface = air + difference_of(i);
-            const real h = m->film_gain[f] * film_law(k, m->pending, surface, air);
-            if (!m->tabulated) {
-                m->film_base[k][i] = h;
-                m->film_sum[k][i] = 0;
-                m->film_outside[k][i] = 0;
-            } else
-                m->film_sum[k][i] += (h - m->film_base[k][i]) * (real)m->pending_time;
-            m->film_outside[k][i] |= (unsigned char)!film_law_holds(k, m->pending, surface, air);
-        }
+        if (read_anew(film_reads[k], film_signal[k], v, air, m->film_known[k], &m->film_made[k]))
+            for (int i = 0; i < 65; i++) {
+                m->film_now[k][i] = film_law(k, v, air + difference_of(i), air);
+                m->film_off[k][i] = (unsigned char)!film_law_holds(k, v, air + difference_of(i), air);
+            }
+        add_table(first, 65, m->film_gain[f], time, m->film_now[k], m->film_off[k], m->film_base[k], m->film_sum[k],
+                  m->film_outside[k]);
     }
-    for (int k = 0; k < TWIN_FOLLOWING_LOSSES; k++)
-        for (int i = 0; i < 121; i++) {
-            const real q = m->source_gain[following_loss[k]] * loss_law(k, m->pending, temperature_of(i));
-            if (!m->tabulated) {
-                m->loss_base[k][i] = q;
-                m->loss_sum[k][i] = 0;
-                m->loss_outside[k][i] = 0;
-            } else
-                m->loss_sum[k][i] += (q - m->loss_base[k][i]) * (real)m->pending_time;
-            m->loss_outside[k][i] |= (unsigned char)!loss_law_holds(k, m->pending, temperature_of(i));
-        }
+    for (int k = 0; k < TWIN_FOLLOWING_LOSSES; k++) {
+        if (read_anew(loss_reads[k], loss_signal[k], v, 0, m->loss_known[k], &m->loss_made[k]))
+            for (int i = 0; i < 121; i++) {
+                m->loss_now[k][i] = loss_law(k, v, temperature_of(i));
+                m->loss_off[k][i] = (unsigned char)!loss_law_holds(k, v, temperature_of(i));
+            }
+        add_table(first, 121, m->source_gain[following_loss[k]], time, m->loss_now[k], m->loss_off[k], m->loss_base[k],
+                  m->loss_sum[k], m->loss_outside[k]);
+    }
     m->tabulated = 1;
 }
 

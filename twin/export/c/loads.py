@@ -126,6 +126,12 @@ def _put_owners(out: Arrays, load: LoadModel, ports: tuple[tuple[int, ...], ...]
     out.integers("pair_pad_local", [owner[p.pad_port][1] for p in load.pairs])
 
 
+def most_reads(load: LoadModel) -> int:
+    """The most signals that one law reads."""
+    uses = [*(f.use for f in load.films), *(s.use for s in load.sources)]
+    return max((len(use.signals) for use in uses), default=0)
+
+
 def put_laws(out: Arrays, load: LoadModel) -> None:
     """The laws as functions, and the functions that call them."""
     place = {s.name: k for k, s in enumerate(load.signals)}
@@ -136,6 +142,8 @@ def put_laws(out: Arrays, load: LoadModel) -> None:
     out.integers("following_film", films)
     out.integers("film_alone", [not load.films[k].use.signals for k in films])
     out.integers("following_loss", losses)
+    _put_reads(out, "film", [load.films[k].use for k in films], place, most_reads(load))
+    _put_reads(out, "loss", [load.sources[k].use for k in losses], place, most_reads(load))
     out.integers("follows", [bool(states_of(s.use)) for s in load.sources])
     of_log, holds = [], []
     for kind, uses in (("source", [s.use for s in load.sources]), ("film", [f.use for f in load.films])):
@@ -159,6 +167,13 @@ def put_laws(out: Arrays, load: LoadModel) -> None:
                      + "".join(holds) + "}\n")  # fmt: skip
     _put_switch(out, "film", films, load.films, place, {"surface": "surface", "ambient": "ambient"})
     _put_switch(out, "loss", losses, load.sources, place, {"temperature": "temperature"})
+
+
+def _put_reads(out: Arrays, kind: str, uses: list[LawUse], place: dict[str, int], width: int) -> None:
+    """Which signals each law that is tabulated reads."""
+    out.integers(f"{kind}_reads", [len(use.signals) for use in uses])
+    reads = [[place[s] for s in use.signals.values()] for use in uses]
+    out.table(f"{kind}_signal", [[*row, *[0] * (width - len(row))] for row in reads], width)
 
 
 def _put_switch(

@@ -36,6 +36,11 @@ typedef struct {
     twin_real pending[TWIN_MOST(TWIN_SIGNALS)], pending_air[TWIN_MOST(TWIN_ENVIRONMENTS)];
     twin_real film_base[TWIN_MOST(TWIN_FOLLOWING_FILMS)][65], film_sum[TWIN_MOST(TWIN_FOLLOWING_FILMS)][65];
     twin_real loss_base[TWIN_MOST(TWIN_FOLLOWING_LOSSES)][121], loss_sum[TWIN_MOST(TWIN_FOLLOWING_LOSSES)][121];
+    twin_real film_now[TWIN_MOST(TWIN_FOLLOWING_FILMS)][65], loss_now[TWIN_MOST(TWIN_FOLLOWING_LOSSES)][121];
+    twin_real film_known[TWIN_MOST(TWIN_FOLLOWING_FILMS)][TWIN_READS + 1];
+    twin_real loss_known[TWIN_MOST(TWIN_FOLLOWING_LOSSES)][TWIN_READS + 1];
+    unsigned char film_made[TWIN_MOST(TWIN_FOLLOWING_FILMS)], loss_made[TWIN_MOST(TWIN_FOLLOWING_LOSSES)];
+    unsigned char film_off[TWIN_MOST(TWIN_FOLLOWING_FILMS)][65], loss_off[TWIN_MOST(TWIN_FOLLOWING_LOSSES)][121];
     unsigned char film_outside[TWIN_MOST(TWIN_FOLLOWING_FILMS)][65];
     unsigned char loss_outside[TWIN_MOST(TWIN_FOLLOWING_LOSSES)][121];
     unsigned char raised[TWIN_MOST(TWIN_FLAGS)];

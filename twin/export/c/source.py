@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.export.c.correction import put_correction
 from twin.export.c.elastic import MESHED, put_elastic
-from twin.export.c.loads import flags, put_contacts, put_laws, put_signals
+from twin.export.c.loads import flags, most_reads, put_contacts, put_laws, put_signals
 from twin.export.c.text import Arrays, identifier, named, quoted
 from twin.export.c.thermal import put_thermal
 from twin.rom.artefact import Artefact
@@ -123,7 +123,7 @@ def _sizes(prepared: Prepared, model: MachineModel, elastic: dict[str, int]) -> 
         "WORK": max(factor + 9 * N + max(sizes), touching, tcp), "SIGNALS": len(load.signals), "AXES": len(load.axes),
         "ENVIRONMENTS": len(load.environments), "SOURCES": len(load.sources), "FILMS": len(load.films),
         "JOINTS": len(load.joints), "THETA": len(load.films) + len(load.joints), "PORTS": len(load.ports),
-        "PAIRS": len(load.pairs), "STRUCTURAL": len(model.sensors),
+        "PAIRS": len(load.pairs), "READS": most_reads(load), "STRUCTURAL": len(model.sensors),
         "DRIVEN": max(len(load.sources) + len(load.films) + 2 * len(load.environments) + len(load.joints)
                       + len(load.pairs), 1),
     }  # fmt: skip

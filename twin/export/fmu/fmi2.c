@@ -18,6 +18,16 @@ typedef struct {
     fmi2ComponentEnvironment componentEnvironment;
 } fmi2CallbackFunctions;
 
+#define FMI(name) fmi2##name /* for shared.c, which says it as version 3 does */
+#define fmi2Instance fmi2Component
+#define fmi2FMUState fmi2FMUstate
+#define fmi2GetFMUState fmi2GetFMUstate
+#define fmi2SetFMUState fmi2SetFMUstate
+#define fmi2FreeFMUState fmi2FreeFMUstate
+#define fmi2SerializedFMUStateSize fmi2SerializedFMUstateSize
+#define fmi2SerializeFMUState fmi2SerializeFMUstate
+#define fmi2DeserializeFMUState fmi2DeSerializeFMUstate
+
 static void tell(const slave *f, int status, const char *message)
 {
     const fmi2Logger log = (fmi2Logger)f->callback;
@@ -28,20 +38,10 @@ EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 
 EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 
-EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[])
-{
-    (void)n;
-    (void)categories;
-    ((slave *)c)->logging = on;
-    return fmi2OK;
-}
-
 EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, fmi2String resources,
                                      const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
 {
     slave *f = type == fmi2CoSimulation ? create(name, token) : NULL;
-    (void)resources;
-    (void)visible;
     if (!f) {
         if (functions && functions->logger)
             functions->logger(functions->componentEnvironment, name, fmi2Error, "logStatusError",
@@ -56,16 +56,10 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
     return f;
 }
 
-EXPORT void fmi2FreeInstance(fmi2Component c) { free(c); }
-
 EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
                                       fmi2Boolean has_stop, fmi2Real stop)
 {
     slave *f = c;
-    (void)has_tolerance;
-    (void)tolerance;
-    (void)has_stop;
-    (void)stop;
     f->s.origin = f->s.time = start;
     return fmi2OK;
 }
@@ -76,63 +70,24 @@ EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
-{
-    slave *f = c;
-    if (!begin(f)) {
-        say(f, 3, "T_initial or step is out of range");
-        return fmi2Error;
-    }
-    f->s.phase = STEPPING;
-    return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2Terminate(fmi2Component c)
-{
-    ((slave *)c)->s.phase = TERMINATED;
-    return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2Reset(fmi2Component c)
-{
-    to_defaults(c);
-    return fmi2OK;
-}
-
 EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference at[], size_t n, fmi2Real value[])
 {
-    for (size_t i = 0; i < n; i++)
-        if (!get_value(c, at[i], &value[i])) {
-            say(c, 3, "no such variable, or no value");
-            return fmi2Error;
-        }
-    return fmi2OK;
+    return (fmi2Status)get_values(c, at, n, value);
 }
 
 EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference at[], size_t n, const fmi2Real value[])
 {
-    for (size_t i = 0; i < n; i++)
-        if (!set_value(c, at[i], value[i])) {
-            say(c, 3, "no variable that can be set now");
-            return fmi2Error;
-        }
-    return fmi2OK;
+    return (fmi2Status)set_values(c, at, n, value);
 }
 
 #define NONE_OF(kind)                                                                                           \
     EXPORT fmi2Status fmi2Get##kind(fmi2Component c, const fmi2ValueReference at[], size_t n, fmi2##kind value[]) \
     {                                                                                                           \
-        (void)c;                                                                                                \
-        (void)at;                                                                                               \
-        (void)value;                                                                                            \
         return n ? fmi2Error : fmi2OK;                                                                          \
     }                                                                                                           \
     EXPORT fmi2Status fmi2Set##kind(fmi2Component c, const fmi2ValueReference at[], size_t n,                    \
                                     const fmi2##kind value[])                                                   \
     {                                                                                                           \
-        (void)c;                                                                                                \
-        (void)at;                                                                                               \
-        (void)value;                                                                                            \
         return n ? fmi2Error : fmi2OK;                                                                          \
     }
 
@@ -140,110 +95,37 @@ NONE_OF(Integer)
 NONE_OF(Boolean)
 NONE_OF(String)
 
-EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
-{
-    if (*state)
-        memcpy(*state, &((slave *)c)->s, SAVED);
-    else
-        *state = copy_of(c);
-    return *state ? fmi2OK : fmi2Error;
-}
-
-EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
-{
-    restore(c, state);
-    return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
-{
-    (void)c;
-    free(*state);
-    *state = NULL;
-    return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
-{
-    (void)c;
-    (void)state;
-    *size = SAVED;
-    return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
-{
-    (void)c;
-    if (size < SAVED)
-        return fmi2Error;
-    memcpy(bytes, state, SAVED);
-    return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
-{
-    if (size != SAVED || memcmp(bytes, DIGEST, 16)) {
-        say(c, 3, "a state of another model");
-        return fmi2Error;
-    }
-    if (!*state)
-        *state = malloc(SAVED);
-    if (!*state)
-        return fmi2Error;
-    memcpy(*state, bytes, SAVED);
-    return fmi2OK;
-}
-
 EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n,
                                                const fmi2ValueReference known[], size_t m, const fmi2Real by[],
                                                fmi2Real change[])
 {
-    (void)c;
-    (void)unknown;
-    (void)n;
-    (void)known;
-    (void)m;
-    (void)by;
-    (void)change;
     return fmi2Error;
 }
 
 EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference at[], size_t n,
                                               const fmi2Integer order[], const fmi2Real value[])
 {
-    (void)c;
-    (void)at;
-    (void)order;
-    (void)value;
     return n ? fmi2Error : fmi2OK;
 }
 
 EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference at[], size_t n,
                                                const fmi2Integer order[], fmi2Real value[])
 {
-    (void)c;
-    (void)at;
-    (void)order;
-    (void)value;
     return n ? fmi2Error : fmi2OK;
 }
 
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_return)
 {
-    (void)no_return;
     return do_step(c, time, size) ? fmi2OK : fmi2Error;
 }
 
 EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
 {
-    (void)c;
     return fmi2Error; /* steps are never pending */
 }
 
 EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
 {
-    (void)c;
-    (void)kind;
     *value = fmi2OK;
     return fmi2Discard;
 }
@@ -256,8 +138,6 @@ EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, 
 
 EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
 {
-    (void)c;
-    (void)kind;
     *value = 0;
     return fmi2Discard;
 }
@@ -270,8 +150,6 @@ EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kin
 
 EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
 {
-    (void)c;
-    (void)kind;
     *value = "";
     return fmi2Discard;
 }

@@ -24,9 +24,7 @@ typedef int fmi3DependencyKind, fmi3IntervalQualifier;
 typedef void (*fmi3LogMessageCallback)(fmi3InstanceEnvironment, fmi3Status, fmi3String, fmi3String);
 typedef void (*fmi3AnyCallback)(void);
 
-#if defined(__GNUC__)
-#pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard gives the signatures */
-#endif
+#define FMI(name) fmi3##name /* for shared.c */
 
 static void tell(const slave *f, int status, const char *message)
 {
@@ -35,12 +33,6 @@ static void tell(const slave *f, int status, const char *message)
 }
 
 EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
-
-EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String categories[])
-{
-    ((slave *)c)->logging = on;
-    return fmi3OK;
-}
 
 EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
@@ -75,8 +67,6 @@ EXPORT fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3Strin
     return NULL;
 }
 
-EXPORT void fmi3FreeInstance(fmi3Instance c) { free(c); }
-
 EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance,
                                               fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop)
 {
@@ -86,54 +76,17 @@ EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_to
     return fmi3OK;
 }
 
-EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
-{
-    slave *f = c;
-    if (!begin(f)) {
-        say(f, fmi3Error, "T_initial or step is out of range");
-        return fmi3Error;
-    }
-    f->s.phase = STEPPING;
-    return fmi3OK;
-}
-
 EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance c) { return fmi3OK; }
-
-EXPORT fmi3Status fmi3Terminate(fmi3Instance c)
-{
-    ((slave *)c)->s.phase = TERMINATED;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3Reset(fmi3Instance c)
-{
-    to_defaults(c);
-    return fmi3OK;
-}
 
 EXPORT fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference at[], size_t n, fmi3Float64 value[], size_t m)
 {
-    if (m != n)
-        return fmi3Error;
-    for (size_t i = 0; i < n; i++)
-        if (!get_value(c, at[i], &value[i])) {
-            say(c, fmi3Error, "no such variable, or no value");
-            return fmi3Error;
-        }
-    return fmi3OK;
+    return m == n ? (fmi3Status)get_values(c, at, n, value) : fmi3Error;
 }
 
 EXPORT fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference at[], size_t n, const fmi3Float64 value[],
                                  size_t m)
 {
-    if (m != n)
-        return fmi3Error;
-    for (size_t i = 0; i < n; i++)
-        if (!set_value(c, at[i], value[i])) {
-            say(c, fmi3Error, "no variable that can be set now");
-            return fmi3Error;
-        }
-    return fmi3OK;
+    return m == n ? (fmi3Status)set_values(c, at, n, value) : fmi3Error;
 }
 
 EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_return,
@@ -144,56 +97,6 @@ EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size,
     *event = *terminate = *early = false;
     *last = f->s.time;
     return done ? fmi3OK : fmi3Error;
-}
-
-EXPORT fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
-{
-    if (*state)
-        memcpy(*state, &((slave *)c)->s, SAVED);
-    else
-        *state = copy_of(c);
-    return *state ? fmi3OK : fmi3Error;
-}
-
-EXPORT fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
-{
-    restore(c, state);
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
-{
-    free(*state);
-    *state = NULL;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size)
-{
-    *size = SAVED;
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
-{
-    if (size < SAVED)
-        return fmi3Error;
-    memcpy(bytes, state, SAVED);
-    return fmi3OK;
-}
-
-EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
-{
-    if (size != SAVED || memcmp(bytes, DIGEST, 16)) {
-        say(c, fmi3Error, "a state of another model");
-        return fmi3Error;
-    }
-    if (!*state)
-        *state = malloc(SAVED);
-    if (!*state)
-        return fmi3Error;
-    memcpy(*state, bytes, SAVED);
-    return fmi3OK;
 }
 
 /* There are no variables of other types, no clocks, no derivatives and no events. */

@@ -11,6 +11,10 @@
 #define EXPORT
 #endif
 
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter" /* the standard gives the signatures */
+#endif
+
 enum { CREATED, INITIALISING, STEPPING, TERMINATED };
 
 typedef struct {
@@ -216,4 +220,26 @@ static slave *create(const char *name, const char *token)
     snprintf(f->name, sizeof f->name, "%s", name ? name : "");
     to_defaults(f);
     return f;
+}
+
+enum { OK = 0, FAILED = 3 }; /* statuses of both versions */
+
+static int get_values(slave *f, const unsigned at[], size_t n, double value[])
+{
+    for (size_t i = 0; i < n; i++)
+        if (!get_value(f, at[i], &value[i])) {
+            say(f, FAILED, "no such variable, or no value");
+            return FAILED;
+        }
+    return OK;
+}
+
+static int set_values(slave *f, const unsigned at[], size_t n, const double value[])
+{
+    for (size_t i = 0; i < n; i++)
+        if (!set_value(f, at[i], value[i])) {
+            say(f, FAILED, "no variable that can be set now");
+            return FAILED;
+        }
+    return OK;
 }

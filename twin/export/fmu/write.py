@@ -79,6 +79,7 @@ def sources(source: Source, signals: tuple[Variable, ...], token: str, digest: s
         f'#include "{source.name}.c"\n\n#define TOKEN "{token}"\n#define DIGEST "{digest[:16]}"\n'
         f"static const double signal_start[] = {{{starts or '0'}}};\n\n"
     )
-    text = head + named("".join((core / name).read_text(encoding="utf-8") for name in ("slave.c", f"fmi{version}.c")),
+    parts = ("slave.c", f"fmi{version}.c", "shared.c")
+    text = head + named("".join((core / name).read_text(encoding="utf-8") for name in parts),
                         source.name)  # fmt: skip
     return {f"fmi{version}.c": text, f"{source.name}.c": source.code, f"{source.name}.h": source.header}

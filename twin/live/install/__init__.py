@@ -1,0 +1,1 @@
+"""Installed beside the machine: a systemd unit and a container file."""
