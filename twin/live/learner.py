@@ -2,8 +2,8 @@
 
 The model goes on untouched; per axis a gain, a slow gain and an offset correct its TCP error at all poses
 (`twin.calibrate.update.gain_filter`, docs/update.md). Its own slew limit is left out: that of the outputs bounds all.
-The filter `state`, which also learns from temperatures, steps a tangent of a hundred columns in JAX, 50 ms per step and
-most of a gigabyte: it stays with `twin update`.
+The filter `state`, which also learns from temperatures, steps a tangent of a hundred columns in JAX: it stays with
+`twin update`.
 """
 
 from __future__ import annotations
