@@ -10,7 +10,7 @@ import numpy as np
 from twin.inject.machines.draws import rounded
 from twin.inject.machines.other_films import other_film
 from twin.inject.machines.text_edits import with_table, with_values
-from twin.inject.machines.toml_text import value_text
+from twin.machine.toml_text import value_text
 from twin.machine.check_lumped import node_capacity
 from twin.machine.description import Machine
 from twin.machine.edit import edited
