@@ -2,8 +2,9 @@
 
 Of a meshed body the port displacements H T of the supported body, then the temperatures that scales read (means and
 slopes along their slices, means of surfaces). Of a lumped one a displacement of the TCP that is the same at every
-position, then the temperatures of screws and those that scales read, the growth of struts, the means of platform and frame. With W projected on the states, the reduced model
-knows its TCP displacement wherever the machine stands (`twin.rom.tcp`).
+position, then the temperatures of screws and those that scales read; where struts carry a platform also the growth of
+their other members and the means of platform and frame. With W projected on the states, the reduced model knows its TCP
+displacement wherever the machine stands (`twin.rom.tcp`).
 """
 
 from __future__ import annotations

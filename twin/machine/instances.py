@@ -160,7 +160,7 @@ class _Placed:
     def _value(self, section: str, key: str, value: Any) -> Any:
         if section == "axes" and key == "position":
             return self._named(("signals",), value)
-        if key in _POINTS and section != "axes" or key == "point":
+        if (key in _POINTS and section != "axes") or key == "point":
             return self._moved(value)
         if key == "direction":
             return self._turned(value)

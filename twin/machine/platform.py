@@ -120,4 +120,3 @@ def closure_problems(machine: Machine) -> Iterator[Problem]:
     if not condition <= WORST:
         what = f"the struts hardly hold the platform at an end of their strokes (condition {condition:.3g})"
         yield Problem(what, "struts", "shorten the strokes, or move the joints apart")
-

@@ -10,8 +10,8 @@ L gives strut forces' work, so a wrench at p is L^T f. The inverse is closed, th
 which has one solution near the zero pose where L stays regular. Source: Merlet, Parallel Robots, 2nd ed., ch. 2 to 4.
 
 Expansions act as strut lengths do. A platform that is warmer by T spreads its joints about p, and a frame its joints
-about the point g where it holds the other side; the struts, whose lengths that does not change, then move the tool as if
-they had grown by
+about the point g where it holds the other side; the struts, whose lengths that does not change, then move the tool as
+if they had grown by
 
     -alpha T n_k . R b_k   (platform),      alpha T n_k . (a_k - g)   (frame).
 

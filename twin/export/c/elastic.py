@@ -65,6 +65,9 @@ def _put_scales(out: Arrays, scales: Sequence[AddedScale], first: np.ndarray) ->
 
 
 def _put_lumped(out: Arrays, structure: LumpedStructure, first: np.ndarray) -> dict[str, int]:
+    if structure.platform is not None:
+        remedy = "use `twin run`, `twin correction`, or --format generic"
+        raise TwinError("a platform on struts has no C code", "export", remedy)
     out.reals("constant_rows", np.hstack(structure.constant))
     screws = structure.screws
     out.integers("screw_input", [first[s.body] + s.first for s in screws])

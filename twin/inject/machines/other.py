@@ -10,13 +10,13 @@ import numpy as np
 from twin.inject.machines.draws import rounded
 from twin.inject.machines.other_films import other_film
 from twin.inject.machines.text_edits import with_table, with_values
-from twin.machine.toml_text import value_text
 from twin.machine.check_lumped import node_capacity
 from twin.machine.description import Machine
 from twin.machine.edit import edited
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 from twin.machine.toml_spans import Keys
+from twin.machine.toml_text import value_text
 
 # Half widths of uniform factors around 1, by kind of parameter: losses of catalogues, film correlations, joints whose
 # flatness and oil nobody knows, material data of tables
