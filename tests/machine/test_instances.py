@@ -11,7 +11,7 @@ import pytest
 from twin.cli.main import run
 from twin.errors import DescriptionError
 from twin.machine.description import Instance
-from twin.machine.instances import expanded, expanded_text, rotation
+from twin.machine.instances import expanded, rotation, written_out
 from twin.machine.load import json_schema, load_machine
 
 REST = """
@@ -161,10 +161,10 @@ def test_instances_are_what_one_would_write_by_hand(tmp_path):
 def test_the_text_written_out_is_the_same_machine(tmp_path):
     """What an artefact keeps knows no templates; arrays of tables survive."""
     text = REST + TEMPLATE + INSTANCES + '[[parameters]]\npath = "films.*.gain"\ntolerance = "20 %"\n'
-    out = expanded_text(text, tomllib.loads(text))
+    out = written_out(text)
     assert "templates" not in tomllib.loads(out)
     assert read(tmp_path, out) == read(tmp_path, text)
-    assert expanded_text(REST, tomllib.loads(REST)) == REST
+    assert written_out(REST) == REST
 
 
 def test_frames_are_rotations():

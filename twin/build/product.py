@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +28,7 @@ from twin.build.pipeline import (
 from twin.build.same_model import same_model
 from twin.errors import ArtefactError
 from twin.machine.description import Machine
-from twin.machine.instances import expanded_text
+from twin.machine.instances import written_out
 from twin.machine.load import load_machine, read_text
 from twin.machine.parameters import parameters
 from twin.progress import Progress, silent
@@ -69,8 +68,7 @@ def build_artefact(
         "rich_states": str(rich.n),
         "options_hash": hashlib.sha256(repr(options).encode()).hexdigest(),
     }
-    text = read_text(description)
-    text = expanded_text(text, tomllib.loads(text))  # who reads it in the artefact knows no templates
+    text = written_out(read_text(description))  # who reads it in the artefact knows no templates
     write_artefact(target, bare, text, result.to_json(), provenance, fields, parameters=parameters(machine))
     return result
 

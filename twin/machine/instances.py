@@ -8,6 +8,7 @@ ordinary description, so nothing after the loader knows templates.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -69,13 +70,14 @@ def expanded(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[Keys, Keys]]
     return {**rest, **{section: entries for section, entries in made.items() if entries}}, origins
 
 
-def expanded_text(text: str, data: Mapping[str, Any]) -> str:
-    """The text of a description with every instance written out; as it is where there is none. data: of `text`."""
+def written_out(text: str) -> str:
+    """The text of a sound description with every instance written out; as it is where there is none."""
+    data = tomllib.loads(text)
     if "instances" not in data and "templates" not in data:
         return text
     written, _ = expanded(data)
     sections = tuple(Section(key, _tables(key, value)) for key, value in written.items())
-    return toml_text("Instances written out by twin build.", sections)
+    return toml_text("All instances written out.", sections)
 
 
 def _tables(key: str, value: Any) -> tuple[Table, ...]:

@@ -24,7 +24,7 @@ def axis_jacobian(artefact: Artefact, axes: Sequence[str]) -> np.ndarray:
     """J (3, n_axes): motion of the tool minus that of the work per motion of a linear axis, machine coordinates.
 
     It follows the kinematic chain of the description in the artefact. Of struts that carry a platform it is the unit
-    matrix: their errors are told in their own lengths (`twin.run.correction_struts`). Raises ModelError for an axis that
+    matrix: their errors are told in their own lengths (`run.correction_struts`). Raises ModelError for an axis that
     moves neither the tool nor the work side, an unknown one, and for none at all.
     """
     if not axes:
