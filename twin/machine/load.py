@@ -72,7 +72,8 @@ def _once(found: list[tuple[Keys, Problem]], origins: dict[Keys, Keys]) -> Itera
     told = set()
     for keys, problem in found:
         if (origin := origins.get(keys[:2])) is not None:
-            keys = (*origin, *keys[2:])
+            prefix = keys[1].removesuffix(origin[-1])  # keys of growth are names that got it, too
+            keys = (*origin, *(key.removeprefix(prefix) for key in keys[2:]))
             if keys in told:
                 continue
             told.add(keys)
