@@ -92,6 +92,7 @@ def _screw(machine: Machine, bodies: Sequence[LumpedBody], name: str, side: str)
         direction=d if side == "tool" else -d,
         expansion=machine.materials[bar.material].expansion,
         from_end=bar.fixed_end == "end",
+        held_at_both=bar.fixed_end == "both",
         axis=linear_axes(machine).index(axis),
         nut=float(where @ d),
         per_position=float(np.sign(along @ d)) * (-1.0 if rail_moves(machine, axis, name, nut) else 1.0),

@@ -123,7 +123,8 @@ class Bar(Entry):
     cross_section: Area = Field(gt=0)
     perimeter: Length | None = Field(None, gt=0)  # times the length: the area of films
     elements: int = Field(12, ge=2, le=10_000)  # of equal length; linear temperatures between their ends
-    fixed_end: Literal["start", "end"] = "start"  # of a screw: the fixed bearing, from which it grows
+    # of a screw: the fixed bearing, from which it grows; both: two that do not yield, between which it is compressed
+    fixed_end: Literal["start", "end", "both"] = "start"
 
 
 class Encoder(Entry):

@@ -5,7 +5,12 @@ moves by the growth of the screw between the two,
 
     d(xi) = int alpha (T - T_ref) dx,
 
-away from the bearing, and takes along the side of the machine that it holds. For temperatures that are linear between
+away from the bearing, and takes along the side of the machine that it holds. Held at both ends by bearings that do not
+yield, its length L stays and the strain of the force between them is the same everywhere, so
+
+    d(xi) = int_0^xi alpha (T - T_ref) dx - xi/L int_0^L alpha (T - T_ref) dx,
+
+zero for a screw that is warm all along. For temperatures that are linear between
 element borders the integral is exact, so the row is piecewise quadratic in the position of the axis. Paper 001, eq
 (16.2), is a polynomial of this function along one screw.
 """
@@ -36,6 +41,7 @@ class Screw:
     axis: int
     nut: float  # m from the bar's start at axis position zero
     per_position: float  # +1 or -1: how the nut moves along the bar with the axis
+    held_at_both: bool = False  # between two fixed bearings that do not yield: its length stays
 
     def row(self, position: float) -> np.ndarray:
         """TCP displacement (3, n) [m/K] per T - T_ref of the bar's states at an axis position [m]."""
@@ -44,6 +50,10 @@ class Screw:
     def growth(self, position: float) -> np.ndarray:
         """(n,) [m/K]: how far the nut moves along the bar, from start to end, per T - T_ref of its states."""
         nut = float(np.clip(self.nut + self.per_position * position, self.borders[0], self.borders[-1]))
+        if self.held_at_both:
+            share = (nut - self.borders[0]) / (self.borders[-1] - self.borders[0])
+            whole = integral(self.borders, self.borders[0], self.borders[-1])
+            return self.expansion * (integral(self.borders, self.borders[0], nut) - share * whole)
         start, end = (nut, self.borders[-1]) if self.from_end else (self.borders[0], nut)
         sign = -1.0 if self.from_end else 1.0
         return sign * self.expansion * integral(self.borders, start, end)
