@@ -58,6 +58,18 @@ def main() -> None:
     print(f"   {hours:.1f} h in {spent:.1f} s ({evaluating:.1f} s from blocks to heat and contacts), "
           f"{3600 * hours / spent:,.0f} times faster than real time; "
           f"heat balance {result.balance_error.max():.0e}")  # fmt: skip
+    rise = result.temperature[-1] - result.temperature[0]
+    heat = result.power.mean(axis=0)
+    for kind in ("motor", "nut", "screw", "bearing"):
+        rises = [r for name, r in zip(result.sensors, rise, strict=True) if name.endswith(f"_{kind}")]
+        watts = [p for name, p in zip(result.sources, heat, strict=True) if name.endswith(f"_{kind}")]
+        told = [f"+{max(rises):.1f} K"] * bool(rises) + [f"{max(watts):.1f} W on average"] * bool(watts)
+        print(f"   {kind}: {', '.join(told)}")
+    air = ", ".join(f"{n} +{r:.1f} K" for n, r in zip(result.sensors, rise, strict=True) if "strut" not in n)
+    moved = 1e6 * np.abs(result.tcp - result.tcp[0]).max(axis=(0, 1))
+    path = 1e6 * (result.tcp_actual - result.tcp_actual[0])
+    print(f"   {air}; tool at the poses {moved[0]:.0f} / {moved[1]:.0f} / {moved[2]:.0f} um along x / y / z, "
+          f"on the path {path[:, 2].min():.0f} um along z, {np.abs(path[:, :2]).max():.1f} um aside")  # fmt: skip
     shipped = replay(artefact, read_run(FOLDER / "runs" / "mixed_paths"), DT)
     n = min(len(result.time), len(shipped.time))
     apart = np.abs(result.temperature[:n] - shipped.temperature[:n])

@@ -7,10 +7,12 @@ held the gantry where they are; the paper does not say what holds it along Y.
 Then the run `constant_room` with coolers of other sizes, because the paper rates none.
 
     python models/linear_gantry/positioning_error.py
+    python models/linear_gantry/positioning_error.py --fine        # elements of half the size, once
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,14 +20,16 @@ import numpy as np
 
 from twin.build.cached_models import full_model
 from twin.build.encoder import EncoderTerms
-from twin.build.full_model import FullModel
+from twin.build.full_model import FullModel, assemble
 from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.logs.read import read_run
+from twin.logs.run import Run
 from twin.logs.signals import signal_values
+from twin.machine.description import Machine
 from twin.machine.load import load_machine
 from twin.physics.motors import motor_winding
 from twin.rom.drive import evaluate
-from twin.rom.load_model import Source
+from twin.rom.load_model import LoadModel, Source
 
 FOLDER = Path(__file__).parent
 COLUMNS = ("column_1", "column_2")
@@ -47,6 +51,7 @@ class Story:
     terms: EncoderTerms  # of Y at Y = 400 mm, at the end
     rises: dict[str, float]  # K, the highest in each part, at the end
     power: dict[str, float]  # W, mean over the last step
+    copper: float  # W of a Y motor, coolers left out, at the end
     balance: float
 
 
@@ -71,8 +76,16 @@ def story(full: FullModel, run: Path) -> Story:
     }
     return Story(
         drive.time - drive.time[0], np.array(sensors) - sensors[0], np.array(tcp) - tcp[0], terms,
-        rises, dict(zip((s.name for s in load.sources), power, strict=True)), balance,
+        rises, dict(zip((s.name for s in load.sources), power, strict=True)),
+        _copper(load, log, sensor_temperatures(full.thermal, x)[full.thermal.sensors.index("column")]), balance,
     )  # fmt: skip
+
+
+def _copper(load: LoadModel, log: Run, temperature: float) -> float:
+    """W of a Y motor by the last current of a log, at the temperature [degC] beside it."""
+    given = next(s.use.parameters for s in load.sources if s.name == MOTORS[0])
+    current = float(log.loads.columns["y_current"][-1])
+    return float(motor_winding(current, temperature, given["resistance"], given["coefficient"]))
 
 
 def cooled(full: FullModel, share: float) -> FullModel:
@@ -88,8 +101,30 @@ def _cooled(source: Source, share: float) -> Source:
     return replace(source, use=replace(source.use, parameters={**given, "cooling_max": share * float(copper)}))
 
 
-def main() -> None:
-    full = full_model(load_machine(FOLDER))
+def finer(machine: Machine) -> Machine:
+    """The same boxes in elements of half the size."""
+    parts = {
+        name: part.model_copy(update={"box": part.box.model_copy(update={"divisions": _twice(part.box.divisions)})})
+        for name, part in machine.parts.items()
+        if part.box is not None
+    }
+    return machine.model_copy(update={"parts": parts})
+
+
+def _twice(divisions: tuple[int, int, int]) -> tuple[int, int, int]:
+    a, b, c = divisions
+    return 2 * a, 2 * b, 2 * c
+
+
+def main(fine: bool = False) -> None:
+    machine = load_machine(FOLDER)
+    if fine:
+        full = assemble(finer(machine))
+        told = story(full, FOLDER / "runs" / RUNS[0])
+        end = ", ".join(f"d{axis} {1e6 * w:+.2f}" for axis, w in zip("XYZ", told.tcp[-1], strict=True))
+        print(f"{RUNS[0]} with {sum(body.n for body in full.bodies):,} nodes: {end} um")
+        return
+    full = full_model(machine)
     for name in RUNS:
         told = story(full, FOLDER / "runs" / name)
         end = ", ".join(f"d{axis} {1e6 * w:+.1f}" for axis, w in zip("XYZ", told.tcp[-1], strict=True))
@@ -100,7 +135,9 @@ def main() -> None:
         print(f"  highest rise: {told.rises[hottest]:.2f} K in {hottest}, ", end="")
         print(f"{max(told.rises[c] for c in COLUMNS):.2f} K in a column; sensors: ", end="")
         print(", ".join(f"{s} {r:+.2f}" for s, r in zip(full.thermal.sensors, told.rise[-1], strict=True)) + " K")
-        print("  heat: " + ", ".join(f"{s} {p:.1f}" for s, p in told.power.items()) + " W", end="")
+        copper, motor = told.copper, told.power[MOTORS[0]]
+        print(f"  copper loss of a motor {copper:.0f} W, of which {motor:.1f} W stay; ", end="")
+        print("heat: " + ", ".join(f"{s} {p:.1f}" for s, p in told.power.items()) + " W", end="")
         print(f"; balance closes to {told.balance:.0e}")
     print("constant_room again, coolers that take another share of the copper loss:")
     for share in SHARES:
@@ -111,4 +148,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:] == ["--fine"])
