@@ -63,7 +63,8 @@ def main() -> None:
     for kind in ("motor", "nut", "screw", "bearing"):
         rises = [r for name, r in zip(result.sensors, rise, strict=True) if name.endswith(f"_{kind}")]
         watts = [p for name, p in zip(result.sources, heat, strict=True) if name.endswith(f"_{kind}")]
-        told = [f"+{max(rises):.1f} K"] * bool(rises) + [f"{max(watts):.1f} W on average"] * bool(watts)
+        told = [f"+{max(rises):.1f} K"] if rises else []
+        told += [f"{max(watts):.1f} W on average"] if watts else []
         print(f"   {kind}: {', '.join(told)}")
     air = ", ".join(f"{n} +{r:.1f} K" for n, r in zip(result.sensors, rise, strict=True) if "strut" not in n)
     moved = 1e6 * np.abs(result.tcp - result.tcp[0]).max(axis=(0, 1))

@@ -217,6 +217,15 @@ def test_tables_of_the_wrong_kind(tmp_path, text):
     assert "no table of tables" in str(caught.value)
 
 
+def test_a_section_of_the_wrong_kind_beside_instances(tmp_path):
+    text = "sensors = 3\n" + (REST + TEMPLATE + INSTANCES).replace(
+        "[templates.drive.sensors.screw]", "[templates.drive.sensors.s]"
+    )
+    with pytest.raises(DescriptionError) as caught:
+        read(tmp_path, text)
+    assert "sensors" in str(caught.value)
+
+
 def test_names_of_other_sections_stay(tmp_path):
     """A material that is called like an entry of the template is the machine's."""
     data = tomllib.loads((REST + TEMPLATE + INSTANCES).replace("steel", "screw"))

@@ -50,6 +50,8 @@ def expanded(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[Keys, Keys]]
     templates, given = data.get("templates", {}), data.get("instances", {})
     if problems := list(_problems(templates, given)):
         raise DescriptionError.collect(problems)
+    if any(not isinstance(rest.get(section, {}), dict) for section in SECTIONS):
+        return rest, {}  # "nodes = 3" is refused by the types
     origins: dict[Keys, Keys] = {}
     made = {section: dict(rest.get(section, {})) for section in SECTIONS}
     clashes = []
