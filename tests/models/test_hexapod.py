@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,16 @@ def test_lengths_of_the_records_are_those_of_the_machine(machine):
     for k in range(2):
         turn = rotated(np.array([0.0, tilt[k, 1], 0.0])) @ rotated(np.array([tilt[k, 0], 0.0, 0.0]))
         np.testing.assert_allclose(own[k], inverse(geometry, Pose(shift[k], turn)), atol=1e-9)
+
+
+def test_thirty_millimetres_in_every_direction(machine):
+    geometry, (low, high) = geometry_of(machine), machine.axes["strut_1_length"].stroke
+    for corner in product((-0.03, 0.03), repeat=3):
+        position = inverse(geometry, Pose(np.array(corner), np.eye(3)))
+        assert low < position.min() < position.max() < high
+    ends = np.array(list(product((low, high), repeat=6)))
+    lever = float(np.linalg.norm(geometry.joint - geometry.point, axis=1).mean())
+    assert worst_condition(geometry, ends, lever) == pytest.approx(4.4, abs=0.05)
 
 
 def test_tool_moves_as_longer_struts_move_it(machine, full):
