@@ -21,7 +21,7 @@ from twin.logs.signals import signal_values
 from twin.machine.load import load_machine
 from twin.machine.platform import geometry_of
 from twin.rom.drive import evaluate
-from twin.rom.parallel import Pose, forward, inverse, rotated
+from twin.rom.parallel import Pose, forward, inverse, rotated, worst_condition
 
 FOLDER = Path(__file__).parents[2] / "models" / "hexapod"
 STRUTS = tuple(f"strut_{k}" for k in range(1, 7))
