@@ -236,6 +236,28 @@ def test_screw_grows_from_its_bearing_to_the_nut_at_any_position(tmp_path, direc
         assert by_rows == pytest.approx(full.structure.displacement(pose, T), abs=1e-18)
 
 
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_screw_held_at_both_ends_keeps_its_length(tmp_path, direction):
+    """u(xi) = int_0^xi a T - xi/L int_0^L a T: for T = 3 + 4 s it is a parabola that is zero at both bearings; a screw
+    that is warm all along moves nothing."""
+    full = model(
+        tmp_path,
+        SCREW.format(origin=-0.5 * direction, direction=direction, fixed="both"),
+        AXIS.format(sign="", carried="nut"),
+        film("all", "screw nut", 10.0),
+        "[tcp.screws]\nscrew = 'tool'\n",
+    )
+    s = np.linspace(-0.5, 0.5, 11) * direction  # machine coordinate of the borders
+    for T, expected in (
+        (3.0 + 4.0 * s, lambda x: 12e-6 * 2.0 * (x**2 - 0.25)),
+        (np.full(11, 7.0), lambda x: 0.0),
+    ):
+        states = [T, np.array([50.0])] if full.thermal.bodies[0].n == 11 else [np.array([50.0]), T]
+        for position in (-0.25, 0.0, 0.2):
+            moved = full.structure.displacement({"x": position}, states)
+            assert moved == pytest.approx([expected(0.05 + position), 0.0, 0.0], abs=1e-15)
+
+
 def test_integral_of_a_broken_line():
     nodes = np.array([0.0, 0.5, 2.0])
     assert integral(nodes, 0.25, 1.0) @ nodes == pytest.approx((1.0 - 0.0625) / 2)

@@ -14,11 +14,12 @@ from tests.support.descriptions import MACHINES
 from twin.errors import DescriptionError
 from twin.machine.description import Machine
 from twin.machine.edit import edited
+from twin.machine.instances import written_out
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 from twin.machine.toml_spans import spans
 
-TEXTS = {path.parent.name: path.read_text(encoding="utf-8") for path in MACHINES}
+TEXTS = {path.parent.name: written_out(path.read_text(encoding="utf-8")) for path in MACHINES}
 PARAMETERS = {path.parent.name: parameters(load_machine(path)) for path in MACHINES}
 NUMBER = re.compile(r"[+-]?\d[\d.]*(?:e[+-]?\d+)?")
 

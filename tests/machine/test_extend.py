@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from tests.support.descriptions import MACHINES, SLIDE
 from twin.errors import DescriptionError
 from twin.machine.extend import appended, changed, free_name, removed
+from twin.machine.instances import written_out
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameter_units
 
-TEXTS = {path.parent.name: path.read_bytes().decode("utf-8") for path in MACHINES}
+TEXTS = {path.parent.name: written_out(path.read_bytes().decode("utf-8")) for path in MACHINES}
 UNITS = {path.parent.name: parameter_units(load_machine(path)) for path in MACHINES}
 TEXT = TEXTS["slide"]
 SOURCE = ("sources.found_1", {"law": "constant_heat", "surface": "bed.x_max", "parameters": {"power": "10 W"}})

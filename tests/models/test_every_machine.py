@@ -28,7 +28,14 @@ def name_of(path: Path) -> str:
 
 
 def test_the_papers_machines_are_here():
-    assert {f.name for f in FOLDERS} >= {"five_axis", "ball_screw_axis", "transfer_unit", "ram_borer"}
+    assert {f.name for f in FOLDERS} >= {
+        "five_axis",
+        "ball_screw_axis",
+        "transfer_unit",
+        "ram_borer",
+        "linear_gantry",
+        "hexapod",
+    }
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=name_of)

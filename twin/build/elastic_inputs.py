@@ -2,8 +2,9 @@
 
 Of a meshed body the port displacements H T of the supported body, then the temperatures that scales read (means and
 slopes along their slices, means of surfaces). Of a lumped one a displacement of the TCP that is the same at every
-position, then the temperatures of screws and those that scales read. With W projected on the states, the reduced model
-knows its TCP displacement wherever the machine stands (`twin.rom.tcp`).
+position, then the temperatures of screws and those that scales read; where struts carry a platform also the growth of
+their other members and the means of platform and frame. With W projected on the states, the reduced model knows its TCP
+displacement wherever the machine stands (`twin.rom.tcp`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from twin.build.structure import Structure
 from twin.rom.elastic_structure import ElasticStructure, PortFlexibility
 from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.scales import AddedScale
+from twin.rom.struts import StrutPlatform
 
 
 class _Rows:
@@ -66,9 +68,22 @@ def _of_lumped(structure: LumpedStructure) -> tuple[LumpedStructure, tuple[np.nd
         states = screw.first + np.arange(len(screw.borders))
         screws.append(replace(screw, first=int(rows.add(screw.body, states, np.eye(len(states)))[0])))
     scales = tuple(_scale(scale, rows) for scale in structure.scales)
+    platform = None if structure.platform is None else _platform(structure.platform, rows)
     W = rows.matrices()
     constant = tuple(np.eye(3, len(w)) for w in W)
-    return LumpedStructure(structure.axes, constant, tuple(screws), scales), W
+    return LumpedStructure(structure.axes, constant, tuple(screws), scales, platform), W
+
+
+def _platform(platform: StrutPlatform, rows: _Rows) -> StrutPlatform:
+    growth = tuple(
+        tuple(replace(g, states=rows.add(g.body, g.states, g.rates[None]), rates=np.ones(1)) for g in own)
+        for own in platform.growth
+    )
+    moving, frame = (
+        None if s is None else replace(s, states=rows.add(s.body, s.states, s.mean[None]), mean=np.ones(1))
+        for s in (platform.moving, platform.frame)
+    )
+    return replace(platform, growth=growth, moving=moving, frame=frame)
 
 
 def _scale(scale: AddedScale, rows: _Rows) -> AddedScale:

@@ -28,7 +28,8 @@ from twin.build.pipeline import (
 from twin.build.same_model import same_model
 from twin.errors import ArtefactError
 from twin.machine.description import Machine
-from twin.machine.load import load_machine
+from twin.machine.instances import written_out
+from twin.machine.load import load_machine, read_text
 from twin.machine.parameters import parameters
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact, SurfaceField, read_artefact, write_artefact
@@ -67,7 +68,7 @@ def build_artefact(
         "rich_states": str(rich.n),
         "options_hash": hashlib.sha256(repr(options).encode()).hexdigest(),
     }
-    text = description.read_text(encoding="utf-8")
+    text = written_out(read_text(description))  # who reads it in the artefact knows no templates
     write_artefact(target, bare, text, result.to_json(), provenance, fields, parameters=parameters(machine))
     return result
 

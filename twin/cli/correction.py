@@ -47,8 +47,9 @@ def command(
     )
     if form == "product":
         click.echo("compressed: a product of factors cannot meet every pose; see the misfit")
+    error = "TCP error" if len(found.before) == 3 else "error of strut lengths"
     for label, values in (
-        ("largest TCP error at the poses", found.before),
+        (f"largest {error} at the poses", found.before),
         ("misfit of the polynomial at the poses, largest", found.residual),
         ("the same, rms", found.residual_rms),
         ("misfit of the product form, eq (16.1) as printed", found.product_form),
@@ -57,7 +58,7 @@ def command(
         ("left at the poses when corrected", found.after),
         ("left between the poses when corrected", found.after_between),
     ):
-        numbers = "  ".join(f"d{c} {1e6 * v:.3f}" for c, v in zip("xyz", values, strict=True))
+        numbers = "  ".join(f"{c} {1e6 * v:.3f}" for c, v in zip(found.components, values, strict=True))
         click.echo(f"  {label:<48} {numbers} um")
     if found.tilt is not None:
         numbers = "  ".join(f"r{c} {1e6 * v:.3f}" for c, v in zip("xyz", found.tilt, strict=True))

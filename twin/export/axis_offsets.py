@@ -33,7 +33,8 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Left:
-    """The TCP error (3,) [m] before and after a table, per machine component, at the poses and PLACES drawn evenly."""
+    """The error before and after a table, at the poses and PLACES drawn evenly: of the TCP (3,) [m] per machine
+    component, or of struts' lengths (6,) [m]."""
 
     before: np.ndarray  # largest
     before_rms: np.ndarray  # over the drawn places
@@ -58,6 +59,8 @@ def sampled(errors: PoseErrors, jacobian: np.ndarray, samples: int = SAMPLES) ->
 
     Where it knows its poses alone (`errors.at` interpolates) these are the same, smoothly filled in.
     """
+    wide = sum(len(g) > 1 for g in errors.grid)
+    samples = min(samples, max(2, round(SAMPLES ** (3 / max(wide, 1)))))  # as many in all as of three axes at most
     grid = tuple(np.linspace(g[0], g[-1], samples) if len(g) > 1 else g for g in errors.grid)
     position = np.array(list(product(*grid)))
     return Sampled(errors.axes, grid, position, errors.at(position) @ offset_matrix(jacobian).T)
@@ -92,8 +95,10 @@ def told(found: Left) -> list[str]:
         ("rms", found.after_rms),
         ("largest that no axis moves against", found.uncorrectable),
     )
+    struts = len(found.before) != 3
+    names = [f"strut {k + 1}" for k in range(len(found.before))] if struts else ["dx", "dy", "dz"]
     lines = [
-        f"{label + ':':<36} {'  '.join(f'd{c} {1e6 * v:.2f}' for c, v in zip('xyz', values, strict=True))} um"
+        f"{label + ':':<36} {'  '.join(f'{c} {1e6 * v:.2f}' for c, v in zip(names, values, strict=True))} um"
         for label, values in rows
     ]
     return [*lines, f"left of the rms of all components:   {100.0 * found.share:.1f} %"]

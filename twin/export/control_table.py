@@ -15,6 +15,7 @@ from twin.rom.artefact import Artefact
 from twin.run.correction import PoseErrors
 from twin.run.correction_axes import axis_jacobian
 from twin.run.correction_file import read_pose_errors
+from twin.run.correction_struts import in_struts
 
 SIGN = (
     "sign: the values are added to the nominal axis position; they are minus the error (+10 um error: -10 um).",
@@ -45,7 +46,8 @@ def source_of(artefact: Artefact, options: ExportOptions) -> Source:
         raise TwinError("no temperature moves its tool", artefact.model.name, "there is nothing to correct")
     errors, time = read_pose_errors(options.result, artefact.digest, options.time)
     jacobian = axis_jacobian(artefact, errors.axes)
-    return Source(replace(errors, model=artefact.model), jacobian, artefact.model.name, artefact.digest, time)
+    errors = in_struts(replace(errors, model=artefact.model))
+    return Source(errors, jacobian, artefact.model.name, artefact.digest, time)
 
 
 def summary(path: Path, found: Left) -> tuple[str, ...]:

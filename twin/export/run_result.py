@@ -14,6 +14,7 @@ from twin.export.options import ExportOptions
 from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
 from twin.run.correction_axes import axis_jacobian, offset_matrix
+from twin.run.correction_struts import on_struts
 from twin.run.results import result_file
 
 
@@ -69,7 +70,7 @@ def _read(f: h5py.File, artefact: Artefact) -> RunResult:
         "power": Quantities(f["power"][...], ("step", "source"), "W", "heat of the sources"),
     }
     axes = tuple(names["pose_axis"].tolist())
-    if axes and artefact.model.moves:
+    if axes and artefact.model.moves and not on_struts(artefact.model):  # theirs come with `twin correction`
         offset = tables["tcp"].values @ offset_matrix(axis_jacobian(artefact, axes)).T
         tables["offset"] = Quantities(offset, ("time", "pose", "pose_axis"), "m", "to add to the nominal axis position")
     return RunResult(artefact.model.name, artefact.digest, coordinates, tables)

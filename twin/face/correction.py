@@ -51,6 +51,7 @@ def correct(
     from twin.run.correction_axes import axis_jacobian
     from twin.run.correction_file import read_pose_errors, write_correction
     from twin.run.correction_rotary import fit_rotary
+    from twin.run.correction_struts import in_struts
 
     wanted = None if time is None else positive("time", time, "s", zero=True)
     zero = None if zero_at is None else quantity("zero_at", zero_at, "m")
@@ -59,7 +60,7 @@ def correct(
     loaded = read(model).artefact
     refuse_still(loaded.model)
     errors, at = read_pose_errors(Path(result), loaded.digest, wanted)
-    errors = replace(errors, model=loaded.model)
+    errors = in_struts(replace(errors, model=loaded.model))
     if zero is not None:
         check_zero(zero, errors.axes, loaded.model.load_model.axes)
     degrees = _degrees(degree, errors.axes, default_degrees(errors))

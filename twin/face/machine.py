@@ -18,7 +18,7 @@ class Machine:
     """A description that was read and cross-checked; its meshes are read when it is built."""
 
     path: Path  # the file
-    text: str = field(repr=False)  # what it holds
+    text: str = field(repr=False)  # what it holds, instances written out
     description: Description = field(repr=False)  # the same as types, SI
 
     @property
@@ -60,9 +60,10 @@ class Machine:
     def unchanged(self) -> Path:
         """The file, for who reads it again. Raises DescriptionError where it is not what was loaded."""
         from twin.errors import DescriptionError
+        from twin.machine.instances import written_out
         from twin.machine.load import read_text
 
-        if read_text(self.path) != self.text:
+        if written_out(read_text(self.path)) != self.text:
             raise DescriptionError("has changed since it was loaded", str(self.path), "load it again: twin.load(PATH)")
         return self.path
 
@@ -81,6 +82,7 @@ def load(machine: Machine | str | Path) -> Machine:
     >>> machine.parameters["contacts.flange.total"]  # W/K
     8.0
     """
+    from twin.machine.instances import written_out
     from twin.machine.load import load_machine, read_text
 
     if isinstance(machine, Machine):
@@ -88,7 +90,8 @@ def load(machine: Machine | str | Path) -> Machine:
     path = Path(machine)
     path = path / "machine.toml" if path.is_dir() else path
     text = read_text(path)
-    return Machine(path, text, load_machine(path, text))
+    description = load_machine(path, text)
+    return Machine(path, written_out(text), description)
 
 
 def sound(machine: Machine | str | Path) -> tuple[Machine, list[str]]:

@@ -59,7 +59,7 @@ def poses(
 ) -> Poses:
     """Which pose grid of a machine suffices for the loads of a run, measured at random poses with the full model.
 
-    Raises DescriptionError for a machine without linear axes, TwinError for one without a TCP.
+    Raises DescriptionError for a machine without linear axes or with struts, TwinError for one without a TCP.
     """
     import numpy as np
 
@@ -83,6 +83,10 @@ def poses(
         what = "has no linear axis, so there is one pose only"
         where = str(machine) if isinstance(machine, str | Path) else str(loaded.path)
         raise DescriptionError(what, where, "nothing to be found out here")
+    if described.tcp.platform is not None:
+        where = str(machine) if isinstance(machine, str | Path) else str(loaded.path)
+        what = "grids over the lengths of six struts are too many to be tried"
+        raise DescriptionError(what, where, "`twin correction` tells what is left between the poses of [poses]")
     times, fields = fields_of_run(full, log, asked or [span * k / 6 for k in range(1, 7)], o.steps, report)
     even = grid_points([np.linspace(low, high, 5) for low, high in strokes])
     errors = displacements(structure, even, fields)

@@ -28,6 +28,7 @@ from twin.machine.copy import with_files
 from twin.machine.description import Machine
 from twin.machine.effects.edits import EDITS, extended_description, loads_with
 from twin.machine.effects.effect import Window
+from twin.machine.instances import written_out
 from twin.machine.load import load_machine
 from twin.nearest import did_you_mean
 
@@ -78,7 +79,7 @@ def hide(
 def _hide_in_machine(asked: Request, target: Path, out: Path, runs: Sequence[Path]) -> list[str]:
     path = target / "machine.toml" if target.is_dir() else target
     machine = load_machine(path)
-    text = path.read_bytes().decode("utf-8-sig")
+    text = written_out(path.read_bytes().decode("utf-8-sig"))
     logs = {folder: read_run(folder) for folder in runs}
     effect = effect_of(asked, machine, list(logs.values()))
     for place in (effect.place, str(effect.settings.get("surface", ""))):

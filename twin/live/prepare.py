@@ -26,6 +26,7 @@ from twin.rom.drive import needed_signals
 from twin.run.correction import PoseErrors, default_degrees
 from twin.run.correction_axes import axis_jacobian, offset_matrix
 from twin.run.correction_polynomial import design_matrix, normalised_axes
+from twin.run.correction_struts import on_struts
 
 FACTS, LIBRARY = "facts.json", "machine.so"
 _FLAGS = ("-std=c99", "-O3", "-shared", "-fPIC")
@@ -36,6 +37,9 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
     model, load, c = artefact.model, artefact.model.load_model, artefact.certificate
     if not model.moves:
         raise TwinError("the machine has no TCP, so nothing can be corrected", "artefact", "describe [tcp]")
+    if on_struts(model):
+        remedy = "use `twin run` and `twin correction`"
+        raise TwinError("offsets of a platform's struts are not computed live", "artefact", remedy)
     n = len(model.poses) - model.scattered
     poses = model.poses[:n]
     errors = PoseErrors(model.pose_axes, model.pose_grid, poses, np.zeros((n, 3)))

@@ -54,7 +54,7 @@ def lumped_oddities(machine: Machine) -> Iterator[Problem]:
             what = f"{largest * 1e6:.4g} um/K is more than ten metres of aluminium grow"
             remedy = 'numbers are m/K: write "3.2 um/K"'
             yield _problem(what, f"tcp.expansion.{place}", remedy, warning=largest < 1e-2)
-    if not machine.tcp.expansion and not machine.tcp.screws:
+    if not (machine.tcp.expansion or machine.tcp.screws or machine.tcp.platform):
         remedy = "give [tcp.expansion] or [tcp.screws], or leave it: temperatures are computed all the same"
         yield _problem("no temperature moves the tool", "tcp", remedy)
 

@@ -123,7 +123,8 @@ class Bar(Entry):
     cross_section: Area = Field(gt=0)
     perimeter: Length | None = Field(None, gt=0)  # times the length: the area of films
     elements: int = Field(12, ge=2, le=10_000)  # of equal length; linear temperatures between their ends
-    fixed_end: Literal["start", "end"] = "start"  # of a screw: the fixed bearing, from which it grows
+    # of a screw: the fixed bearing, from which it grows; both: two that do not yield, between which it is compressed
+    fixed_end: Literal["start", "end", "both"] = "start"
 
 
 class Encoder(Entry):
@@ -278,6 +279,35 @@ class TcpSide(Entry):
     point: Point | None = None  # tool side only: the tool centre point at axis positions zero
 
 
+class Strut(Entry):
+    """Of a parallel machine: what sets the distance between a joint on the frame and one on the platform."""
+
+    axis: str  # linear: its position zero is the length between `base` and `joint`, positive is longer
+    base: Point  # centre of the joint on the frame
+    joint: Point  # of that on the platform, at axis positions zero
+    screw: str  # bar; from its fixed end to the nut it adds its growth to the length
+    growth: dict[str, DisplacementPerKelvin] = {}  # m/K that the strut gains per kelvin of a node, or of a bar's mean
+
+
+class Platform(Entry):
+    """Of a parallel machine: a platform that six [struts] carry."""
+
+    side: Literal["tool", "work"] = "tool"  # that it carries
+    point: Point  # tool centre point at axis positions zero
+    moving: str | None = None  # node whose expansion spreads the joints of the platform about the point
+    frame: str | None = None  # node whose expansion spreads the joints of the frame about `ground`
+    ground: Point = (0.0, 0.0, 0.0)  # where the frame holds the other side
+
+
+class Instance(Entry):
+    """A template's entries under names of their own, at a place of their own (`twin.machine.instances`)."""
+
+    of: str  # template
+    origin: Point = (0.0, 0.0, 0.0)  # of the template's coordinates in the machine
+    x: Vector = (1.0, 0.0, 0.0)  # direction of the template's x in the machine
+    z: Vector | None = None  # of its z, made square to x; by default as upright as can be
+
+
 class Tcp(Entry):
     """The two sides of the TCP; of a lumped machine what each temperature moves the tool by, as seen from the work."""
 
@@ -287,6 +317,7 @@ class Tcp(Entry):
     expansion: dict[str, tuple[DisplacementPerKelvin, DisplacementPerKelvin, DisplacementPerKelvin]] = {}
     # lumped machines: bars that position an axis; the screw grows from its fixed end, and its nut holds this side
     screws: dict[str, Literal["tool", "work"]] = {}
+    platform: Platform | None = None  # lumped machines: what six struts carry, instead of screws
 
 
 class Support(Entry):
@@ -346,6 +377,7 @@ class Machine(Entry):
     sources: dict[str, Source] = {}
     films: dict[str, Film]
     sensors: dict[str, Sensor] = {}
+    struts: dict[str, Strut] = {}
     tcp: Tcp = Tcp()
     supports: dict[str, Support] = {}
     poses: dict[str, int | tuple[Length, ...]] = {}  # per linear axis: number of equidistant positions, or a list

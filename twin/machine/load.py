@@ -14,7 +14,8 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from twin.atomic import atomic_path
 from twin.errors import DescriptionError, Problem
-from twin.machine.description import Machine, MachineEntry, ParameterEntry
+from twin.machine.description import Instance, Machine, MachineEntry, ParameterEntry
+from twin.machine.instances import SECTIONS, expanded
 from twin.machine.reason import unreasonable
 from twin.machine.references import reference_problems
 from twin.machine.schema_errors import Keys, known_keys, missing_section, schema_problem
@@ -44,6 +45,11 @@ def load_machine(path: Path, text: str | None = None) -> Machine:
     lines = key_lines(text)
     if far := list(unreasonable(data)):
         raise DescriptionError.collect([_placed(path, lines, keys, problem) for keys, problem in far[:SHOWN]])
+    try:
+        data, origins = expanded(data)
+    except DescriptionError as e:
+        wrong = [_placed(path, lines, tuple(p.where.split(".")), p) for p in e.problems]
+        raise DescriptionError.collect(wrong) from e
     found, sound = _schema_problems(data)
     partial = _partial(data, sound, path.parent)
     if partial is not None:
@@ -53,10 +59,25 @@ def load_machine(path: Path, text: str | None = None) -> Machine:
             keys = tuple(problem.where.split("."))
             if keys not in reported | mistyped:  # what follows from a mistake is not another mistake
                 found.append((keys, problem))
-    problems = {_placed(path, lines, keys, problem): line_of(lines, keys) or 0 for keys, problem in found}
+    problems = {}
+    for keys, problem in _once(found, origins):
+        problems[_placed(path, lines, keys, problem)] = line_of(lines, keys) or 0
     if any(not p.warning for p in problems):
         raise DescriptionError.collect(sorted(problems, key=problems.__getitem__))
     return Machine.model_validate({**data, "folder": path.parent})
+
+
+def _once(found: list[tuple[Keys, Problem]], origins: dict[Keys, Keys]) -> Iterable[tuple[Keys, Problem]]:
+    """Problems of entries that instances made, at what they were made from: what several share is said of the first."""
+    told = set()
+    for keys, problem in found:
+        if (origin := origins.get(keys[:2])) is not None:
+            prefix = keys[1].removesuffix(origin[-1])  # keys of growth are names that got it, too
+            keys = (*origin, *(key.removeprefix(prefix) for key in keys[2:]))
+            if keys in told:
+                continue
+            told.add(keys)
+        yield keys, problem
 
 
 def located(path: Path, problems: Iterable[Problem]) -> list[Problem]:
@@ -88,6 +109,13 @@ def json_schema() -> dict[str, Any]:
     """The JSON schema of machine.toml: editors complete and check with it."""
     schema = Machine.model_json_schema()
     schema["properties"].pop("folder")
+    instance = Instance.model_json_schema()
+    sections = {name: schema["properties"][name] for name in SECTIONS}
+    template = {"type": "object", "properties": sections, "additionalProperties": False}
+    schema["properties"] |= {
+        "templates": {"type": "object", "additionalProperties": template},
+        "instances": {"type": "object", "additionalProperties": instance},
+    }
     schema["title"] = "twin machine description"
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 

@@ -30,6 +30,7 @@ from twin.machine.lumped_references import (
     misplaced,
 )
 from twin.machine.parameters import parameter_problems
+from twin.machine.platform import closure_problems, platform_problems
 from twin.machine.size import refused
 from twin.nearest import did_you_mean, nearest
 from twin.units import parse_unit
@@ -37,7 +38,7 @@ from twin.units import parse_unit
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _NAMED = (
     "materials", "parts", "nodes", "bars", "axes", "contacts", "tanks", "scales", "signals", "environment", "sources",
-    "films", "sensors", "supports",
+    "films", "sensors", "struts", "supports",
 )  # fmt: skip
 
 
@@ -49,6 +50,7 @@ def reference_problems(machine: Machine) -> list[Problem]:
         free_node_problems,
     )  # fmt: skip
     for check in (
+        platform_problems,
         *((lumped_problems, _axes, _laws, _sensors, _added) if machine.lumped else of_meshes),
         _poses,
         refused,
@@ -340,6 +342,7 @@ def _motion(machine: Machine) -> Iterator[Problem]:
         yield from parameter_problems(machine)
     if machine.lumped:
         yield from joint_law_problems(machine)
+        yield from closure_problems(machine)
         yield from bodies_without_film(machine, [body.parts for body in bodies_of(machine)])
         return
     with suppress(TwinError):  # axes that carry the wrong side are reported above

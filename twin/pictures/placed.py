@@ -12,8 +12,10 @@ from scipy.sparse.csgraph import connected_components
 from twin.machine.bodies import bodies_of, body_of, split_surface
 from twin.machine.description import Machine
 from twin.machine.kinematics import direction, displacement, rail_moves
+from twin.machine.platform import geometry_of
 from twin.pictures.surface import SurfaceMesh
 from twin.rom.artefact import Artefact, SurfaceField
+from twin.rom.parallel import forward
 
 
 def described(artefact: Artefact) -> Machine:
@@ -49,6 +51,8 @@ def parts_of(triangles: np.ndarray, n_points: int) -> np.ndarray:
 
 def poses_in_space(machine: Machine, axes: Sequence[str], poses: np.ndarray) -> np.ndarray:
     """The tool's place as seen from the work (n_poses, 3) [m] at poses (n_poses, n_axes) [m]; zero at position zero."""
+    if machine.tcp.platform is not None:
+        return np.array([forward(geometry_of(machine), p).shift for p in poses])
     if machine.lumped:
         return poses @ np.array([_lumped_axis(machine, a) for a in axes]).reshape(len(axes), 3)
     bodies = bodies_of(machine)

@@ -5,7 +5,12 @@ moves by the growth of the screw between the two,
 
     d(xi) = int alpha (T - T_ref) dx,
 
-away from the bearing, and takes along the side of the machine that it holds. For temperatures that are linear between
+away from the bearing, and takes along the side of the machine that it holds. Held at both ends by bearings that do not
+yield, its length L stays and the strain of the force between them is the same everywhere, so
+
+    d(xi) = int_0^xi alpha (T - T_ref) dx - xi/L int_0^L alpha (T - T_ref) dx,
+
+zero for a screw that is warm all along. For temperatures that are linear between
 element borders the integral is exact, so the row is piecewise quadratic in the position of the axis. Paper 001, eq
 (16.2), is a polynomial of this function along one screw.
 """
@@ -17,8 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.rom.parallel import Pose, forward, frame_spreads, joints_spread, lines
 from twin.rom.scales import AddedScale
 from twin.rom.springs import Positions
+from twin.rom.struts import Spread, StrutPlatform
 
 
 @dataclass(frozen=True)
@@ -34,13 +41,22 @@ class Screw:
     axis: int
     nut: float  # m from the bar's start at axis position zero
     per_position: float  # +1 or -1: how the nut moves along the bar with the axis
+    held_at_both: bool = False  # between two fixed bearings that do not yield: its length stays
 
     def row(self, position: float) -> np.ndarray:
         """TCP displacement (3, n) [m/K] per T - T_ref of the bar's states at an axis position [m]."""
+        return np.outer(self.direction, self.growth(position))
+
+    def growth(self, position: float) -> np.ndarray:
+        """(n,) [m/K]: how far the nut moves along the bar, from start to end, per T - T_ref of its states."""
         nut = float(np.clip(self.nut + self.per_position * position, self.borders[0], self.borders[-1]))
+        if self.held_at_both:
+            share = (nut - self.borders[0]) / (self.borders[-1] - self.borders[0])
+            whole = integral(self.borders, self.borders[0], self.borders[-1])
+            return self.expansion * (integral(self.borders, self.borders[0], nut) - share * whole)
         start, end = (nut, self.borders[-1]) if self.from_end else (self.borders[0], nut)
         sign = -1.0 if self.from_end else 1.0
-        return np.outer(sign * self.expansion * self.direction, integral(self.borders, start, end))
+        return sign * self.expansion * integral(self.borders, start, end)
 
 
 @dataclass(frozen=True)
@@ -51,6 +67,7 @@ class LumpedStructure:
     constant: tuple[np.ndarray, ...]  # per body (3, n_b) m/K
     screws: tuple[Screw, ...]
     scales: tuple[AddedScale, ...] = ()
+    platform: StrutPlatform | None = None  # its struts' screws are all of `screws`, in the order of `axes`
 
     @property
     def moves(self) -> bool:
@@ -60,6 +77,11 @@ class LumpedStructure:
     def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
         """(3, n_b) [m/K] per body. Raises ValueError for unknown axes or a wrong number of positions."""
         given = self._vector(positions)
+        if self.platform is not None:
+            pose = forward(self.platform.geometry, np.array(given))
+            jacobian = self.platform.sign * np.linalg.inv(lines(self.platform.geometry, pose))[:3]
+            own = self._strut_rows(given, pose)
+            return tuple(rows + jacobian @ grown for rows, grown in zip(self.constant, own, strict=True))
         result = [rows.copy() for rows in self.constant]
         for screw in self.screws:
             states = slice(screw.first, screw.first + len(screw.borders))
@@ -67,6 +89,40 @@ class LumpedStructure:
         for scale in self.scales:
             result[scale.body][:, scale.states] += scale.rows(given[scale.axis])
         return tuple(result)
+
+    def strut_error_rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
+        """(6, n_b) [m/K] per body: by how much the struts are too long, which minus this in their positions cancels.
+
+        What else moves the tool (`constant`) counts as the strut lengths that would move it so. Raises ValueError
+        where no struts carry a platform.
+        """
+        if self.platform is None:
+            raise ValueError("no struts carry a platform")
+        given = self._vector(positions)
+        pose = forward(self.platform.geometry, np.array(given))
+        L = self.platform.sign * lines(self.platform.geometry, pose)[:, :3]
+        own = self._strut_rows(given, pose)
+        return tuple(grown + L @ rows for rows, grown in zip(self.constant, own, strict=True))
+
+    def _strut_rows(self, given: list[float], pose: Pose) -> tuple[np.ndarray, ...]:
+        """What the struts seem to grow by, (6, n_b) [m/K] per body."""
+        platform = self.platform
+        assert platform is not None
+        rows = [np.zeros((len(self.axes), own.shape[1])) for own in self.constant]
+        for k, (screw, growth) in enumerate(zip(self.screws, platform.growth, strict=True)):
+            states = screw.first + np.arange(len(screw.borders))
+            along = float(np.sign(screw.direction @ (platform.geometry.joint[k] - platform.geometry.base[k])))
+            rows[screw.body][k, states] += along * screw.growth(given[screw.axis])
+            for own in growth:
+                rows[own.body][k, own.states] += own.rates
+        spreads: list[tuple[Spread | None, np.ndarray]] = [
+            (platform.moving, joints_spread(platform.geometry, pose)),
+            (platform.frame, frame_spreads(platform.geometry, pose, platform.ground)),
+        ]
+        for spread, gains in spreads:
+            if spread is not None:
+                rows[spread.body][:, spread.states] += spread.expansion * np.outer(gains, spread.mean)
+        return tuple(rows)
 
     def pose_rows(self, poses: np.ndarray) -> tuple[np.ndarray, ...]:
         """G per body (n_poses, 3, n_b) [m/K] at poses (n_poses, n_axes) [m]."""

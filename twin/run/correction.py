@@ -45,6 +45,11 @@ class PoseErrors:
     model: MachineModel | None = None  # that they are of, with
     state: np.ndarray | None = None  # (N,) its state at that time, where both are known
 
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the errors: along x, y, z, or of each strut's length."""
+        return ("dx", "dy", "dz") if self.tcp.shape[1] == 3 else self.axes
+
     def at(self, position: np.ndarray) -> np.ndarray:
         """TCP error (m, 3) [m] at positions (m, n_axes) [m], as `twin run` computes it (`twin.rom.tcp`).
 
@@ -99,7 +104,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class Quality:
-    """What a correction leaves, per machine component [m]; (3,) each."""
+    """What a correction leaves, per machine component [m]; (3,) each, or (6,) of struts."""
 
     before: np.ndarray  # largest error at the poses without correction
     residual: np.ndarray  # largest misfit of the polynomial at the poses
@@ -112,6 +117,7 @@ class Quality:
     product_form: (
         np.ndarray
     )  # largest misfit of the product form, eq (16.1) as printed, at the poses, whatever the form
+    components: tuple[str, ...] = ("dx", "dy", "dz")  # what each is of
     tilt: np.ndarray | None = None  # rad, largest tilt of the tool against the work: linear axes leave all of it
 
 
@@ -194,5 +200,6 @@ def quality(correction: Correction, errors: PoseErrors) -> Quality:
         after_between=largest(corrected_error(correction, errors, middles)),
         condition=float(np.linalg.cond(design_matrix(axes, errors.poses))),
         product_form=largest(errors.tcp - printed(errors.poses)),
+        components=errors.components,
         tilt=None if tilt is None else largest(tilt),
     )

@@ -15,6 +15,7 @@ import numpy as np
 
 from twin.errors import ModelError
 from twin.rom.artefact import Artefact
+from twin.rom.lumped_structure import LumpedStructure
 
 PARALLEL = 1e-9  # singular values of J below this share of the largest are none
 
@@ -22,11 +23,15 @@ PARALLEL = 1e-9  # singular values of J below this share of the largest are none
 def axis_jacobian(artefact: Artefact, axes: Sequence[str]) -> np.ndarray:
     """J (3, n_axes): motion of the tool minus that of the work per motion of a linear axis, machine coordinates.
 
-    It follows the kinematic chain of the description in the artefact. Raises ModelError for an axis that moves neither
-    the tool nor the work side, an unknown one, and for none at all.
+    It follows the kinematic chain of the description in the artefact. Of struts that carry a platform it is the unit
+    matrix: their errors are told in their own lengths (`run.correction_struts`). Raises ModelError for an axis that
+    moves neither the tool nor the work side, an unknown one, and for none at all.
     """
     if not axes:
         raise ModelError("the machine has no axis to correct with", "axes", "describe a linear axis with `poses`")
+    structure = artefact.model.structure
+    if isinstance(structure, LumpedStructure) and structure.platform is not None:
+        return np.eye(len(axes))
     directions = {a.name: np.array(a.direction) for a in artefact.model.load_model.axes}
     machine = tomllib.loads(artefact.description)
     columns = []

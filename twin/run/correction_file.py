@@ -68,7 +68,7 @@ def write_correction(
         "axes": [
             {"name": a.name, "centre_m": a.centre, "half_range_m": a.half_range, "degree": a.degree} for a in axes
         ],
-        "components": ["x", "y", "z"],
+        "components": [name.removeprefix("d") for name in quality.components],
         "tool_motion_per_axis_motion": correction.jacobian.T.tolist(),
         "offset_per_error": correction.offset_per_error.tolist(),
         "form": "full" if correction.form == "full" else "product (compressed)",
@@ -119,8 +119,9 @@ def read_correction(path: Path) -> Correction:
             for a in told["axes"]
         )
         shape = tuple(a.degree + 1 for a in axes)
-        coefficients = np.array(told["coefficients_m"], dtype=float).reshape(3, *shape)
-        jacobian = np.array(told["tool_motion_per_axis_motion"], dtype=float).reshape(len(axes), 3).T
+        n = len(told["components"])
+        coefficients = np.array(told["coefficients_m"], dtype=float).reshape(n, *shape)
+        jacobian = np.array(told["tool_motion_per_axis_motion"], dtype=float).reshape(len(axes), n).T
         factors = tuple(tuple(np.array(f) for f in component) for component in told.get("factors", ()))
         form = "product" if factors else "full"
     except (OSError, ValueError, KeyError, TypeError) as e:

@@ -65,6 +65,11 @@ def _put_scales(out: Arrays, scales: Sequence[AddedScale], first: np.ndarray) ->
 
 
 def _put_lumped(out: Arrays, structure: LumpedStructure, first: np.ndarray) -> dict[str, int]:
+    if structure.platform is not None:
+        remedy = "use `twin run`, `twin correction`, or --format generic"
+        raise TwinError("a platform on struts has no C code", "export", remedy)
+    if any(s.held_at_both for s in structure.screws):
+        raise TwinError("a screw held at both ends has no C code", "export", "use `twin run`, or --format generic")
     out.reals("constant_rows", np.hstack(structure.constant))
     screws = structure.screws
     out.integers("screw_input", [first[s.body] + s.first for s in screws])

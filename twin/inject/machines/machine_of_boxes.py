@@ -14,8 +14,8 @@ from twin.inject.machines.heat import INTO_LARGE, INTO_SMALL, Heat, drive_law, h
 from twin.inject.machines.linear_axis import LinearAxis
 from twin.inject.machines.materials import material_tables
 from twin.inject.machines.structure import LAYOUTS, Structure, structure
-from twin.inject.machines.toml_text import Section, Table, toml_text
 from twin.inject.machines.watched import sensor_tables
+from twin.machine.toml_text import Section, Table, toml_text
 
 MOST_SOURCES = 4
 AIR = {"unit": "degC", "range": [10.0, 35.0]}

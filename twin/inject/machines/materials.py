@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from twin.inject.machines.draws import about
-from twin.inject.machines.toml_text import Table
+from twin.machine.toml_text import Table
 
 SPREAD = 0.03  # of logarithms
 # W/(m K), kg/m^3, J/(kg K), GPa, 1, 1e-6/K

@@ -13,7 +13,7 @@ from twin.inject.machines.films import constant_film, moved_film, still_film
 from twin.inject.machines.heat import Heat, drive_law, heat, signal_table
 from twin.inject.machines.machine_of_boxes import AIR
 from twin.inject.machines.materials import material_tables
-from twin.inject.machines.toml_text import Section, Table, toml_text
+from twin.machine.toml_text import Section, Table, toml_text
 
 STRUCTURE = ("bed", "column", "headstock", "arm", "frame")  # in the order of the flow of forces, from the ground
 UNITS = ("motor", "spindle_bearing", "gearbox", "hydraulics", "cover", "second_motor")  # small, at one of the structure

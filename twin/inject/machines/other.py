@@ -10,13 +10,14 @@ import numpy as np
 from twin.inject.machines.draws import rounded
 from twin.inject.machines.other_films import other_film
 from twin.inject.machines.text_edits import with_table, with_values
-from twin.inject.machines.toml_text import value_text
 from twin.machine.check_lumped import node_capacity
 from twin.machine.description import Machine
 from twin.machine.edit import edited
+from twin.machine.instances import written_out
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 from twin.machine.toml_spans import Keys
+from twin.machine.toml_text import value_text
 
 # Half widths of uniform factors around 1, by kind of parameter: losses of catalogues, film correlations, joints whose
 # flatness and oil nobody knows, material data of tables
@@ -41,7 +42,7 @@ def other(text: str, seed: int, folder: Path = Path("."), off: Mapping[str, floa
     Raises DescriptionError for text that is no sound description. Machines with mesh files keep their meshes.
     """
     rng, path = np.random.default_rng(seed), folder / "machine.toml"
-    machine = load_machine(path, text)
+    machine, text = load_machine(path, text), written_out(text)
     for name in machine.films:
         if entries := other_film(rng, machine, name):
             text = with_table(text, ("films", name), entries)

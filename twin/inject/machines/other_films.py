@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.inject.machines.draws import between, one_of, rounded, with_unit
-from twin.inject.machines.toml_text import value_text
 from twin.machine.description import Film, Machine
+from twin.machine.toml_text import value_text
 from twin.physics.laws import LAWS
 from twin.units import to_si
 

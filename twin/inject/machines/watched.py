@@ -9,7 +9,7 @@ import numpy as np
 from twin.inject.machines.boxes import LETTERS, Solid
 from twin.inject.machines.draws import one_of
 from twin.inject.machines.structure import Structure
-from twin.inject.machines.toml_text import Table
+from twin.machine.toml_text import Table
 
 SENSORS = (4, 32)  # of a machine: from a handful for a correction to a measuring campaign
 RIM = 8  # mm, of sensors from edges
