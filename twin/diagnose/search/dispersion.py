@@ -7,8 +7,8 @@ Of m measured numbers with white residual r, after the named causes and the stro
 is about 1 where noise and model discrepancy are all that is left: the expectation of r^T Pi r is m, with a standard
 deviation of (2 m)^(1/2), as Pi is the inverse of the covariance of r (the dispersion of McCullagh, Nelder, Generalized
 Linear Models, 1989, section 4.5; c-hat of Burnham, Anderson, Model Selection and Multimodel Inference, 2002, section
-2.5). More than that is an error of the model's form, and a cause may explain a large share of it by chance: it must
-explain more than the whole excess, r^T Pi r - m; in a model so poor that c is above 2, more than all that is left.
+2.5). More than that is an error of the model's form, and a cause explains a share of it by chance: it must explain
+more than a quarter of the excess, r^T Pi r - m; in a model so poor that c is above 3, more than all that is left.
 
 Dividing every statistic by c, as those books do, was tried and is not enough: what a form leaves lasts for hours, so
 that one place may explain half of it.
@@ -45,7 +45,7 @@ class Dispersion:
         if self.share > policy.dispersed:
             return self.left
         excess = self.left - self.measured
-        return excess if excess > policy.chance * math.sqrt(2.0 * self.measured) else 0.0
+        return policy.excess * excess if excess > policy.chance * math.sqrt(2.0 * self.measured) else 0.0
 
 
 def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:

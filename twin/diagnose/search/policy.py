@@ -34,8 +34,9 @@ class SearchPolicy:
     chance: float = _rule(
         3.0, DERIVED, "by which what is left is more than noise and model discrepancy", "standard deviations"
     )
+    excess: float = _rule(0.25, LUMPED, "of what is left beyond them, which a cause must explain")
     dispersed: float = _rule(
-        2.0, LUMPED, "of what is left per measured number, above which a cause must explain more than all that is left"
+        3.0, LUMPED, "of what is left per measured number, above which a cause must explain more than all that is left"
     )
     halves: float = _rule(
         0.5,

@@ -46,7 +46,7 @@ def poor_note(
     if dispersion.share > policy.dispersed:
         told = f"the model is too poor to name a cause that explains less than all that is left, {variance}"
     else:
-        told = f"even the best explanation leaves {variance}: a cause must explain more than this excess to be named"
+        told = f"even the best explanation leaves {variance}: a cause must explain {policy.excess:.0%} of the excess"
     sensors = plans[0].sensors
     if not sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
         return told
