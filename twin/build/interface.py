@@ -119,10 +119,38 @@ def _facing(fa: _Facets, fb: _Facets, gap: float | None) -> np.ndarray:
     return np.column_stack([i[keep], j[keep]])
 
 
+def common_areas(body: BodyMesh, a: str, b: str, gap: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """How much of every facet of `a` and of `b` [m^2], in the order of the surfaces' facets, faces the other surface.
+
+    Nothing is assembled. Raises DescriptionError for an unknown surface.
+    """
+    fa, fb = _facets(body, a), _facets(body, b)
+    of_a, of_b = np.zeros(len(fa.centre)), np.zeros(len(fb.centre))
+    pairs = _facing(fa, fb, gap)
+    for start in range(0, len(pairs), PAIRS):
+        i, j = pairs[start : start + PAIRS].T
+        _, owner, area = _common(fa, fb, i, j, gap)
+        of_a += np.bincount(i[owner], area, len(of_a))
+        of_b += np.bincount(j[owner], area, len(of_b))
+    return of_a, of_b
+
+
 def _intersect(
     fa: _Facets, fb: _Facets, i: np.ndarray, j: np.ndarray, gap: float | None
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Unknowns (t, 12), local matrices (t, 12, 12) and the area of the intersections of facet pairs.
+    """Unknowns (t, 12), local matrices (t, 12, 12) and the area of the intersections of facet pairs."""
+    triangles, owner, area = _common(fa, fb, i, j, gap)
+    rule, weights = triangle_rule(4)
+    at = np.einsum("qk,tkc->tqc", rule, triangles)
+    jump = np.concatenate([p2_triangle(at[:, :, :3]), -p2_triangle(at[:, :, 3:])], axis=2)
+    local = np.einsum("t,q,tqi,tqj->tij", area, weights, jump, jump, optimize=True)
+    return np.concatenate([fa.nodes[i[owner]], fb.nodes[j[owner]]], axis=1), local, float(area.sum())
+
+
+def _common(
+    fa: _Facets, fb: _Facets, i: np.ndarray, j: np.ndarray, gap: float | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Intersections of facet pairs as triangles (t, 3, 6), the pair (t,) that each is of, its area (t,) m^2.
 
     Each corner of B's triangle carries its barycentric coordinates in A (projected along A's normal) and in B; both
     are linear, so clipping where A's turn negative keeps both along, and so does clipping where the distance from A's
@@ -147,10 +175,4 @@ def _intersect(
             distance = np.einsum("kvc,kc->kv", polygons[:, :, 3:], sign * off) + reach[:, None]
             polygons, counts = clip(polygons, counts, distance)
     triangles, owner = fan(polygons, counts)
-
-    rule, weights = triangle_rule(4)
-    at = np.einsum("qk,tkc->tqc", rule, triangles)
-    jump = np.concatenate([p2_triangle(at[:, :, :3]), -p2_triangle(at[:, :, 3:])], axis=2)
-    area = np.abs(np.linalg.det(triangles[:, :, :3])) * np.sqrt(twice_area_2[owner]) / 2.0
-    local = np.einsum("t,q,tqi,tqj->tij", area, weights, jump, jump, optimize=True)
-    return np.concatenate([fa.nodes[i[owner]], fb.nodes[j[owner]]], axis=1), local, float(area.sum())
+    return triangles, owner, np.abs(np.linalg.det(triangles[:, :, :3])) * np.sqrt(twice_area_2[owner]) / 2.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import click
@@ -24,7 +25,7 @@ def command(path: Path | None, machine_path: Path | None, no_meshes: bool, as_js
 
     All mistakes are shown at once, with file, key and remedy. Exit status 2 if there are errors, 0 if only warnings.
     A run is checked against the signals of --machine, else of the machine that its run.toml names, else of the
-    machine.toml two folders up (models/NAME/runs/RUN).
+    machine.toml two folders up (models/NAME/runs/RUN). Of a machine the last line is the command that shows it.
     """
     if schema:
         from twin.machine.load import json_schema
@@ -37,4 +38,6 @@ def command(path: Path | None, machine_path: Path | None, no_meshes: bool, as_js
 
     findings = check(path, machine_path, not no_meshes)
     click.echo(json.dumps(findings.to_json(), indent=1) if as_json else str(findings))
+    if findings.kind == "machine" and findings.facts and not as_json:
+        click.echo(f"see it: twin show {shlex.quote(str(path))}")
     return 0 if findings.ok else 2

@@ -25,6 +25,7 @@ COMMANDS = {
     "new": "Begin a machine from a template, or from nothing but a log.",
     "import": "Reduce matrices that another program assembled.",
     "check": "Find mistakes in a machine description or a run folder.",
+    "show": "Show a machine as it is described, in a browser, before anything is built.",
     "unpack": "Turn a file of load blocks into a run folder.",
     "losses": "Show the heat of every source, every film coefficient, and where they come from.",
     "simulate": "Step the full model through a run and write a run folder.",

@@ -6,12 +6,25 @@ Additional films come on top of that: they account for no surface.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
 from twin.errors import DescriptionError, Problem
 from twin.machine.bodies import split_surface
 from twin.machine.description import Machine
 from twin.machine.free_nodes import on_parts
 from twin.nearest import did_you_mean
+
+
+FIXED, ADIABATIC = "fixed contacts", "the adiabatic list"  # uses of a surface besides "films.NAME"
+
+
+@dataclass(frozen=True)
+class SurfaceUses:
+    """What every named surface is used for, right or wrong."""
+
+    films: Mapping[str, tuple[tuple[str, str], ...]]  # (part, surface) of every film, additional ones too
+    users: Mapping[tuple[str, str], tuple[str, ...]]  # of every (part, surface): one is right, "films.NAME" and the above
+    problems: tuple[Problem, ...]
 
 
 def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> dict[str, tuple[tuple[str, str], ...]]:
@@ -21,13 +34,21 @@ def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> 
     they leave uncovered exchanges no heat. Nodes beside parts are left out. Raises DescriptionError with all unknown,
     unused and doubly used surfaces.
     """
+    uses = surface_uses(machine, surfaces)
+    if uses.problems:
+        raise DescriptionError.collect(list(uses.problems))
+    return dict(uses.films)
+
+
+def surface_uses(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> SurfaceUses:
+    """The same, with what each surface is used for; problems are told and not raised."""
     uses = _Uses(surfaces)
     for part_name, part in machine.parts.items():
         for name in part.adiabatic:
-            uses.claim(f"{part_name}.{name}", "the adiabatic list", f"parts.{part_name}.adiabatic")
+            uses.claim(f"{part_name}.{name}", ADIABATIC, f"parts.{part_name}.adiabatic")
     for contact_name, contact in machine.contacts.items():
         for surface in contact.surfaces or ():
-            uses.claim(surface, "fixed contacts", f"contacts.{contact_name}.surfaces")
+            uses.claim(surface, FIXED, f"contacts.{contact_name}.surfaces")
     result: dict[str, list[tuple[str, str]]] = {name: [] for name in machine.films}
     rest: dict[str, str] = {}  # part -> film that takes what is left of it
     for film_name, film in machine.films.items():
@@ -42,9 +63,8 @@ def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> 
                 result[film_name].append(key)
     for part_name, name in uses.left_to(rest):
         result[rest[part_name]].append((part_name, name))
-    if uses.problems:
-        raise DescriptionError.collect(uses.problems)
-    return {name: tuple(found) for name, found in result.items()}
+    films = {name: tuple(found) for name, found in result.items()}
+    return SurfaceUses(films, uses.users(rest), tuple(uses.problems))
 
 
 class _Uses:
@@ -85,6 +105,13 @@ class _Uses:
                 remedy = "put each surface into exactly one of: a film, a fixed contact, the part's adiabatic list"
                 self.problems.append(Problem(what, f"parts.{part}", remedy))
         return left
+
+    def users(self, rest: Mapping[str, str]) -> dict[tuple[str, str], tuple[str, ...]]:
+        """What each surface is used for; those without a use are of the film that takes the rest of their part."""
+        return {
+            (part, name): tuple(users) or ((f"films.{rest[part]}",) if part in rest else ())
+            for (part, name), users in self._users.items()
+        }
 
 
 def unknown_surface(surface: str, where: str, surfaces: Mapping[str, Collection[str]]) -> Problem:

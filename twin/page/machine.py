@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from twin.errors import ModelError
+from twin.page.creases import creases
 from twin.page.packed import packed
 from twin.page.shape import Shape
 from twin.page.words import CAUTION
 from twin.rom.artefact import Artefact
 from twin.rom.certificate_table import table
 from twin.run.correction_axes import axis_jacobian
-
-CREASE = 0.8  # cosine of the angle between two faces below which the edge between them is drawn
-
 
 def machine_told(artefact: Artefact, shape: Shape | None) -> dict[str, Any]:
     """As JSON. Lengths in m, temperatures in degC."""
@@ -85,7 +83,7 @@ def _surface(artefact: Artefact, shape: Shape | None) -> dict[str, Any]:
     """Bodies one after the other; shifts: (n_fields, n_axes, 3) m/m by the linear axes."""
     first = np.cumsum([0, *(len(f.nodes) for f in artefact.fields)])
     triangles = np.vstack([f.triangles + n for f, n in zip(artefact.fields, first, strict=False)])
-    edges = np.vstack([_edges(f.nodes, f.triangles) + n for f, n in zip(artefact.fields, first, strict=False)])
+    edges = np.vstack([creases(f.nodes, f.triangles) + n for f, n in zip(artefact.fields, first, strict=False)])
     names = [b.name for b in artefact.model.bodies]
     rows = [names.index(f.body) for f in artefact.fields]
     return {
@@ -98,23 +96,6 @@ def _surface(artefact: Artefact, shape: Shape | None) -> dict[str, Any]:
         "shifts": shape.structure.system.shifts[rows].tolist() if shape else [],
         "deforms": shape is not None,
     }
-
-
-def _edges(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Pairs of nodes (k, 2) between faces that meet at an angle, and at borders."""
-    a, b, c = (nodes[triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-30)[:, None]
-    pairs = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
-    owner = np.tile(np.arange(len(triangles)), 3)
-    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    pairs, owner = pairs[order], owner[order]
-    start = np.flatnonzero(np.r_[True, np.any(np.diff(pairs, axis=0), axis=1)]) if len(pairs) else np.zeros(0, int)
-    count = np.diff(np.r_[start, len(pairs)])
-    second = np.minimum(start + 1, len(pairs) - 1)
-    sharp = np.abs(np.einsum("ij,ij->i", normal[owner[start]], normal[owner[second]])) < CREASE  # windings differ
-    kept: np.ndarray = pairs[start[(count != 2) | sharp]]
-    return kept
 
 
 def _certificate(artefact: Artefact) -> dict[str, Any]:

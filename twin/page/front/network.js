@@ -1,0 +1,31 @@
+"use strict";
+// A lumped machine as its network: nodes round, bars square, contacts between them.
+
+class Network {
+  constructor(told, canvas, pick) {
+    const svg = (name, values) => {
+      const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+      for (const [key, value] of Object.entries(values)) made.setAttribute(key, value);
+      return made;
+    };
+    const across = told.places.map((p) => p[0]), up = told.places.map((p) => p[1]);
+    const span = (values) => Math.max(Math.max(...values) - Math.min(...values), 1e-9);
+    const scale = Math.min(640 / span(across), 360 / span(up), 160), middle = (values) => (Math.max(...values) + Math.min(...values)) / 2;
+    const at = told.places.map(([x, y]) => [400 + scale * (x - middle(across)), 240 - scale * (y - middle(up))]);
+    const host = svg("svg", { id: "network", viewBox: "0 0 800 500", role: "img", "aria-label": "nodes and bars" });
+    for (const [a, b, moves] of told.links)
+      host.append(svg("line", { x1: at[a][0], y1: at[a][1], x2: at[b][0], y2: at[b][1], class: moves ? "moves" : "" }));
+    this.members = told.names.map((name, k) => {
+      const [x, y] = at[k];
+      const made = told.bars[k] ? svg("rect", { x: x - 14, y: y - 14, width: 28, height: 28, class: "member" }) : svg("circle", { cx: x, cy: y, r: 15, class: "member" });
+      const text = svg("text", { x, y: y + 30 });
+      text.textContent = name;
+      made.addEventListener("click", () => pick(k));
+      host.append(made, text);
+      return made;
+    });
+    canvas.replaceWith(host);
+  }
+  choose(entry) { this.members.forEach((made, k) => made.classList.toggle("chosen", !!entry && entry.places.includes(k))); }
+  reset() {}
+}
