@@ -11,9 +11,9 @@ import click
 def command(machine: str, output: str | None) -> None:
     """Write a page that shows MACHINE as it is described, before anything is built.
 
-    The machine to turn, axes to slide, and every surface, film, source, sensor and contact to click. Red is what no film
-    and no contact covers: it exchanges no heat. A lumped machine is shown as its network. The page needs nothing beside
-    it; only meshes are read.
+    The machine to turn, axes to slide, and every surface, film, source, sensor and contact to click. Red is what no
+    film and no contact covers: it exchanges no heat. A lumped machine is shown as its network. The page needs nothing
+    beside it. Meshes are read, and nothing is assembled.
     """
     from twin.face.show import show
 

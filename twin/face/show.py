@@ -26,12 +26,14 @@ def show(machine: Machine | str | Path, output: str | Path | None = None) -> Sho
     output: NAME.html in the current folder by default. Nothing is assembled. Raises TwinError for a description or
     meshes that cannot be read, and for an output that is a folder or is the description.
     """
+    import re
+
     from twin.errors import TwinError
     from twin.page.front import DESCRIBED, write_page
     from twin.show.content import described_told
 
     loaded = load(machine)
-    path = Path(f"{loaded.name}.html" if output is None else output)
+    path = Path(re.sub(r"[^\w.-]+", "_", loaded.name) + ".html" if output is None else output)
     if path.is_dir():
         raise TwinError("is a folder", str(path), f"name a file: -o {path / 'machine.html'}")
     if path.exists() and path.samefile(loaded.path):

@@ -14,7 +14,6 @@ from twin.machine.description import Machine
 from twin.machine.free_nodes import on_parts
 from twin.nearest import did_you_mean
 
-
 FIXED, ADIABATIC = "fixed contacts", "the adiabatic list"  # uses of a surface besides "films.NAME"
 
 
@@ -23,7 +22,7 @@ class SurfaceUses:
     """What every named surface is used for, right or wrong."""
 
     films: Mapping[str, tuple[tuple[str, str], ...]]  # (part, surface) of every film, additional ones too
-    users: Mapping[tuple[str, str], tuple[str, ...]]  # of every (part, surface): one is right, "films.NAME" and the above
+    users: Mapping[tuple[str, str], tuple[str, ...]]  # (part, surface) -> "films.NAME" and the above: one is right
     problems: tuple[Problem, ...]
 
 

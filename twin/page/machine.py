@@ -18,6 +18,7 @@ from twin.rom.artefact import Artefact
 from twin.rom.certificate_table import table
 from twin.run.correction_axes import axis_jacobian
 
+
 def machine_told(artefact: Artefact, shape: Shape | None) -> dict[str, Any]:
     """As JSON. Lengths in m, temperatures in degC."""
     model = artefact.model

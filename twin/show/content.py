@@ -62,8 +62,8 @@ def uncovered(surfaces: Surfaces) -> list[tuple[str, str]]:
 
 def _facts(machine: Machine, surfaces: Surfaces | None, listed: list[Entry]) -> list[str]:
     counts = {group: sum(e.group == group for e in listed) for group in dict.fromkeys(e.group for e in listed)}
-    told = [f"{count} {group.lower()}" for group, count in counts.items()]
-    return [f"{len(bodies_of(machine))} bodies", *([f"{len(machine.parts)} parts"] if surfaces else []), *told]
+    told = [f"{group.lower()}: {count}" for group, count in counts.items() if group != "Tool and work"]
+    return [f"bodies: {len(bodies_of(machine))}", *([f"parts: {len(machine.parts)}"] if surfaces else []), *told]
 
 
 def _notes(machine: Machine, surfaces: Surfaces | None) -> list[str]:

@@ -132,11 +132,14 @@ def _role(machine: Machine, contact: str, path: str) -> str:
 
 def _members(machine: Machine) -> Iterator[Entry]:
     for name, node in machine.nodes.items():
-        given: Facts = [(key, f"{getattr(node, key):.4g} {unit}") for key, unit in _NODE if getattr(node, key) is not None]
-        yield Entry("Nodes", f"nodes.{name}", given + ([("material", node.material)] if node.material else []), (name,))
+        given = [(key, getattr(node, key), unit) for key, unit in _NODE]
+        facts = [(key, number(value, unit)) for key, value, unit in given if value is not None]
+        yield Entry(
+            "Nodes", f"nodes.{name}", [*facts, *([("material", node.material)] if node.material else [])], (name,)
+        )
     for name, bar in machine.bars.items():
-        facts: Facts = [("material", bar.material), ("length", number(bar.length, "m")), ("elements", str(bar.elements)),
-                        ("cross-section", number(bar.cross_section, "m²"))]  # fmt: skip
+        facts = [("material", bar.material), ("length", number(bar.length, "m")), ("elements", str(bar.elements))]
+        facts.append(("cross-section", number(bar.cross_section, "m²")))
         if bar.perimeter is not None:
             facts.append(("perimeter", number(bar.perimeter, "m")))
         yield Entry("Bars", f"bars.{name}", facts, (name,))
@@ -182,7 +185,11 @@ def _held(machine: Machine, surfaces: Surfaces | None) -> Iterator[Entry]:
             told += [("tool centre point", _point(given.point))] if given.point else []
             yield Entry("Tool and work", f"tcp.{side}", told, (given.surface,), given.point, owner_of(given.surface))
     for name, tank in machine.tanks.items():
-        told = [("on", tank.surface), ("capacity", number(tank.capacity, "J/K")), ("conductance", number(tank.conductance, "W/K"))]
+        told = [
+            ("on", tank.surface),
+            ("capacity", number(tank.capacity, "J/K")),
+            ("conductance", number(tank.conductance, "W/K")),
+        ]
         yield Entry("Tanks", f"tanks.{name}", told, (tank.surface,))
 
 

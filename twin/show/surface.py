@@ -115,9 +115,7 @@ def _joined(machine: Machine, meshes: tuple[BodyMesh, ...]) -> dict[str, np.ndar
             continue
         part = split_surface(contact.surfaces[0])[0]
         body = next(m for m in meshes if any(p.name == part for p in m.parts))
-        for surface, area in zip(
-            contact.surfaces, common_areas(body, *contact.surfaces, gap=contact.gap), strict=True
-        ):
+        for surface, area in zip(contact.surfaces, common_areas(body, *contact.surfaces, gap=contact.gap), strict=True):
             found[surface] = found.get(surface, 0.0) + area
     return found
 

@@ -1,7 +1,7 @@
 "use strict";
 // The machine as described: its surfaces in grey, red where nothing exchanges heat, blue where something is chosen.
 
-const GREY = [0.74, 0.76, 0.79], PALE = [0.86, 0.87, 0.89], BARE = [0.8, 0.23, 0.18], CHOSEN = [0, 0.447, 0.698];
+const GREY = [0.74, 0.76, 0.79], PALE = [0.86, 0.87, 0.89], BARE = [0.8, 0.23, 0.18], CHOSEN = [0, 0.447, 0.698], SENSOR = [0.9, 0.624, 0];
 
 class Described {
   constructor(content) {
@@ -15,8 +15,8 @@ class Described {
     this.size = new THREE.Box3().setFromArray(this.points).getSize(new THREE.Vector3()).length();
     const grey = new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, side: THREE.DoubleSide,
       polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
-    const seen = new THREE.MeshBasicMaterial({ color: 0x0072b2, transparent: true, opacity: 0.4, depthTest: false, depthWrite: false,
-      side: THREE.DoubleSide });
+    const seen = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.4, depthTest: false, depthWrite: false, side: THREE.DoubleSide });
+    seen.color.setRGB(...CHOSEN);
     const ink = new THREE.LineBasicMaterial({ color: 0x33383f, transparent: true, opacity: 0.45 });
     this.bodies = told.bodies.map((_, b) => this.made(b, grey, seen, ink));
     this.sensors();
@@ -49,8 +49,9 @@ class Described {
     const corners = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], place = [];
     for (const x of [0, 1]) for (const y of [2, 3]) for (const z of [4, 5]) for (const c of [x, y, z]) place.push(...corners[c]);
     const geometry = this.geometry(Float32Array.from(place));
-    const usual = new THREE.MeshBasicMaterial({ color: 0xe69f00, side: THREE.DoubleSide });
-    const chosen = new THREE.MeshBasicMaterial({ color: 0x0072b2, depthTest: false, side: THREE.DoubleSide });
+    const usual = new THREE.MeshBasicMaterial({ side: THREE.DoubleSide });
+    const chosen = new THREE.MeshBasicMaterial({ depthTest: false, side: THREE.DoubleSide });
+    usual.color.setRGB(...SENSOR); chosen.color.setRGB(...CHOSEN);
     this.points3 = this.entries.filter((e) => e.point).map((entry) => {
       const mesh = new THREE.Mesh(geometry, usual);
       mesh.frustumCulled = false;

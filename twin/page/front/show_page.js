@@ -19,6 +19,8 @@ class Page {
   }
   drawn() {
     const { network, surface } = this.content, canvas = by("machine-canvas");
+    by("reset").hidden = !surface;
+    if (network) by("drawn").textContent = "The machine as a network of nodes and bars";
     if (network) return new Network(network, canvas, (k) => this.choose(this.member(network.names[k])));
     if (!surface || !Stage.supported()) {
       canvas.replaceWith(element("p", "This browser draws no WebGL, so no machine; the list needs none."));

@@ -10,7 +10,7 @@ class Stage {
     this.renderer.setPixelRatio(this.full);
     this.scene = new THREE.Scene();
     this.camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -100, 100);
-    this.camera.up.setComponent(vertical, 1);
+    this.camera.up.set(0, 0, 0).setComponent(vertical, 1);
     this.scene.add(new THREE.AmbientLight(0xffffff, 0.72 * Math.PI));
     const sun = new THREE.DirectionalLight(0xffffff, 0.42 * Math.PI);
     sun.position.set(-0.4, 0.7, 1);
