@@ -47,10 +47,8 @@ def test_names_cannot_leave_the_folder_or_the_script(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("bad", ["folder", "description", "mesh", "axis"])
 def test_bad_input_is_one_error_and_no_page(tmp_path, capsys, bad):
-    edits = {
-        "mesh": ('box = { origin = [-0.06, -0.06, 0.20], size = [0.12, 0.12, 0.03], divisions = [3, 3, 1] }', 'mesh = "no.msh"'),
-        "axis": ('carries = ["slide"]', 'carries = ["bed"]'),
-    }  # fmt: skip
+    plate = "box = { origin = [-0.06, -0.06, 0.20], size = [0.12, 0.12, 0.03], divisions = [3, 3, 1] }"
+    edits = {"mesh": (plate, 'mesh = "no.msh"'), "axis": ('carries = ["slide"]', 'carries = ["bed"]')}
     path = edited(tmp_path, *([edits[bad]] if bad in edits else []))
     target = {"folder": tmp_path, "description": path}.get(bad, tmp_path / "page.html")
     before = path.read_text(encoding="utf-8")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from twin.machine.bodies import owner_of
 from twin.machine.description import Machine
@@ -23,7 +23,7 @@ class Entry:
     places: tuple[str, ...] = ()  # surfaces "part.surface", or nodes and bars
     point: tuple[float, float, float] | None = None  # m, machine coordinates, axes at zero
     on: str = ""  # the part that carries the point
-    title: str = field(default="")
+    title: str = ""
 
     @property
     def name(self) -> str:
@@ -40,11 +40,13 @@ def entries(machine: Machine, surfaces: Surfaces | None) -> list[Entry]:
     return found
 
 
-def number(value: float, unit: str = "1") -> str:
+def number(value: float, unit: str) -> str:
+    """With its unit, "1" for none; four digits."""
     return f"{value:.4g}" + ("" if unit == "1" else f" {unit}")
 
 
 def square(area: float) -> str:
+    """An area [m^2] in words."""
     return f"{area:.3g} m²"
 
 
