@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 
 import pytest
@@ -45,16 +46,20 @@ def test_names_cannot_leave_the_folder_or_the_script(tmp_path, monkeypatch):
     assert "</script><b>" not in page.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("bad", ["folder", "description", "mesh", "axis"])
+@pytest.mark.parametrize("bad", ["folder", "device", "description", "mesh", "axis"])
 def test_bad_input_is_one_error_and_no_page(tmp_path, capsys, bad):
     plate = "box = { origin = [-0.06, -0.06, 0.20], size = [0.12, 0.12, 0.03], divisions = [3, 3, 1] }"
     edits = {"mesh": (plate, 'mesh = "no.msh"'), "axis": ('carries = ["slide"]', 'carries = ["bed"]')}
     path = edited(tmp_path, *([edits[bad]] if bad in edits else []))
-    target = {"folder": tmp_path, "description": path}.get(bad, tmp_path / "page.html")
+    pipe = tmp_path / "pipe"
+    if bad == "device":
+        os.mkfifo(pipe)
+    target = {"folder": tmp_path, "device": pipe, "description": path}.get(bad, tmp_path / "page.html")
     before = path.read_text(encoding="utf-8")
     assert run(["show", str(path), "-o", str(target)]) == 2
     told = capsys.readouterr().err
     assert told.startswith("error: ")
     assert "Traceback" not in told
-    assert [p.name for p in tmp_path.iterdir()] == ["machine.toml"]
+    assert {p.name for p in tmp_path.iterdir()} == {"machine.toml", *(["pipe"] if bad == "device" else [])}
+    assert bad != "device" or not pipe.is_file()
     assert path.read_text(encoding="utf-8") == before

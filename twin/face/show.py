@@ -24,7 +24,7 @@ def show(machine: Machine | str | Path, output: str | Path | None = None) -> Sho
     """Write the page of a description: the machine to turn, with all that is named on it.
 
     output: NAME.html in the current folder by default. Nothing is assembled. Raises TwinError for a description or
-    meshes that cannot be read, and for an output that is a folder or is the description.
+    meshes that cannot be read, and for an output that is no ordinary file or is the description.
     """
     import re
 
@@ -34,8 +34,8 @@ def show(machine: Machine | str | Path, output: str | Path | None = None) -> Sho
 
     loaded = load(machine)
     path = Path(re.sub(r"[^\w.-]+", "_", loaded.name) + ".html" if output is None else output)
-    if path.is_dir():
-        raise TwinError("is a folder", str(path), f"name a file: -o {path / 'machine.html'}")
+    if path.exists() and not path.is_file():  # a device would be replaced by the page
+        raise TwinError("is not an ordinary file", str(path), "name a file with -o, machine.html for example")
     if path.exists() and path.samefile(loaded.path):
         raise TwinError("would replace the description it shows", str(path), "name another file")
     told = described_told(loaded.description)
