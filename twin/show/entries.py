@@ -161,7 +161,8 @@ def _contacts(machine: Machine, surfaces: Surfaces | None, load: Load) -> Iterat
                 facts.append(("gap", number(contact.gap, "m")))
             yield Entry("Fixed contacts", f"contacts.{name}", facts + law, tuple(places))
             continue
-        facts = [("axis", str(contact.axis)), ("pairs", str(len(contact.pairs))), ("segments", str(contact.segments))]
+        facts = [("axis", str(contact.axis)), ("pairs", str(len(contact.pairs)))]
+        facts += [] if machine.lumped else [("segments", str(contact.segments))]
         stiffness = [(k, getattr(contact.stiffness, k)) for k in ("axial", "normal", "lateral")]
         facts += [(f"stiffness {k}", f"{1e-6 * v:.4g} N/µm per pair") for k, v in stiffness if v]
         yield Entry("Moving contacts", f"contacts.{name}", facts + law, tuple(places))

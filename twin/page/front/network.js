@@ -15,11 +15,16 @@ class Network {
     const host = svg("svg", { id: "network", viewBox: "0 0 800 500", role: "img", "aria-label": "nodes and bars" });
     for (const [a, b, moves] of told.links)
       host.append(svg("line", { x1: at[a][0], y1: at[a][1], x2: at[b][0], y2: at[b][1], class: moves ? "moves" : "" }));
+    let nearest = 50; // between two members, at most what makes symbols large enough
+    at.forEach((a, k) => at.slice(0, k).forEach((b) => { nearest = Math.min(nearest, Math.hypot(a[0] - b[0], a[1] - b[1])); }));
+    const r = Math.max(0.3 * nearest, 4), crowded = told.names.length > 14; // then only what is chosen shows its name
     this.members = told.names.map((name, k) => {
       const [x, y] = at[k];
-      const made = told.bars[k] ? svg("rect", { x: x - 14, y: y - 14, width: 28, height: 28, class: "member" }) : svg("circle", { cx: x, cy: y, r: 15, class: "member" });
-      const text = svg("text", { x, y: y + 30 });
-      text.textContent = name;
+      const made = told.bars[k] ? svg("rect", { x: x - r, y: y - r, width: 2 * r, height: 2 * r, class: "member" })
+        : svg("circle", { cx: x, cy: y, r, class: "member" });
+      const text = svg("text", { x, y: y + r + 15, class: crowded ? "crowded" : "" }), hover = svg("title", {});
+      text.textContent = hover.textContent = name;
+      made.append(hover);
       made.addEventListener("click", () => pick(k));
       host.append(made, text);
       return made;
