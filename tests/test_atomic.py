@@ -68,3 +68,14 @@ def test_places_that_cannot_be_written_are_told_beforehand(tmp_path: Path, monke
     with pytest.raises(TwinError, match="Permission denied"):
         check_file(tmp_path / "new" / "a.h5")
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_device_or_pipe_is_not_replaced_by_a_file(tmp_path: Path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(TwinError, match="pipe or device"), atomic_path(pipe) as temporary:
+        temporary.write_text("new")
+    with pytest.raises(TwinError, match="pipe or device"):
+        check_file(pipe)
+    assert pipe.is_fifo()
+    assert [p.name for p in tmp_path.iterdir()] == ["pipe"]

@@ -25,7 +25,14 @@ def check_file(target: Path) -> None:
     """The same for a file to be written."""
     if target.is_dir():
         raise TwinError("is a folder, not a file", str(target), "name a file with -o")
+    _not_a_device(target)
     check_folder(target.parent)
+
+
+def _not_a_device(target: Path) -> None:
+    """A rename would put a file in its place: /dev/null would be gone."""
+    if target.exists() and not target.is_file() and not target.is_dir():
+        raise TwinError("is a pipe or device, not an ordinary file", str(target), "name a file with -o")
 
 
 def _cannot_write(e: OSError, target: Path) -> TwinError:
@@ -38,9 +45,10 @@ def _cannot_write(e: OSError, target: Path) -> TwinError:
 def atomic_path(target: Path) -> Iterator[Path]:
     """Yield a temporary path in the target's folder; rename it to `target` on success, remove it on any failure.
 
-    Raises TwinError if the disk is full or the folder cannot be written.
+    Raises TwinError if the disk is full or the folder cannot be written, and for a target that is a pipe or device.
     """
     target = Path(target)
+    _not_a_device(target)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -28,14 +28,14 @@ def show(machine: Machine | str | Path, output: str | Path | None = None) -> Sho
     """
     import re
 
+    from twin.atomic import check_file
     from twin.errors import TwinError
     from twin.page.front import DESCRIBED, write_page
     from twin.show.content import described_told
 
     loaded = load(machine)
     path = Path(re.sub(r"[^\w.-]+", "_", loaded.name) + ".html" if output is None else output)
-    if path.exists() and not path.is_file():  # a device would be replaced by the page
-        raise TwinError("is not an ordinary file", str(path), "name a file with -o, machine.html for example")
+    check_file(path)
     if path.exists() and path.samefile(loaded.path):
         raise TwinError("would replace the description it shows", str(path), "name another file")
     told = described_told(loaded.description)
