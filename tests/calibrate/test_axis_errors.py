@@ -127,7 +127,7 @@ def test_chain_of_an_artefact(rail_moves):
     load = SimpleNamespace(axes=axes, rails=rails, pairs=pairs)
     description = (Path(__file__).parents[2] / "models" / "five_axis" / "machine.toml").read_text(encoding="utf-8")
     artefact = SimpleNamespace(
-        model=SimpleNamespace(load_model=load, bodies=tuple(bodies.values())), description=description
+        model=SimpleNamespace(load_model=load, bodies=tuple(bodies.values()), structure=None), description=description
     )
     assert chain_of(artefact) == FIVE_AXIS
     load.axes = (AxisWiring("x", (-1.0, 0.0, 0.0), -0.4, 0.4, "x"), *axes[1:])

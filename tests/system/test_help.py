@@ -64,6 +64,7 @@ def test_the_list_of_commands_is_complete():
         "check",
         "build",
         "run",
+        "show",
         "live",
         "export",
         "calibrate",
