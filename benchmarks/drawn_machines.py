@@ -148,7 +148,8 @@ def counted(rows: Sequence[Row]) -> None:
         visible = any(m >= least for m, least in zip(row.get("moved", VISIBLE), VISIBLE, strict=True))
         for only in (False, True) if visible else (False,):
             answers.setdefault((row["hidden"][0], only), Counter())[answer(row)] += 1
-        print(row["seed"], row["hidden"], answer(row), row["verdict"], row["causes"], f"{row['seconds']:.0f} s")
+        told = f"dispersion {row['dispersion']:.2f}, best {row['best']:.0f}, " if "dispersion" in row else ""
+        print(row["seed"], row["hidden"], answer(row), row["verdict"], row["causes"], f"{told}{row['seconds']:.0f} s")
     for only in (False, True):
         print("of those that are visible" if only else "of all")
         for (hidden, seen), of_kind in answers.items():
@@ -273,7 +274,7 @@ def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     ]
     stuck += broken_sensors(usable, study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
     own = emptied(detector, plans)
-    found, _ = searched(own, measured_of(with_measured(study, plans)))
+    found, left = searched(own, measured_of(with_measured(study, plans)))
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
     opened = on_sealed(found, verdict, causes, FAMILIES, plans[2:], 1)
     verdict, causes = opened.verdict, opened.causes
@@ -286,6 +287,8 @@ def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
         "rivals": [(r.family, r.place) for c in causes for r in c.rivals],
         "by_run": [[(s.amplitude, s.sigma) for s in a.by_run] for a in found.accepted],
         "observed": {k: v / detector.thresholds.get(k, np.inf) for k, v in found.steps[0].observed.items()},
+        "dispersion": left.share,
+        "best": max((h.statistic for h in found.steps[0].ranked), default=0.0),
         "seconds": time.perf_counter() - began,
     }
 

@@ -159,6 +159,7 @@ def _row(
     rivals = [(r.family, r.place) for c in d.causes[:1] for r in c.rivals]
     row = {"days": list(days), "hidden": hidden, "verdict": d.verdict, "causes": causes, "rivals": rivals}
     row["best"] = [(r.family, r.place, round(r.statistic), round(d.thresholds[r.family])) for r in d.ranked[:3]]
+    row["dispersion"] = result.search.dispersion()  # unknown heat not taken out
     return row | {"seconds": round(time.perf_counter() - began)}, result
 
 
@@ -185,7 +186,8 @@ def told(rows: Sequence[Row]) -> None:
         answers = [answer(r) for r in own]
         for r, a in zip(own, answers, strict=True):
             hidden = "" if clean else " {} {} {:.3g}".format(*r["hidden"])
-            print(f"      {' '.join(r['days'])}{hidden}: {a}, {r['verdict']} {r['causes']} {r['seconds']} s")
+            told = f"dispersion {r['dispersion']:.1f}, " if "dispersion" in r else ""
+            print(f"      {' '.join(r['days'])}{hidden}: {a}, {r['verdict']} {r['causes']} {told}{r['seconds']} s")
         counts = ", ".join(f"{answers.count(a)} {a}" for a in dict.fromkeys(answers))
         print(f"   {'as measured' if clean else 'a fault at twice its limit'}: {len(own)} diagnoses: {counts}")
 

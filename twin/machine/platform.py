@@ -118,5 +118,5 @@ def closure_problems(machine: Machine) -> Iterator[Problem]:
         yield Problem(e.problems[0].what, "struts", "shorten the strokes, or move the joints apart")
         return
     if not condition <= WORST:
-        what = f"the struts hardly hold the platform at an end of their strokes (condition {condition:.3g})"
+        what = f"the platform is near a singular pose at an end of the strokes (condition number {condition:.3g})"
         yield Problem(what, "struts", "shorten the strokes, or move the joints apart")
