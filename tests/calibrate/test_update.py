@@ -10,6 +10,7 @@ import pytest
 
 from models.scripts import load_script
 from twin.build.simulate import Noise, simulate_run
+from twin.calibrate.score.compare import simulated_tcp
 from twin.calibrate.update.live import read_gains, read_state, write_live
 from twin.calibrate.update.methods import Options, learnt, update_run
 from twin.calibrate.update.plan import Plan
@@ -279,12 +280,38 @@ def test_states_of_other_machines_are_refused(artefact, lived, tmp_path):
             read_gains(tmp_path / "state.json")
 
 
+@pytest.mark.parametrize("method", ["gain", pytest.param("state", marks=pytest.mark.long)])
+@pytest.mark.parametrize("first", [0, 5])
+def test_deviations_that_count_from_the_first_row(artefact, truth, base, method, first):
+    """They stand on what is predicted when that row comes: an unknown zero of the probe is none of the machine's."""
+    whole = truth.tcp
+    counted = dataclasses.replace(
+        whole,
+        time=whole.time[first:],
+        position=whole.position[first:],
+        displacement=whole.displacement[first:] - whole.displacement[first],
+        sigma=None,
+    )
+    run = dataclasses.replace(truth, tcp=counted, tcp_reference="first")
+    updated, *_ = update_run(artefact, run, dataclasses.replace(OPTIONS, method=method), Plan(1800.0), base=base)
+    assert updated.reference == whole.time[first]
+    assert not np.isin(updated.reference, updated.row_time)
+    assert len(updated.row_time) == len(whole.time) - first - 1
+    zero = updated.measured - counted.displacement[1:]
+    np.testing.assert_allclose(zero, np.broadcast_to(zero[0], zero.shape), atol=1e-15)
+    if method == "gain":  # nothing is learnt before: what the base model computes there
+        computed = simulated_tcp(artefact, base, whole.time[first : first + 1], whole.position[first : first + 1])
+        np.testing.assert_allclose(zero[0], computed[0], atol=0.1e-6)  # an update interpolates between the poses
+        np.testing.assert_allclose(updated.predicted[0], updated.predicted_base[0], atol=1e-12)
+    rest = np.linalg.norm(updated.measured - updated.predicted)
+    assert rest < (0.75 if method == "gain" else 0.5) * np.linalg.norm(updated.measured - updated.predicted_base)
+
+
 def test_what_cannot_be_updated_is_refused(artefact, truth):
     with pytest.raises(LogError, match=r"no tcp\.csv"):
         update_run(artefact, dataclasses.replace(truth, tcp=None), OPTIONS)
-    with pytest.raises(LogError, match="count from the first row"):
-        update_run(
-            artefact, dataclasses.replace(truth, tcp_reference="first"), dataclasses.replace(OPTIONS, method="gain")
-        )
+    early = dataclasses.replace(truth.tcp, time=truth.tcp.time - 1e5)
+    with pytest.raises(LogError, match="count from the first row, which is outside"):
+        update_run(artefact, dataclasses.replace(truth, tcp=early, tcp_reference="first"), OPTIONS)
     with pytest.raises(ModelError, match="as parameters"):
         update_run(dataclasses.replace(artefact, parameters=()), truth, OPTIONS)

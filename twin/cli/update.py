@@ -68,6 +68,11 @@ def _lines(told: Mapping[str, Any]) -> list[str]:
         f"largest correction {1e6 * max(told['largest_correction_m']):.1f} um, "
         f"by at most {1e6 * told['largest_step_of_correction_m']:.2f} um a step"
     ]
+    if told["counted_from_s"] is not None:
+        lines.append(
+            f"deviations count from the row at {told['counted_from_s'] / 3600:.2f} h: they stand on what was predicted "
+            f"there, and what that is wrong all errors keep"
+        )
     if "discrepancy" in told:
         lines.append(
             f"earlier runs are most likely with {told['discrepancy']['factor']:g} times the prior discrepancies"

@@ -149,7 +149,9 @@ def update(
         "run": name_of(run),
         "pose_axes": list(artefact.model.pose_axes),
         "unknown_sensors": _unknown_sensors(loaded, measured),
-        "rows_left_out": (0 if measured.tcp is None else len(measured.tcp.time)) - len(updated.row_time),
+        "rows_left_out": (0 if measured.tcp is None else len(measured.tcp.time))
+        - len(updated.row_time)
+        - (updated.reference is not None),
         "twin": __version__,
     }
     if tuned is not None:

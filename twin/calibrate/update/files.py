@@ -54,6 +54,7 @@ def summary(updated: Updated, noise: float) -> dict[str, Any]:
     return {
         "method": updated.method,
         "rows": len(updated.row_time),
+        "counted_from_s": updated.reference,
         "used": int(updated.used.sum()),
         "measurement_times_s": updated.row_time[updated.used].tolist(),
         "asked_s": list(updated.asked),

@@ -149,6 +149,7 @@ class Updated:
     used: np.ndarray  # (m,) bool: assimilated; others only scored
     asked: tuple[float, ...]  # s, when a scheduler asked for a measurement
     told: tuple[Told, ...]
+    reference: float | None  # s: the row that the others count from, where they do; it is none of the m
 
 
 def replay_update(
@@ -165,21 +166,23 @@ def replay_update(
     plan: which rows of tcp.csv are used, by default all; the others are predicted all the same. sensors: names of
     structural sensors in the model's order, to be read from the run's temperatures.
 
-    Raises LogError where the run has no row of tcp.csv inside its loads' time, or counts deviations from the first row.
+    Where deviations count from the first row of tcp.csv they are put on what is predicted when it comes. That row
+    measures nothing then, and what the prediction is wrong there all later errors keep.
+
+    Raises LogError where the run has no row of tcp.csv inside its loads' time, none but the one that the others count
+    from, or where that one is outside or has no position.
     """
     plan = Plan() if plan is None else plan
     if run.tcp is None:
         raise LogError("no tcp.csv", str(run.folder), "an update needs rows of time, positions, dx, dy, dz")
-    rows = _rows(run, base)
-    file = str(run.folder / "tcp.csv")
+    reference, rows = _rows(run, base)
     if not rows:
-        raise LogError("no TCP measurement inside the time of the loads", file, "check the times of tcp.csv")
-    if run.tcp_reference == "first":
-        what = "deviations count from the first row, and an update needs them whole"
-        raise LogError(what, file, 'measure them absolutely: tcp_reference = "absolute"')
+        where = str(run.folder / "tcp.csv")
+        raise LogError("no TCP measurement inside the time of the loads", where, "check the times of tcp.csv")
     model, n, m = program.model, len(base.time) - 1, len(rows)
     values, readings = _temperatures(run, base.time, sensors)
     of_step = np.searchsorted(base.time, [r.time for r in rows], side="left") - 1
+    counted = np.zeros(3)  # m: what the base model's error is too little by, where deviations count from a row
     position = base.position[:, [base.axes.index(a) for a in model.pose_axes]]
     live = program.begin()
     correction, (tcp, sigma) = np.zeros_like(base.tcp), np.zeros((2, n + 1, 3))
@@ -193,17 +196,15 @@ def replay_update(
             end = float(base.time[k + 1])
             tcp[k + 1], sigma[k + 1] = program.predict(live, position[k + 1])
             correction[k + 1] = program.at_poses(live) - base.tcp[k + 1]
+            if reference is not None and k == max(0, np.searchsorted(base.time, reference.time, side="left") - 1):
+                zero, _, by_base, _ = _expected(program, base, k, before, live, reference)
+                counted = zero - by_base
+                rows = [replace(r, displacement=r.displacement + zero) for r in rows]
             drift = {}
             here = np.flatnonzero(of_step == k)
             for i in here:  # all of them before any is learnt
-                ahead = (end - rows[i].time) / (end - base.time[k])
-                place = rows[i].position
-                late, predicted_sigma[i] = program.predict(live, place)
-                predicted[i] = late + ahead * (program.predict(before, place)[0] - late)
-                weights, _ = pose_weights(model.pose_grid, place[None])
-                predicted_base[i] = weights[0] @ (ahead * base.tcp[k] + (1.0 - ahead) * base.tcp[k + 1])
-                own = [program.updater.predict(p.state, place)[0] for p in (before, live)]
-                drift[i] = ahead * (own[1] - own[0])  # the row is older than the state by less than a step
+                predicted[i], predicted_sigma[i], by_base, drift[i] = _expected(program, base, k, before, live, rows[i])
+                predicted_base[i] = by_base + counted
             if readings[k].any():
                 live, news = program.temperatures(live, values[k], readings[k])
                 told += news
@@ -234,7 +235,22 @@ def replay_update(
         used=used,
         asked=tuple(plan.asked),
         told=tuple(told),
+        reference=None if reference is None else reference.time,
     ), live
+
+
+def _expected(
+    program: Program[S], base: Result, k: int, before: Live[S], live: Live[S], row: Measurement
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """When a row comes in step k, between `before` and `live`, each (3,) m: the TCP error as predicted, its standard
+    deviation, as the base model has it, and by how much the method's own prediction moves to the end of the step."""
+    ahead = (base.time[k + 1] - row.time) / (base.time[k + 1] - base.time[k])
+    late, sigma = program.predict(live, row.position)
+    predicted = late + ahead * (program.predict(before, row.position)[0] - late)
+    weights, _ = pose_weights(program.model.pose_grid, row.position[None])
+    by_base = weights[0] @ (ahead * base.tcp[k] + (1.0 - ahead) * base.tcp[k + 1])
+    own = [program.updater.predict(p.state, row.position)[0] for p in (before, live)]
+    return predicted, sigma, by_base, ahead * (own[1] - own[0])
 
 
 def _worth(program: Program[S], live: Live[S], position: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -244,22 +260,31 @@ def _worth(program: Program[S], live: Live[S], position: np.ndarray, time: float
     return sigma, program.updater.predict(after, position)[1]
 
 
-def _rows(run: Run, base: Result) -> list[Measurement]:
-    """The rows of tcp.csv inside the computed time, with a position and a value, in the order of time."""
-    if run.tcp is None:
-        return []
+def _rows(run: Run, base: Result) -> tuple[Measurement | None, list[Measurement]]:
+    """The rows of tcp.csv inside the computed time, with a position and a value, in the order of time; before them the
+    one that all count from, where they do."""
+    if run.tcp is None or not len(run.tcp.time):
+        return None, []
     position = tcp_positions(run.tcp, base)
-    good = (run.tcp.time > base.time[0]) & (run.tcp.time <= base.time[-1])
-    good &= np.isfinite(position).all(axis=1) & np.isfinite(run.tcp.displacement).any(axis=1)
-    order = [i for i in np.argsort(run.tcp.time, kind="stable") if good[i]]
-    sigma = run.tcp.sigma
-    return [
-        Measurement(
-            float(run.tcp.time[i]), position[i], run.tcp.displacement[i],
-            None if sigma is None or not (np.isfinite(sigma[i]) and sigma[i] > 0.0) else float(sigma[i]),
+    good = (run.tcp.time >= base.time[0]) & (run.tcp.time <= base.time[-1]) & np.isfinite(position).all(axis=1)
+    from_first = run.tcp_reference == "first"
+    if from_first and not good[0]:
+        raise LogError(
+            "deviations count from the first row, which is outside the time of the loads or has no position",
+            str(run.folder / "tcp.csv"),
+            "let the loads begin before the first row, or remove rows before the loads",
         )
-        for i in order
-    ]  # fmt: skip
+    good &= (run.tcp.time > base.time[0]) & np.isfinite(run.tcp.displacement).any(axis=1)
+    sigma = run.tcp.sigma
+
+    def row(i: int) -> Measurement:
+        known = sigma is not None and np.isfinite(sigma[i]) and sigma[i] > 0.0
+        own = float(sigma[i]) if sigma is not None and known else None
+        return Measurement(float(run.tcp.time[i]), position[i], run.tcp.displacement[i], own)
+
+    good[0] &= not from_first
+    rows = [row(i) for i in np.argsort(run.tcp.time, kind="stable") if good[i]]
+    return row(0) if from_first else None, rows
 
 
 def _temperatures(run: Run, time: np.ndarray, sensors: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
