@@ -263,10 +263,11 @@ def _worth(program: Program[S], live: Live[S], position: np.ndarray, time: float
 def _rows(run: Run, base: Result) -> tuple[Measurement | None, list[Measurement]]:
     """The rows of tcp.csv inside the computed time, with a position and a value, in the order of time; before them the
     one that all count from, where they do."""
-    if run.tcp is None or not len(run.tcp.time):
+    tcp = run.tcp
+    if tcp is None or not len(tcp.time):
         return None, []
-    position = tcp_positions(run.tcp, base)
-    good = (run.tcp.time >= base.time[0]) & (run.tcp.time <= base.time[-1]) & np.isfinite(position).all(axis=1)
+    position = tcp_positions(tcp, base)
+    good = (tcp.time >= base.time[0]) & (tcp.time <= base.time[-1]) & np.isfinite(position).all(axis=1)
     from_first = run.tcp_reference == "first"
     if from_first and not good[0]:
         raise LogError(
@@ -274,16 +275,16 @@ def _rows(run: Run, base: Result) -> tuple[Measurement | None, list[Measurement]
             str(run.folder / "tcp.csv"),
             "let the loads begin before the first row, or remove rows before the loads",
         )
-    good &= (run.tcp.time > base.time[0]) & np.isfinite(run.tcp.displacement).any(axis=1)
-    sigma = run.tcp.sigma
+    good &= (tcp.time > base.time[0]) & np.isfinite(tcp.displacement).any(axis=1)
+    sigma = tcp.sigma
 
     def row(i: int) -> Measurement:
         known = sigma is not None and np.isfinite(sigma[i]) and sigma[i] > 0.0
         own = float(sigma[i]) if sigma is not None and known else None
-        return Measurement(float(run.tcp.time[i]), position[i], run.tcp.displacement[i], own)
+        return Measurement(float(tcp.time[i]), position[i], tcp.displacement[i], own)
 
     good[0] &= not from_first
-    rows = [row(i) for i in np.argsort(run.tcp.time, kind="stable") if good[i]]
+    rows = [row(i) for i in np.argsort(tcp.time, kind="stable") if good[i]]
     return row(0) if from_first else None, rows
 
 
