@@ -103,16 +103,17 @@ def null(
         run = planned.run
         films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in probed.places])
         air = run.drive.environment.reshape(n, INNER, -1)
-        usual = typical(study, k)
+        mean, apart = shared_by_film(study, local)
+        least = lowest(study, k)
         A, M, rise = np.zeros_like(body.A0), np.zeros(body.n), np.zeros((n, INNER))
         for p in np.flatnonzero(films >= 0):
-            strength = local[p] * usual[films[p]]
+            strength = apart[p] * least[films[p]]
             A += strength * probed.A[p]
             M += strength * probed.M[p]
         surround = air[:, :, load.surroundings] - probed.base.reference_temperature
         rise[:] = surround
         slow = _smooth(rng, n, len(load.films), form.shape_time / (INNER * (run.drive.time[1] - run.drive.time[0])))
-        wobble = form.shape * slow + wind * winds(study, k, exponent)
+        wobble = mean + form.shape * slow + wind * winds(study, k, exponent)
         forcing = np.zeros((n, INNER, body.n))
         for j, vector in enumerate(split):
             if vector is not None:
@@ -199,13 +200,42 @@ def winds(study: Study, k: int, exponent: np.ndarray) -> np.ndarray:
     return result
 
 
+def shared_by_film(study: Study, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Relative changes of the coefficients of places (n_places,): the mean over the area of each film (n_films,), and
+    what is left of each place.
+
+    The mean acts in proportion to the coefficient, as it changes. A constant one of the mean of a film that motion
+    makes many times as large would take more than there is at rest.
+    """
+    probed = study.probed
+    (body,) = probed.base.bodies
+    names = [f.name for f in probed.base.load_model.films]
+    mean, apart = np.zeros(len(names)), np.array(local)
+    for f, name in enumerate(names):
+        own = [p for p, place in enumerate(probed.places) if place.film == name]
+        area = np.array([float(body.one @ probed.A[p] @ body.one) for p in own])
+        if area.sum() > 0.0:
+            mean[f] = area @ local[own] / area.sum()
+        apart[own] -= mean[f]
+    return mean, apart
+
+
 def typical(study: Study, k: int) -> np.ndarray:
     """(n_films,) W/(m^2 K): the mean convection of each film in a run, at a rise of a few kelvin."""
+    return _convection(study, k).mean(axis=0)
+
+
+def lowest(study: Study, k: int) -> np.ndarray:
+    """(n_films,) W/(m^2 K): the least convection of each film in a run, likewise."""
+    return _convection(study, k).min(axis=0)
+
+
+def _convection(study: Study, k: int) -> np.ndarray:
+    """(n, n_films) W/(m^2 K)"""
     drive = study.runs[k].run.drive
-    load = study.probed.base.load_model
-    result = drive.theta[:, : len(load.films)].mean(axis=0)
+    result = np.array(drive.theta[:, : len(study.probed.base.load_model.films)])
     middle = drive.films.value.shape[2] // 2 + 15
-    result[list(drive.films.index)] = drive.films.value[:, :, middle].mean(axis=0)
+    result[:, list(drive.films.index)] = drive.films.value[:, :, middle]
     return result
 
 
