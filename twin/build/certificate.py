@@ -129,7 +129,8 @@ def certify(
 ) -> Certificate:
     """Certificate from the parts of the error; the first one is compact against rich, on all scenarios.
 
-    positions: (m, n_axes) m; the comparisons have the displacement at the poses of the grid, then there.
+    positions: (m, n_axes) m, perhaps with angles [rad] behind; the comparisons have the displacement at the poses of
+    the grid, then there.
     """
     compact, counted = parts[0].errors, [part.errors for part in parts if part.counts]
     T = np.sum([c.temperature_error.max(axis=0) for c in counted], axis=0)
@@ -247,5 +248,7 @@ def _worst_output(
 
 
 def _tcp_row(model: MachineModel, at: np.ndarray, axis: int) -> str:
-    place = ", ".join(f"{a} {1e3 * v:.0f} mm" for a, v in zip(model.pose_axes, at, strict=True))
-    return f"d{'xyz'[axis]} at {place or 'the only pose'}"
+    n = len(model.pose_axes)
+    place = [f"{a} {1e3 * v:.0f} mm" for a, v in zip(model.pose_axes, at[:n], strict=True)]
+    place += [f"{a} {np.rad2deg(v):.0f} deg" for a, v in zip(model.turning, at[n:], strict=False)]
+    return f"d{'xyz'[axis]} at {', '.join(place) or 'the only pose'}"

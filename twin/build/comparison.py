@@ -150,7 +150,7 @@ class _Reader:
         model = self.stepper.model
         if is_exact(model):
             return elastic_rows(model, self._positions)
-        return (pose_weights(model.pose_grid, self._positions)[0],)
+        return (pose_weights(model.pose_grid, self._positions[:, : len(model.pose_axes)])[0],)
 
     def outputs(self, scenario: Scenario, substeps: int, finer: int) -> tuple[np.ndarray, np.ndarray]:
         """Temperatures (n, n_sensors) degC and TCP displacements (n, n_places, 3) m at the ends of all steps."""

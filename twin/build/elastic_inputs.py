@@ -14,10 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from twin.build.flexibility import BodyFlexibility
 from twin.build.structure import Structure
-from twin.rom.elastic_structure import ElasticStructure, PortFlexibility
+from twin.rom.elastic_structure import CutStructure, ElasticStructure, PortFlexibility
 from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.scales import AddedScale
+from twin.rom.springs import SpringSystem
 from twin.rom.struts import StrutPlatform
 
 
@@ -57,8 +59,26 @@ def _of_meshed(structure: Structure) -> tuple[ElasticStructure, tuple[np.ndarray
     scales = tuple(_scale(scale, rows) for scale in structure.system.scales)
     nodes = tuple(replace(n, states=rows.add(n.body, n.states, np.eye(1))) for n in structure.system.nodes)
     system = replace(structure.system, encoders=tuple(encoders), scales=scales, nodes=nodes)
-    bodies = tuple(PortFlexibility(body.name, body.F, body.R) for body in structure.bodies)
-    return ElasticStructure(bodies, system, structure.middles, structure.size), rows.matrices()
+    cut = None if structure.cut is None else _cut(structure.cut, system, rows)
+    return ElasticStructure(_bare(structure), system, structure.middles, structure.size, cut), rows.matrices()
+
+
+def _bare(structure: ElasticStructure) -> tuple[PortFlexibility, ...]:
+    return tuple(PortFlexibility(body.name, body.F, body.R) for body in structure.bodies)
+
+
+def _cut(cut: CutStructure, acting: SpringSystem, rows: _Rows) -> CutStructure:
+    """Pieces read rows of their own, bodies that are not cut those of the whole machine; scales grow alike."""
+    inputs = []
+    for owner, piece in zip(cut.owners, cut.structure.bodies, strict=True):
+        assert isinstance(piece, BodyFlexibility)
+        all_of_it = cut.owners.count(owner) == 1
+        inputs.append(np.arange(len(piece.F)) if all_of_it else rows.add(owner, np.arange(piece.H.shape[1]), piece.H))
+    readers = zip(cut.structure.system.encoders, acting.encoders, strict=True)
+    encoders = tuple(replace(e, strip=replace(same.strip, body=e.strip.body)) for e, same in readers)
+    bare = replace(cut.structure.system, encoders=encoders, scales=(), nodes=())
+    structure = replace(cut.structure, bodies=_bare(cut.structure), system=bare)
+    return replace(cut, structure=structure, inputs=tuple(inputs))
 
 
 def _of_lumped(structure: LumpedStructure) -> tuple[LumpedStructure, tuple[np.ndarray, ...]]:

@@ -18,6 +18,7 @@ from twin.build.surface import Patch, facet_nodes, patch, segments
 from twin.errors import DescriptionError
 from twin.machine.bodies import split_surface
 from twin.rom.elastic_ports import AxialPort, MeanPort, RailPort, RigidPort
+from twin.rom.turning import MomentPort
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
@@ -48,13 +49,14 @@ class PortTable:
         assert isinstance(port, MeanPort)
         return port
 
-    def rigid(self, surface: str) -> RigidPort:
-        """The rigid port of a "part.surface"."""
-        key = ("rigid", surface)
+    def rigid(self, surface: str, *more: str) -> RigidPort:
+        """The rigid port of a "part.surface", or of several of one part together."""
+        key = ("rigid", surface, *more)
         if key not in self._known:
-            body, offset, whole = self._patch(surface)
-            first = self._add_mean(body, offset, surface, whole)
-            self._add_rotation(body, offset, surface, whole)
+            body, offset, whole = self._patch(surface, *more)
+            label = ", ".join((surface, *more))
+            first = self._add_mean(body, offset, label, whole)
+            self._add_rotation(body, offset, label, whole)
             self._known[key] = RigidPort(body, first, whole.centroid, whole.normal)
         port = self._known[key]
         assert isinstance(port, RigidPort)
@@ -93,6 +95,15 @@ class PortTable:
         assert isinstance(port, AxialPort)
         return port
 
+    def moments(self, name: str, body: int, nodes: np.ndarray, values: np.ndarray) -> MomentPort:
+        """Moments of the displacements of a body: values (k, m) at its nodes (m,), one row per function."""
+        first = len(self.names[body])
+        for k, row in enumerate(values):
+            for a in range(3):
+                self.names[body].append(f"{name}[{k}].{COMPONENTS[a]}")
+                self._rows[body].append((3 * nodes + a, row))
+        return MomentPort(body, first)
+
     def slices(self, surface: str, direction: np.ndarray, n: int) -> tuple[int, int, list[Patch]]:
         """Body, first node of the part within it, and `n` equal lengths of a surface along the unit vector."""
         body, offset, part, facets = self._surface(surface)
@@ -129,9 +140,9 @@ class PortTable:
         known = ", ".join(part.name for body in self.bodies for part in body.parts)
         raise DescriptionError(f"unknown part in '{surface}'", "machine.toml", f"parts are: {known}")
 
-    def _patch(self, surface: str) -> tuple[int, int, Patch]:
+    def _patch(self, surface: str, *more: str) -> tuple[int, int, Patch]:
         body, offset, part, facets = self._surface(surface)
-        return body, offset, patch(part, facets)
+        return body, offset, patch(part, np.concatenate([facets, *(self._surface(s)[3] for s in more)]))
 
     def _add_mean(self, body: int, offset: int, label: str, p: Patch) -> int:
         first = len(self.names[body])

@@ -131,11 +131,20 @@ def in_finer_steps(step: Comparison, halved: float) -> Comparison:
 
 
 def positions_off_grid(model: MachineModel, seed: int, count: int = POSITIONS) -> np.ndarray:
-    """Random positions (count, n_axes) [m] between the poses of the grid; none without axes or TCP."""
+    """Random positions (count, n_axes) [m] between the poses of the grid; none without axes or TCP.
+
+    Of machines whose rotary axes turn with random angles [rad] behind them, (count, n_axes + n_turning).
+    """
     low = np.array([nodes[0] for nodes in model.pose_grid])
     high = np.array([nodes[-1] for nodes in model.pose_grid])
     rng = np.random.default_rng([seed, 20261])
-    return rng.uniform(low, high, (count if len(low) and model.moves else 0, len(low)))
+    if not model.moves:
+        count = 0
+    positions = rng.uniform(low, high, (count if len(low) or model.turning else 0, len(low)))
+    signals = {s.name: s for s in model.load_model.signals}
+    reach = [signals[axis.position] for axis in model.load_model.rotary]
+    angles = rng.uniform([s.low for s in reach], [s.high for s in reach], (len(positions), len(reach)))
+    return np.hstack([positions, angles])
 
 
 def chosen_for_full(load: LoadModel, scenarios: Sequence[Scenario], count: int) -> list[Scenario]:

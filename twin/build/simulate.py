@@ -15,7 +15,7 @@ from twin.build.pipeline import full_model
 from twin.build.stepper import CoupledStepper, sensor_temperatures
 from twin.errors import LogError
 from twin.logs.read import read_run
-from twin.logs.run import Run, Table, Tcp
+from twin.logs.run import Run, Table, Tcp, tcp_places
 from twin.logs.signals import signal_values
 from twin.machine.description import Machine
 from twin.machine.load import load_machine
@@ -23,6 +23,7 @@ from twin.progress import Progress, silent
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.load_model import LoadModel
 from twin.rom.rest import rest_before
+from twin.rom.tcp import places
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,9 @@ def simulate(
 ) -> Simulation:
     """Step the full model through `drive` and solve the thermo-elastic problem at the TCP rows.
 
-    tcp_time (m,) s since the drive's start, tcp_positions (m, n_axes) m: a row is evaluated at the end of the step it
-    falls in. start: uniform initial temperature [degC], None: in equilibrium with the surroundings.
+    tcp_time (m,) s since the drive's start, tcp_positions (m, n_axes) m, perhaps with angles [rad] behind them: a row
+    is evaluated at the end of the step it falls in. start: uniform initial temperature [degC], None: in equilibrium
+    with the surroundings.
     """
     model = full.thermal
     stepper = CoupledStepper(model)
@@ -74,7 +76,7 @@ def simulate(
 
     def tcp_rows(step: int) -> None:
         for r in np.flatnonzero(row_step == step):
-            positions = dict(zip(model.pose_axes, tcp_positions[r], strict=True))
+            positions = dict(zip((*model.pose_axes, *model.turning), tcp_positions[r], strict=False))
             tcp[r] = full.structure.displacement(positions, tuple(x))
 
     temperatures = [np.concatenate([sensor_temperatures(model, x), shown[0]])]
@@ -125,8 +127,7 @@ def simulate_run(
         raise LogError(f"the log covers {span:g} h, not {hours:g} h", str(run.folder), "give --hours within the log")
     n_steps = None if hours is None else int(np.ceil(hours * 3600.0 / dt))
     drive = evaluate(load, run.loads.time, signal_values(run, load.signals), dt, n_steps)
-    axes = full.thermal.pose_axes
-    tcp_time, positions = np.zeros(0), np.zeros((0, len(axes)))
+    tcp_time, positions = np.zeros(0), np.zeros((0, 0))
     if full.thermal.moves:
         tcp_time, positions = _tcp_rows(full, run, drive, max(1, round(tcp_every / dt)))
     inside = tcp_time <= drive.time[-1]
@@ -145,7 +146,7 @@ def simulate_run(
     simulated = Run(
         loads=loads,
         temperatures=temperatures,
-        tcp=Tcp(result.tcp_time, axes, result.tcp_positions, result.tcp, sigma) if len(result.tcp_time) else None,
+        tcp=_told(full, result, sigma) if len(result.tcp_time) else None,
         start=run.start,
         zone=run.zone,
         sampling=run.sampling,
@@ -166,12 +167,19 @@ def _air(load: LoadModel, drive: Drive) -> float:
     return float(measured_air(load, drive)[0, load.surroundings])
 
 
+def _told(full: FullModel, result: Simulation, sigma: np.ndarray | None) -> Tcp:
+    axes, turning = full.thermal.pose_axes, full.thermal.turning
+    position, angle = result.tcp_positions[:, : len(axes)], result.tcp_positions[:, len(axes) :]
+    return Tcp(result.tcp_time, axes, position, result.tcp, sigma, angle=dict(zip(turning, angle.T, strict=True)))
+
+
 def _tcp_rows(full: FullModel, run: Run, drive: Drive, every: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times (m,) [s] and positions (m, n_axes) [m] of the run's tcp.csv, else of every so many steps."""
-    axes = full.thermal.pose_axes
+    """Times (m,) [s] and positions (m, n_axes) [m] of the run's tcp.csv, else of every so many steps.
+
+    With the angles [rad] of rotary axes that turn behind them.
+    """
+    model = full.thermal
     if run.tcp is not None:
-        column = {name: i for i, name in enumerate(run.tcp.axes)}
-        return run.tcp.time, run.tcp.position[:, [column[a] for a in axes]]
+        return run.tcp.time, tcp_places(run.tcp, model.pose_axes, model.turning)
     steps = np.arange(every - 1, drive.n_steps, every)
-    order = [[a.name for a in full.thermal.load_model.axes].index(a) for a in axes]
-    return drive.time[steps + 1], drive.position[steps][:, order]
+    return drive.time[steps + 1], places(model, drive.position[steps], drive.angle[steps])

@@ -11,7 +11,9 @@ from twin.errors import DescriptionError
 from twin.machine.bodies import Body
 from twin.machine.description import Contact, Machine, StiffnessOfPair
 from twin.machine.kinematics import direction, displacement, linear_axes
+from twin.machine.turning import turning_axes
 from twin.rom.springs import Ground, Guide, SpringSystem
+from twin.rom.turning import Turn
 
 PLANE = 0.5  # a mean normal shorter than this is no plane's but a cylinder's
 
@@ -48,6 +50,10 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
     shifts = shifts.reshape(len(bodies), len(axes), 3)
     encoders = linear_encoders(machine, ports, shifts)
     scales = [added_scale(machine, scale, *ports.surface_mean(scale.surface)) for scale in machine.scales.values()]
+    turns = tuple(
+        Turn(t.axis, direction(machine, t.axis), np.array(machine.axes[t.axis].point, dtype=float),
+             ports.rigid(*t.seat), t.sign) for t in turning_axes(machine)
+    )  # fmt: skip
     return SpringSystem(
         axes=axes,
         shifts=shifts,
@@ -61,6 +67,7 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
         work=work,
         encoders=encoders,
         scales=tuple(scales),
+        turns=turns,
     )
 
 

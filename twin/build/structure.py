@@ -10,7 +10,7 @@ nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
@@ -18,6 +18,7 @@ from itertools import product
 import numpy as np
 from scipy.sparse import csr_array
 
+from twin.build.cut_structure import cut_structure
 from twin.build.elastic_ports import PortTable
 from twin.build.elasticity import body_elasticity
 from twin.build.encoder import EncoderTerms
@@ -30,6 +31,7 @@ from twin.build.workers import workers
 from twin.machine.bodies import bodies_of, tanks_on
 from twin.machine.description import Machine
 from twin.machine.free_nodes import free_nodes
+from twin.machine.turning import turning_axes
 from twin.progress import Progress, silent
 from twin.rom.elastic_structure import ElasticStructure
 from twin.rom.scales import LinearEncoder
@@ -47,7 +49,7 @@ class Structure(ElasticStructure):
     def pose_rows(self, poses: np.ndarray) -> tuple[np.ndarray, ...]:
         """G per body (n_poses, 3, n_nodes_b) [m/K], the TCP displacement being sum_b G_b T_b.
 
-        poses (n_poses, n_axes) [m].
+        poses (n_poses, n_axes) [m], rotary axes at zero.
         """
         stacked = [np.array(z) for z in zip(*(self.rows(p) for p in poses), strict=True)]
         rows = tuple(
@@ -63,6 +65,10 @@ class Structure(ElasticStructure):
         """TCP displacement (3,) [m], tool minus work side; fields: T - T_ref (n_nodes_b,) [K] per body."""
         rows = self.rows(positions)
         w = np.sum([z @ (b.H @ T) for z, b, T in zip(rows, self.bodies, fields, strict=True)], axis=0)
+        if self.cut is not None and (turned := self.turned_rows(positions)):
+            for b, piece, z in zip(self.cut.owners, self.cut.structure.bodies, turned, strict=True):
+                assert isinstance(piece, BodyFlexibility)
+                w = w + z @ (piece.H @ fields[b])
         for b, nodes, growth in self.system.scale_rows(positions):
             w = w + growth @ fields[b][nodes]
         return w
@@ -141,10 +147,7 @@ def assemble_structure(
     ):
 
         def condensed(body: BodyMesh, names: list[str], U: csr_array) -> BodyFlexibility:
-            solid, points = body_elasticity(machine, body), body.nodes
-            if linear:
-                solid, U, points = linear_elasticity(body, solid, U)
-            found = condense(body.name, tuple(names), U, solid, points, advance)
+            found = _condensed(machine, body, names, U, linear, advance)
             more = len(tanks_on(machine, tuple(part.name for part in body.parts)))  # these bend nothing
             more += len(free_nodes(machine)) if body is bodies[0] else 0
             return replace(found, H=np.pad(found.H, ((0, 0), (0, more)))) if more else found
@@ -152,7 +155,24 @@ def assemble_structure(
         flexible = list(pool.map(condensed, bodies, ports.names, ports.matrices()))
     middles = np.array([body.nodes.mean(axis=0) for body in bodies])
     size = max(float(np.linalg.norm(b.nodes - m, axis=1).max()) for b, m in zip(bodies, middles, strict=True))
-    structure = Structure(tuple(flexible), system, middles, size)
+    turned = len({t.body for t in turning_axes(machine)})
+    with progress("bodies cut at bearings", turned) as advance:
+        cut = cut_structure(
+            machine, bodies, tuple(flexible),
+            lambda apart, piece, names, U: _condensed(apart, piece, names, U, linear, lambda _: None),
+        )  # fmt: skip
+        if turned:
+            advance("all pieces")
+    structure = Structure(tuple(flexible), system, middles, size, cut)
     for corner in product(*(machine.axes[a].stroke for a in system.axes)):
         structure.rows(np.array(corner))
     return structure
+
+
+def _condensed(
+    machine: Machine, body: BodyMesh, names: list[str], U: csr_array, linear: bool, advance: Callable[[str], None]
+) -> BodyFlexibility:
+    solid, points = body_elasticity(machine, body), body.nodes
+    if linear:
+        solid, U, points = linear_elasticity(body, solid, U)
+    return condense(body.name, tuple(names), U, solid, points, advance)

@@ -53,7 +53,7 @@ class Patch:
 
 
 @dataclass(frozen=True)
-class _Points:
+class SurfacePoints:
     """Quadrature points of a patch: (m pieces, q points)."""
 
     nodes: np.ndarray  # (m, 6)
@@ -83,7 +83,7 @@ def facet_nodes(part: PartMesh, facets: np.ndarray) -> np.ndarray:
 def patch(part: PartMesh, facets: np.ndarray) -> Patch:
     """Functionals of a set of facets. Raises DescriptionError where there are none."""
     nodes = facet_nodes(part, facets)
-    return _patch(part, _points(part, nodes, np.broadcast_to(np.eye(3), (len(nodes), 3, 3)), 3))
+    return _patch(part, surface_points(part, nodes, np.broadcast_to(np.eye(3), (len(nodes), 3, 3)), 3))
 
 
 def segments(part: PartMesh, facets: np.ndarray, direction: np.ndarray, n: int) -> list[Patch]:
@@ -109,14 +109,14 @@ def segments(part: PartMesh, facets: np.ndarray, direction: np.ndarray, n: int) 
         if i < n - 1:
             pieces, counts = clip(pieces, counts, high - np.einsum("mkc,mc->mk", pieces, s[rows]))
         triangles, owner = fan(pieces, counts)
-        result.append(_patch(part, _points(part, nodes[rows[owner]], triangles, 3)))
+        result.append(_patch(part, surface_points(part, nodes[rows[owner]], triangles, 3)))
     return result
 
 
 def mass(part: PartMesh, facets: np.ndarray) -> sp.csr_array:
     """int N N^T dA [m^2] over facets, (n, n): the film matrix per W/(m^2 K)."""
     nodes = facet_nodes(part, facets)
-    at = _points(part, nodes, np.broadcast_to(np.eye(3), (len(nodes), 3, 3)), 4)
+    at = surface_points(part, nodes, np.broadcast_to(np.eye(3), (len(nodes), 3, 3)), 4)
     local = np.einsum("mq,mqi,mqj->mij", at.weight, at.shape, at.shape)
     return scatter(nodes, nodes, local, part.n)
 
@@ -128,7 +128,7 @@ def scatter(rows: np.ndarray, columns: np.ndarray, local: np.ndarray, n: int) ->
     return sp.coo_array((local.ravel(), (i, j)), shape=(n, n)).tocsr()
 
 
-def _points(part: PartMesh, nodes: np.ndarray, triangles: np.ndarray, degree: int) -> _Points:
+def surface_points(part: PartMesh, nodes: np.ndarray, triangles: np.ndarray, degree: int) -> SurfacePoints:
     """Quadrature on triangles (m, 3, 3), given in barycentric coordinates of their facets (m, 6 nodes)."""
     curved = isinstance(part.mesh, MeshTet2)
     rule, weights = triangle_rule(degree + 4 if curved else degree)
@@ -140,10 +140,10 @@ def _points(part: PartMesh, nodes: np.ndarray, triangles: np.ndarray, degree: in
     normal = np.cross(tangents[:, :, 0], tangents[:, :, 1])  # of length dA / d(reference area)
     weight = weights * share[:, None]  # some rules have a negative one
     x = np.einsum("mqi,mix->mqx", shape, x_nodes)
-    return _Points(nodes, shape, x, weight * np.linalg.norm(normal, axis=2), weight[:, :, None] * normal)
+    return SurfacePoints(nodes, shape, x, weight * np.linalg.norm(normal, axis=2), weight[:, :, None] * normal)
 
 
-def _patch(part: PartMesh, at: _Points) -> Patch:
+def _patch(part: PartMesh, at: SurfacePoints) -> Patch:
     area = float(at.weight.sum())
     if not area > 0:
         raise _no_area(part)

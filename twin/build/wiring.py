@@ -14,6 +14,7 @@ from twin.errors import DescriptionError
 from twin.machine import wiring
 from twin.machine.description import Contact, Machine
 from twin.machine.kinematics import linear_axes
+from twin.machine.turning import turning_axes
 from twin.physics.laws import LAWS
 from twin.physics.radiation import radiation_coefficient
 from twin.rom.law_values import law_table, law_values, states_of
@@ -64,6 +65,7 @@ def load_model(machine: Machine, ports: ContactPorts, areas: Mapping[str, float]
         ports=ports.names,
         rails=ports.rails,
         pairs=ports.pairs,
+        rotary=tuple(wiring.rotary(t.axis, machine) for t in turning_axes(machine)),
     )
 
 

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from twin.cli.bundle import bundled
 from twin.cli.quantity import Quantity
+
+if TYPE_CHECKING:
+    from twin.face.correction import RotaryOptions
+
+
+def _options() -> type[Any]:
+    from twin.face.correction import RotaryOptions
+
+    return RotaryOptions
 
 
 @click.command(epilog="Example: twin correction out/five_axis.h5 out/experiment_a --time '4 h' -o out/correction.json")
@@ -23,10 +33,12 @@ from twin.cli.quantity import Quantity
 @click.option("--zero-at", type=Quantity("m", negative=True),
               help="position of the only axis where the error is held at zero, e.g. '-500 mm': "
               "the fixed bearing, if it does not move; within the stroke  [default: a constant is fitted]")  # fmt: skip
+@click.option("--angles", help="of rotary axes that turn tool or work, 'b=30 deg,c=90 deg'  [default: zero]")
 @click.option("--rotary", is_flag=True, help="offsets of the rotary axes besides, which take up tilt about them")
+@bundled(_options)
 def command(
     artefact: str, result: str, output: str, time: float | None, degree: str | None,
-    form: Literal["full", "product"], zero_at: float | None, rotary: bool,
+    form: Literal["full", "product"], zero_at: float | None, options: RotaryOptions,
 ) -> None:  # fmt: skip
     """Compress the TCP error that `twin run ARTEFACT RUN -o RESULT` found at all poses, at one time, for the control.
 
@@ -36,7 +48,7 @@ def command(
     """
     from twin.face.correction import correct
 
-    made = correct(artefact, result, output, time, degree, form, zero_at, rotary)
+    made = correct(artefact, result, output, time, degree, form, zero_at, options)
     correction, found = made.correction, made.quality
     count = correction.polynomial.coefficients.size
     if form == "product":

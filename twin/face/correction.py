@@ -26,6 +26,14 @@ class Corrected:
     rotary: RotaryCorrection | None = None
 
 
+@dataclass(frozen=True)
+class RotaryOptions:
+    """What rotary axes do in a correction."""
+
+    rotary: bool = False  # offsets of theirs besides, which take up tilt about them
+    angles: str | None = None  # of those that turn tool or work, "b=30 deg,c=90 deg"; by default zero
+
+
 def correct(
     model: Model | str | Path,
     result: str | Path,
@@ -34,13 +42,13 @@ def correct(
     degree: str | None = None,
     form: Literal["full", "product"] = "full",
     zero_at: Quantity | None = None,
-    rotary: bool = False,
+    options: RotaryOptions = RotaryOptions(),
 ) -> Corrected:
     """Compress the TCP error that `twin.run` wrote to the folder `result`, at one time, for the control.
 
     time: since the start of the run, by default its end. degree: of the polynomial, "2", or "x=4,y=2". form: all
     products of powers, or one factor per axis. zero_at: position of the only axis where the error is held at zero.
-    rotary: offsets of rotary axes besides, which take up tilt about them; their descriptions must have a `point`.
+    options: what rotary axes do, whose descriptions must have a `point`.
     Raises TwinError for models without a TCP, results of another model, times outside the run, and an output that is no
     correction.
     """
@@ -61,13 +69,22 @@ def correct(
     refuse_still(loaded.model)
     errors, at = read_pose_errors(Path(result), loaded.digest, wanted)
     errors = in_struts(replace(errors, model=loaded.model))
+    if options.angles is not None:
+        errors = errors.turned(_angles(options.angles, loaded.model.turning))
     if zero is not None:
         check_zero(zero, errors.axes, loaded.model.load_model.axes)
     degrees = _degrees(degree, errors.axes, default_degrees(errors))
     correction = fit_correction(errors, axis_jacobian(loaded, errors.axes), degrees, form, zero)
     found = quality(correction, errors)
-    facts = {"machine": loaded.model.name, "artefact": loaded.digest, "result": str(result), "time_s": at}
-    turned = fit_rotary(loaded, errors) if rotary else None
+    facts: dict[str, object] = {
+        "machine": loaded.model.name,
+        "artefact": loaded.digest,
+        "result": str(result),
+        "time_s": at,
+    }
+    if errors.angles:
+        facts["angles_rad"] = dict(zip(loaded.model.turning, errors.angles, strict=True))
+    turned = fit_rotary(loaded, errors) if options.rotary else None
     write_correction(Path(output), correction, found, facts, turned)
     return Corrected(correction, found, errors.axes, at, turned)
 
@@ -83,6 +100,24 @@ def _check_output(path: Path) -> None:
     except TwinError as e:
         what = "exists and is not a correction of this version, so it is not replaced"
         raise TwinError(what, str(path), "choose another file with -o") from e
+
+
+def _angles(text: str, turning: tuple[str, ...]) -> tuple[float, ...]:
+    """Angles [rad] of the axes `turning` from 'b=30 deg,c=90 deg'. Raises TwinError for other axes and no angles."""
+    from twin.nearest import did_you_mean
+    from twin.units import to_si
+
+    found = dict.fromkeys(turning, 0.0)
+    for item in text.split(","):
+        axis, _, value = (part.strip() for part in item.partition("="))
+        if axis not in found:
+            remedy = did_you_mean(axis, turning, "axes that turn") if turning else "see `point` of a rotary axis"
+            raise TwinError(f"no rotary axis '{axis}' turns tool or work", "--angles", remedy)
+        try:
+            found[axis] = to_si(value, "rad")
+        except ValueError as e:
+            raise TwinError(f"'{item.strip()}' is no angle: {e}", "--angles", f"write --angles '{axis}=30 deg'") from e
+    return tuple(found.values())
 
 
 def _degrees(text: str | None, axes: tuple[str, ...], default: tuple[int, ...]) -> tuple[int, ...]:

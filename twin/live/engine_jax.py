@@ -26,6 +26,7 @@ from twin.rom.artefact import read_artefact
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.following_flags import following_flags
 from twin.rom.poses import outside_grid
+from twin.rom.turning import STRAIGHT, off_zero
 from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalanced
 from twin.run.stepping import StepHeat, advance, inputs_of
 from twin.run.system import prepare
@@ -147,6 +148,8 @@ class JaxEngine:
         here = drive.position[:, [axes.index(a) for a in self._model.pose_axes]]
         self._flags = [name for k, name in enumerate(drive.flag_names) if drive.flags[0, k]]
         self._flags += [name for name, raised in followed.items() if raised[0]]
+        turned = zip(self._load.rotary, np.abs(drive.angle[0]) > STRAIGHT, strict=True)
+        self._flags += [off_zero(axis.name) for axis, off in turned if off]
         if outside_grid(self._model.pose_grid, here)[0]:
             self._flags.append("position outside the pose grid, TCP error of its border")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -41,6 +41,18 @@ class Tcp:
     sigma: np.ndarray | None = None  # (n,) m, standard deviation of each component
     naive: bool = False
     angle: Mapping[str, np.ndarray] = field(default_factory=dict)  # (n,) rad of each rotary axis that is logged
+
+
+def tcp_places(tcp: Tcp, axes: Sequence[str], turning: Sequence[str]) -> np.ndarray:
+    """Positions (n, n_axes) [m] of linear axes, behind them the angles [rad] of the axes `turning`, zero if not logged.
+
+    Columns of angles are named like the axis, or like it with "_position". Raises ValueError for a linear axis without
+    a column.
+    """
+    position = tcp.position[:, [tcp.axes.index(axis) for axis in axes]]
+    named = {name.removesuffix("_position"): values for name, values in tcp.angle.items()}
+    angles = [named.get(axis.removesuffix("_position"), np.zeros(len(tcp.time))) for axis in turning]
+    return np.column_stack([position, *angles])
 
 
 @dataclass(frozen=True)

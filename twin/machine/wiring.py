@@ -11,7 +11,7 @@ from twin.machine.description import Machine
 from twin.machine.kinematics import direction
 from twin.nearest import did_you_mean, nearest
 from twin.physics.laws import LAWS, Argument
-from twin.rom.load_model import AxisWiring, EnvironmentWiring, LawUse, Signal, Source
+from twin.rom.load_model import AxisWiring, EnvironmentWiring, LawUse, RotaryWiring, Signal, Source
 from twin.units import parse_unit, to_si
 
 SWITCH = Argument("1", "a switch, 0 off and 1 on", low=0.0, high=1.0)
@@ -95,6 +95,12 @@ def axis(name: str, machine: Machine) -> AxisWiring:
         )
     x, y, z = (float(d) for d in direction(machine, name))
     return AxisWiring(name, (x, y, z), low, high, entry.position)
+
+
+def rotary(name: str, machine: Machine) -> RotaryWiring:
+    """A rotary axis that turns the tool or the work. Raises DescriptionError for a position that is no angle."""
+    expect_signal(machine.axes[name].position, "rad", f"axes.{name}.position", machine)
+    return RotaryWiring(name, machine.axes[name].position)
 
 
 def source(name: str, entry: description.Source, machine: Machine) -> Source:

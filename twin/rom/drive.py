@@ -9,7 +9,7 @@ the step, so energy is neither lost nor gained.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,7 @@ class Drive:
     flags: np.ndarray  # (n, n_flags) bool: flag_names[k] holds at some time in this step
     flag_names: tuple[str, ...]  # e.g. "signals.x_current above 20 A", "gap in loads"
     switched: np.ndarray | None = None  # (n, n_environments) K of `environment` that switches bring; None: no switch
+    angle: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n, n_rotary) rad at the end of each step
     radiation: bool = True  # False where `theta` is the whole coefficient of films (scenarios at the box's bounds)
 
     @property
@@ -133,6 +134,7 @@ def evaluate(
         square=square,
         neighbour=neighbour,
         position=_columns([np.interp(edges[1:], t, values[a.position]) for a in load_model.axes], n_steps),
+        angle=_columns([np.interp(edges[1:], t, values[a.position]) for a in load_model.rotary], n_steps),
         flags=np.stack(list(flags.values()), axis=1),
         flag_names=tuple(flags),
         switched=None if switched is None else intervals.mean(switched),
@@ -220,7 +222,8 @@ def needed_signals(load_model: LoadModel) -> set[str]:
     """Signals that laws, positions, environments and switches read."""
     uses = [source.use for source in load_model.sources] + [film.use for film in load_model.films]
     needed = {name for use in uses for name in use.signals.values()}
-    needed |= {a.position for a in load_model.axes} | {e.signal for e in load_model.environments if e.signal}
+    needed |= {a.position for a in load_model.axes} | {a.position for a in load_model.rotary}
+    needed |= {e.signal for e in load_model.environments if e.signal}
     needed |= {c.switch for c in load_model.joints + load_model.pairs if c.switch}
     return needed | {e.switch for e in load_model.environments if e.switch}
 

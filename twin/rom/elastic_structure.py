@@ -13,7 +13,8 @@ costs one dense system of the size of the springs. Static condensation: see `twi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -51,11 +52,17 @@ class ElasticStructure:
     system: SpringSystem
     middles: np.ndarray  # (n_bodies, 3) m: mean of each body's nodes, in mesh coordinates
     size: float  # m: largest distance of a node from its body's middle
+    cut: CutStructure | None = None  # where rotary axes turn parts of bodies
 
     @property
     def axes(self) -> tuple[str, ...]:
         """Linear axes, in the order of positions."""
         return self.system.axes
+
+    @property
+    def turning(self) -> tuple[str, ...]:
+        """Rotary axes, whose angles follow the positions."""
+        return self.system.turning
 
     def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
         """Z_b (3, n_ports_b) per body: the TCP displacement is sum_b Z_b h_b at this pose, plus `scale_rows`.
@@ -66,7 +73,7 @@ class ElasticStructure:
 
     def tilt_rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
         """The same of the tool's rotation [rad] against the work, about x, y, z of the machine; scales turn nothing."""
-        return self._rows(positions, self.system.tilt_rows())
+        return self._rows(positions, self.system.tilt_rows(positions))
 
     def _rows(self, positions: Positions, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """What t (k, P) reads of port displacements, per port displacement of the supported bodies, body by body."""
@@ -83,6 +90,14 @@ class ElasticStructure:
         J = self.system.gap_rows(positions)
         f, a = self._solve(J, J @ heat, np.zeros(6 * len(self.bodies)))
         return np.asarray(heat - self._flexibility @ (J.T @ f) + self._motions @ a)
+
+    def turned_rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
+        """What rotary axes off zero add: (3, p) per cut body over its ports, as `rows`; none where all are at zero."""
+        return () if self.cut is None else self.cut.difference(positions, SpringSystem.tcp_rows)
+
+    def turned_tilt_rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
+        """The same for `tilt_rows`."""
+        return () if self.cut is None else self.cut.difference(positions, SpringSystem.tilt_rows)
 
     def refuse_mechanism(self, positions: Positions) -> None:
         """Raises Mechanism where a body can move freely, as `rows` does; displacements are not solved for."""
@@ -150,3 +165,29 @@ class ElasticStructure:
             "of the others",
             (name, *others),
         )
+
+
+@dataclass(frozen=True)
+class CutStructure:
+    """The machine with bodies cut at the bearings of rotary axes, which hold the pieces together (`twin.rom.turning`).
+
+    Bearings hold a few moments where bodies are glued all over, so this machine is not quite the glued one. What it
+    tells is by how much turned parts bend otherwise than seen from their bearings as at angle zero, which is what the
+    whole machine takes (`SpringSystem`): a correction of that, none at angles zero.
+    """
+
+    structure: ElasticStructure
+    names: tuple[str, ...]  # of the cut bodies
+    owners: tuple[int, ...]  # body of the machine that each of them is all of, or a piece of
+    inputs: tuple[np.ndarray, ...]  # (p,) elastic inputs of the owner that are its ports
+
+    def difference(
+        self, positions: Positions, read: Callable[[SpringSystem, Positions], np.ndarray]
+    ) -> tuple[np.ndarray, ...]:
+        """Rows (3, p) of what is read, with turned bearings minus seen from them; none where all angles are zero."""
+        system = self.structure.system
+        if not system.angles(positions).any():
+            return ()
+        turned = self.structure._rows(positions, read(replace(system, staged=False), positions))
+        straight = self.structure._rows(system.vector(positions), read(system, positions))
+        return tuple(a - b for a, b in zip(turned, straight, strict=True))

@@ -38,6 +38,14 @@ class AxisWiring:
 
 
 @dataclass(frozen=True)
+class RotaryWiring:
+    """A rotary axis that turns the tool or the work: which signal is its angle."""
+
+    name: str
+    position: str  # signal name, rad
+
+
+@dataclass(frozen=True)
 class EnvironmentWiring:
     """Air of a zone, a radiant surrounding, or a coolant at its inlet."""
 
@@ -140,6 +148,7 @@ class LoadModel:
     ports: tuple[str, ...]
     rails: tuple[Rail, ...]
     pairs: tuple[Pair, ...]
+    rotary: tuple[RotaryWiring, ...] = ()  # in the order of `MachineModel.turning`
 
     @property
     def surroundings(self) -> int:

@@ -110,13 +110,18 @@ class MachineModel:
     ambient_sensors: tuple[tuple[str, int], ...]  # sensors in air: (name, index in LoadModel.environments)
     pose_axes: tuple[str, ...]  # axis names of the grid, e.g. ("x", "y", "z")
     pose_grid: tuple[np.ndarray, ...]  # per axis the grid positions [m]
-    poses: np.ndarray  # (n_poses, n_axes) m, C order over pose_grid, then those `scattered`
+    poses: np.ndarray  # (n_poses, n_axes) m, C order over pose_grid, angles zero, then those `scattered`
     structure: ElasticStructure | LumpedStructure | None = None  # acts on W of the bodies; None: G is all there is
     scattered: int = 0  # so many poses, the last ones, lie anywhere within the grid (`twin.rom.tcp.at_positions`)
 
     @property
     def n(self) -> int:
         return sum(b.n for b in self.bodies)
+
+    @property
+    def turning(self) -> tuple[str, ...]:
+        """Rotary axes that turn the tool or the work: their angles [rad] may follow positions of the pose axes."""
+        return self.structure.turning if isinstance(self.structure, ElasticStructure) else ()
 
     @property
     def moves(self) -> bool:

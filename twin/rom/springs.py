@@ -8,16 +8,19 @@ nor moment, at every position.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from twin.rom.contact import station_weights
 from twin.rom.elastic_ports import MeanPort, RailPort, RigidPort
+from twin.rom.parallel import rotated
 from twin.rom.scales import AddedScale, LinearEncoder, NodeRow
+from twin.rom.turning import Bearing, Turn, frames, placed
 
-Positions = Mapping[str, float] | np.ndarray  # m, by axis name (others at zero) or in the order of the linear axes
+# m, by axis name (others at zero) or in the order of the linear axes; then the angles [rad] of the axes that turn
+Positions = Mapping[str, float] | np.ndarray
 
 
 @dataclass(frozen=True)
@@ -57,18 +60,37 @@ class SpringSystem:
     encoders: tuple[LinearEncoder, ...] = ()  # linear scales; axes without one are read at their screw
     scales: tuple[AddedScale, ...] = ()  # growth that encoders lack
     nodes: tuple[NodeRow, ...] = ()  # beside the parts
+    turns: tuple[Turn, ...] = ()  # rotary axes: of the tool, then of the work, each from the guides outwards
+    staged: bool = True  # what turned is seen from its bearing, as at angle zero
+    bearings: tuple[Bearing, ...] = ()  # of all `turns`, where bodies are cut there
+
+    @property
+    def turning(self) -> tuple[str, ...]:
+        """Rotary axes, in the order of angles."""
+        return tuple(turn.axis for turn in self.turns)
 
     def vector(self, positions: Positions) -> np.ndarray:
         """Positions (n_axes,) [m] in the order of `axes`. Raises ValueError for unknown axes or a wrong number."""
+        return self._split(positions)[0]
+
+    def angles(self, positions: Positions) -> np.ndarray:
+        """Angles (n_turning,) [rad] in the order of `turns`, zero where none are given. Raises as `vector`."""
+        return self._split(positions)[1]
+
+    def _split(self, positions: Positions) -> tuple[np.ndarray, np.ndarray]:
+        n, names = len(self.axes), (*self.axes, *self.turning)
         if isinstance(positions, Mapping):
-            unknown = set(positions) - set(self.axes)
+            unknown = set(positions) - set(names)
             if unknown:
-                raise ValueError(f"no linear axis {sorted(unknown)}; axes are {self.axes}")
-            return np.array([float(positions.get(a, 0.0)) for a in self.axes])
+                raise ValueError(f"no axis {sorted(unknown)}; axes are {names}")
+            vector = np.array([float(positions.get(a, 0.0)) for a in names])
+            return vector[:n], vector[n:]
         vector = np.asarray(positions, dtype=float)
-        if vector.shape != (len(self.axes),):
-            raise ValueError(f"positions of shape {vector.shape} for axes {self.axes}")
-        return vector
+        if vector.shape == (n,):
+            return vector, np.zeros(len(self.turns))
+        if vector.shape != (len(names),):
+            raise ValueError(f"positions of shape {vector.shape} for axes {names}")
+        return vector[:n], vector[n:]
 
     def gap_rows(self, positions: Positions) -> np.ndarray:
         """J (s, P): gaps of the springs [m] per port displacement; -J^T f are the forces on the ports."""
@@ -88,6 +110,13 @@ class SpringSystem:
         for ground in self.grounds:
             column = self.offsets[ground.port.body] + ground.port.first
             J[ground.first : ground.first + len(ground.directions), column : column + 3] = ground.directions
+        for bearing in self.bearings:
+            k, theta = 3 * len(bearing.harmonics), self.angles(positions)[bearing.turn]
+            rows = slice(bearing.first, bearing.first + k)
+            R = rotated(theta * self.turns[bearing.turn].direction)
+            inner, outer = (int(self.offsets[p.body] + p.first) for p in (bearing.inner, bearing.outer))
+            J[rows, inner : inner + k] += np.eye(k)
+            J[rows, outer : outer + k] -= np.kron(bearing.turned(theta), R)
         return J
 
     def tcp_rows(self, positions: Positions) -> np.ndarray:
@@ -100,12 +129,12 @@ class SpringSystem:
             t += np.outer(self._lever(encoder) * encoder.sign, self.reader_row(encoder, positions))
         return t
 
-    def tilt_rows(self) -> np.ndarray:
-        """(3, P): rotation [rad] of the tool minus that of the work side, the same at every position."""
+    def tilt_rows(self, positions: Positions) -> np.ndarray:
+        """(3, P): rotation [rad] of the tool minus that of the work side, the same wherever linear axes stand."""
         t = np.zeros((3, int(self.offsets[-1])))
-        for port, sign in ((self.tool, 1.0), (self.work, -1.0)):
+        for port, _, Q in self._sides(positions):
             column = self.offsets[port.body] + port.first + 3  # behind the mean displacement
-            t[:, column : column + 3] += sign * np.eye(3)
+            t[:, column : column + 3] += Q
         return t
 
     def scale_rows(self, positions: Positions) -> list[tuple[int, np.ndarray, np.ndarray]]:
@@ -146,10 +175,47 @@ class SpringSystem:
 
     def nut_rows(self, positions: Positions) -> np.ndarray:
         """t (3, P) with every nut as the datum of its axis: `tcp_rows` of a machine without linear scales."""
-        shift = np.einsum("bak,a->bk", self.shifts, self.vector(positions))
         t = np.zeros((3, int(self.offsets[-1])))
-        for port, sign in ((self.tool, 1.0), (self.work, -1.0)):
-            point = self.tool_point + shift[self.tool.body] - shift[port.body]  # in the body's mesh coordinates
+        for port, point, Q in self._sides(positions):
             column = self.offsets[port.body] + port.first
-            t[:, column : column + 6] += sign * port.motion_at(point)
+            t[:, column : column + 6] += Q @ port.motion_at(point)
         return t
+
+    def tool_centre(self, positions: Positions) -> np.ndarray:
+        """(3,) m: where the tool centre point is in the machine."""
+        at, angles = self._split(positions)
+        own = [k for k, turn in enumerate(self.turns) if turn.sign == 1]
+        point = placed(self.tool_point, [self.turns[k] for k in own], angles[own])
+        return np.asarray(point + at @ self.shifts[self.tool.body])
+
+    def in_space(
+        self, axis: str, point: np.ndarray, direction: np.ndarray, positions: Positions
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Point (3,) [m] and direction (3,) of a rotary axis that others turn, without the linear axes."""
+        if axis not in self.turning:
+            return point, direction
+        k, angles = self.turning.index(axis), self.angles(positions)
+        inner = [i for i in range(k) if self.turns[i].sign == self.turns[k].sign]
+        turns = [self.turns[i] for i in inner]
+        there = placed(point, turns, angles[inner])
+        return there, placed(point + direction, turns, angles[inner]) - there
+
+    def _sides(self, positions: Positions) -> Iterator[tuple[RigidPort, np.ndarray, np.ndarray]]:
+        """Ports whose rigid motions, taken at a point (3,) of their mesh and times (3, 3), make up tool minus work.
+
+        Of a machine that is not cut at its bearings, what turned moves with its bearing, and against it as at angle
+        zero, in its own coordinates:  Q_0 M_1(r_0) + sum_i Q_i (M_(i+1)(r_i) - M_i(r_i)),  M_i the motion of the i-th
+        bearing, the patch of tool or work behind the last, Q_i and r_i of `twin.rom.turning.frames`.
+        """
+        at, angles = self._split(positions)
+        shift = np.einsum("bak,a->bk", self.shifts, at)
+        own = {sign: [k for k, turn in enumerate(self.turns) if turn.sign == sign] for sign in (1, -1)}
+        turns = {sign: [self.turns[k] for k in own[sign]] for sign in own}
+        centre = self.tool_centre(positions)
+        for port, sign in ((self.tool, 1), (self.work, -1)):
+            found = frames(centre - shift[port.body], turns[sign], angles[own[sign]])
+            ports = [turn.port for turn in turns[sign]] if self.staged else []
+            for held, (r, Q), (beyond, R) in zip(ports, found[:-1], found[1:], strict=bool(ports)):
+                yield held, r, sign * Q
+                yield held, beyond, -sign * R
+            yield port, found[-1][0], sign * found[-1][1]

@@ -7,13 +7,14 @@ that reading gives the same bits again.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import h5py
 import numpy as np
 
-from twin.rom.elastic_structure import ElasticStructure, PortFlexibility
+from twin.rom.elastic_structure import CutStructure, ElasticStructure, PortFlexibility
 from twin.rom.from_json import filled
 from twin.rom.hdf5_file import floats, member, put, scale, text
 from twin.rom.lumped_structure import LumpedStructure
@@ -25,14 +26,12 @@ def write_structure(group: h5py.Group, structure: ElasticStructure | LumpedStruc
     """Fill an empty group."""
     bare = structure
     if isinstance(structure, ElasticStructure):
-        bare = replace(structure, bodies=())
+        bare = _without_flexibility(structure)
         scale(group, "rigid_motion", ("x", "y", "z", "rx", "ry", "rz"), "", "about the machine origin")
-        flexible = group.create_group("bodies")
-        for body in structure.bodies:
-            own = flexible.create_group(body.name)
-            scale(own, "elastic_port", np.arange(len(body.F)), "", "as the first elastic inputs of the body")
-            put(own, "F", body.F, "m/N", ("elastic_port", "elastic_port"), "displacement per force; rad, N m likewise")
-            put(own, "R", body.R, "1", ("elastic_port", "rigid_motion"), "displacement per translation, rotation")
+        _put_flexibilities(group.create_group("bodies"), structure.bodies)
+        if structure.cut is not None:
+            pieces = [structure.cut.structure.bodies[i] for i in _pieces(structure.cut)]
+            _put_flexibilities(group.create_group("pieces"), pieces)
     (kind,) = (name for name, one in KINDS.items() if type(structure) is one)
     put(group, "json", json.dumps({"kind": kind, **_plain(bare)}), "", (), "springs, scales, tool centre point (JSON)")
 
@@ -50,17 +49,56 @@ def read_structure(group: h5py.Group, bodies: tuple[str, ...]) -> ElasticStructu
     if isinstance(structure, LumpedStructure):
         return structure
     assert isinstance(structure, ElasticStructure)
-    flexible = tuple(_flexibility(group, name) for name in bodies)
-    for body, n in zip(flexible, np.diff(structure.system.offsets), strict=True):
-        if body.F.shape != (n, n) or body.R.shape != (n, 6):
-            raise KeyError(f"'structure/{body.name}' has matrices that do not fit")
-    return replace(structure, bodies=flexible)
+    structure = replace(structure, bodies=_flexibilities(group, "bodies", bodies, np.diff(structure.system.offsets)))
+    return structure if structure.cut is None else replace(structure, cut=_read_cut(group, structure, bodies))
 
 
-def _flexibility(group: h5py.Group, name: str) -> PortFlexibility:
-    where = f"structure/bodies/{name}"
-    own = member(group, f"bodies/{name}", "structure")
-    return PortFlexibility(name, floats(own, "F", where), floats(own, "R", where))
+def _put_flexibilities(group: h5py.Group, bodies: Sequence[PortFlexibility]) -> None:
+    for body in bodies:
+        own = group.create_group(body.name)
+        scale(own, "elastic_port", np.arange(len(body.F)), "", "as the first elastic inputs of the body")
+        put(own, "F", body.F, "m/N", ("elastic_port", "elastic_port"), "displacement per force; rad, N m likewise")
+        put(own, "R", body.R, "1", ("elastic_port", "rigid_motion"), "displacement per translation, rotation")
+
+
+def _without_flexibility(structure: ElasticStructure) -> ElasticStructure:
+    cut = structure.cut
+    if cut is not None:
+        cut = replace(cut, structure=replace(cut.structure, bodies=()))
+    return replace(structure, bodies=(), cut=cut)
+
+
+def _pieces(cut: CutStructure) -> list[int]:
+    """Cut bodies that are not all of their owner."""
+    return [i for i, owner in enumerate(cut.owners) if cut.owners.count(owner) > 1]
+
+
+def _read_cut(group: h5py.Group, structure: ElasticStructure, bodies: tuple[str, ...]) -> CutStructure:
+    cut = structure.cut
+    assert cut is not None
+    sizes, pieces = np.diff(cut.structure.system.offsets), _pieces(cut)
+    if not len(sizes) == len(cut.owners) == len(cut.names) == len(cut.inputs):
+        raise KeyError("'structure/json' has a cut structure whose bodies do not fit")
+    if not set(cut.owners) <= set(range(len(bodies))):
+        raise KeyError("'structure/json' has a cut structure of other bodies")
+    if any(len(at) != n for at, n in zip(cut.inputs, sizes, strict=True)):
+        raise KeyError("'structure/json' has a cut structure whose inputs do not fit")
+    read = iter(_flexibilities(group, "pieces", tuple(cut.names[i] for i in pieces), sizes[pieces]))
+    own = [next(read) if i in pieces else structure.bodies[owner] for i, owner in enumerate(cut.owners)]
+    return replace(cut, structure=replace(cut.structure, bodies=tuple(own)))
+
+
+def _flexibilities(
+    group: h5py.Group, kind: str, names: tuple[str, ...], sizes: np.ndarray
+) -> tuple[PortFlexibility, ...]:
+    found = []
+    for name, n in zip(names, sizes, strict=True):
+        where = f"structure/{kind}/{name}"
+        own = member(group, f"{kind}/{name}", "structure")
+        found.append(PortFlexibility(name, floats(own, "F", where), floats(own, "R", where)))
+        if found[-1].F.shape != (n, n) or found[-1].R.shape != (n, 6):
+            raise KeyError(f"'{where}' has matrices that do not fit")
+    return tuple(found)
 
 
 def _plain(value: Any) -> Any:

@@ -6,6 +6,9 @@ W_b x_b are the elastic inputs of a body (`twin.rom.model`): a pose costs one de
 whatever the number of states, so positions are computed exactly where they are asked for, each once. G has kinks
 wherever a pad passes a station of its rail: interpolation between the poses of a grid converges slowly, and is left for
 artefacts without a structure.
+
+Positions are (m, n_axes) [m] in the order of `pose_axes`, or (m, n_axes + n_turning) with the angles [rad] of the
+rotary axes of the structure (`MachineModel.turning`) behind them; without, these stand at zero.
 """
 
 from __future__ import annotations
@@ -38,6 +41,8 @@ def refuse_other_structure(model: MachineModel) -> None:
         return
     try:
         rows = [Z[0] @ inputs(model, b) for b, Z in enumerate(elastic_rows(model, model.poses[:1]))]
+        if model.turning:
+            elastic_rows(model, np.append(model.poses[0], np.ones(len(model.turning)))[None])
     except (ModelError, ValueError, LookupError, ArithmeticError, np.linalg.LinAlgError) as e:
         raise KeyError(f"'structure' cannot be solved: {e}") from e
     size = max(float(np.abs(body.G).max(initial=0.0)) for body in model.bodies)
@@ -66,6 +71,9 @@ def elastic_rows(model: MachineModel, positions: np.ndarray) -> tuple[np.ndarray
             all_rows[i, :, : ports.shape[1]] = ports  # what scales read follows the ports
         for b, at, growth in structure.system.scale_rows(position):
             Z[b][i][:, at] += growth
+        if structure.cut is not None and (turned := structure.turned_rows(position)):
+            for b, at, ports in zip(structure.cut.owners, structure.cut.inputs, turned, strict=True):
+                Z[b][i][:, at] += ports
     return tuple(Z)
 
 
@@ -97,20 +105,25 @@ def at_positions(model: MachineModel, positions: np.ndarray) -> MachineModel:
         if members is not None and body.W_members is not None:
             members = np.concatenate([members, np.einsum("pcw,mwn->mpcn", Z, body.W_members)], axis=1)
         bodies.append(replace(body, G=np.concatenate([body.G, Z @ inputs(model, b)]), G_members=members))
-    poses = np.concatenate([model.poses, different])
+    poses = np.concatenate([_with_angles(model, model.poses), _with_angles(model, different)])
     return replace(model, bodies=tuple(bodies), poses=poses, scattered=len(different))
 
 
 def row_weights(model: MachineModel, positions: np.ndarray, kind: Kind = "lagrange") -> tuple[np.ndarray, np.ndarray]:
     """Weights (m, n_poses) of the model's TCP rows at positions (m, n_axes) [m], and which lie outside its grid (m,).
 
-    One where a pose of its own is there (`at_positions`), interpolated between the poses of the grid elsewhere.
+    One where a pose of its own is there (`at_positions`), interpolated between the poses of the grid elsewhere. That is
+    at angles zero: other angles are outside.
     """
-    weights, outside = pose_weights(model.pose_grid, positions, kind)
+    n = len(model.pose_axes)
+    weights, beyond = pose_weights(model.pose_grid, positions[:, :n], kind)
+    outside = beyond | positions[:, n:].any(axis=1)
     if model.scattered and len(positions):
         weights = np.hstack([weights, np.zeros((len(positions), model.scattered))])
-        apart = np.abs(positions[:, None, :] - model.poses[-model.scattered :]).max(axis=2)
+        own = _with_angles(model, model.poses[-model.scattered :])
+        apart = np.abs(_with_angles(model, positions)[:, None, :] - own).max(axis=2)
         there = apart.min(axis=1) < THERE
+        outside[there] = beyond[there]
         weights[there] = np.eye(weights.shape[1])[apart[there].argmin(axis=1) - model.scattered]
     return weights, outside
 
@@ -161,7 +174,16 @@ def tilt_at(model: MachineModel, x: Sequence[np.ndarray], positions: np.ndarray)
     for i, position in enumerate(_within_grid(model, positions)):
         for ports, displacement in zip(model.structure.tilt_rows(position), read, strict=True):
             tilt[i] += ports @ displacement[: ports.shape[1]]  # what scales read follows the ports
+        if model.structure.cut is not None and (turned := model.structure.turned_tilt_rows(position)):
+            for b, at, ports in zip(model.structure.cut.owners, model.structure.cut.inputs, turned, strict=True):
+                tilt[i] += ports @ read[b][at]
     return tilt
+
+
+def places(model: MachineModel, position: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Positions as this module takes them, of positions (m, n_axes) [m] and angles (m, n_rotary) [rad] of a drive."""
+    order = [[axis.name for axis in model.load_model.axes].index(name) for name in model.pose_axes]
+    return np.hstack([position[:, order], angle]) if model.turning else position[:, order]
 
 
 def by_body(model: MachineModel, states: np.ndarray) -> list[np.ndarray]:
@@ -177,12 +199,20 @@ def inputs(model: MachineModel, body: int) -> np.ndarray:
     return W
 
 
+def _with_angles(model: MachineModel, positions: np.ndarray) -> np.ndarray:
+    """Positions (m, n_axes + n_turning), angles zero where they have none."""
+    missing = len(model.pose_axes) + len(model.turning) - positions.shape[1]
+    return np.pad(positions, ((0, 0), (0, missing)))
+
+
 def _within_grid(model: MachineModel, positions: np.ndarray) -> np.ndarray:
-    """Positions (m, n_axes) [m], those outside the grid moved to its border: pads may have left their rails there."""
+    """Positions, those outside the grid moved to its border: pads may have left their rails there. Angles stay."""
     positions = np.asarray(positions, dtype=float)
-    if not positions.shape[1]:
+    n = len(model.pose_grid)
+    if not n:
         return positions
-    return np.clip(positions, [nodes[0] for nodes in model.pose_grid], [nodes[-1] for nodes in model.pose_grid])
+    low, high = ([nodes[k] for nodes in model.pose_grid] for k in (0, -1))
+    return np.hstack([np.clip(positions[:, :n], low, high), positions[:, n:]])
 
 
 def _distinct(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

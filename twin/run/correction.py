@@ -7,7 +7,7 @@ every interpolation cycle; minus the error, transformed to the axes, is added to
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Literal
@@ -44,6 +44,7 @@ class PoseErrors:
     tcp: np.ndarray  # (n_poses, 3) m
     model: MachineModel | None = None  # that they are of, with
     state: np.ndarray | None = None  # (N,) its state at that time, where both are known
+    angles: tuple[float, ...] = ()  # rad of the rotary axes that turn (`MachineModel.turning`); none: all at zero
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -56,7 +57,7 @@ class PoseErrors:
         Interpolated between the poses where the model is not given or has no structure.
         """
         if self.model is not None and self.state is not None and is_exact(self.model):
-            return tcp_at(self.model, by_body(self.model, self.state), position)
+            return tcp_at(self.model, by_body(self.model, self.state), self.with_angles(position))
         weights, _ = pose_weights(self.grid, position)
         return np.asarray(weights @ self.tcp)
 
@@ -65,7 +66,18 @@ class PoseErrors:
         """(n_poses, 3) [rad] of the tool against the work at the poses; None where the model does not tell it."""
         if self.model is None or self.state is None:
             return None
-        return tilt_at(self.model, by_body(self.model, self.state), self.poses)
+        return tilt_at(self.model, by_body(self.model, self.state), self.with_angles(self.poses))
+
+    def with_angles(self, position: np.ndarray) -> np.ndarray:
+        """Positions (m, n_axes) [m] with the angles [rad] behind them."""
+        return np.column_stack([position, np.tile(self.angles, (len(position), 1))]) if self.angles else position
+
+    def turned(self, angles: tuple[float, ...]) -> PoseErrors:
+        """The errors with rotary axes at other angles [rad]. Raises ValueError unless model and state are known."""
+        there = replace(self, angles=angles)
+        if self.model is None or self.state is None or not is_exact(self.model):
+            raise ValueError("neither a structure nor a state to compute errors of turned axes by")
+        return replace(there, tcp=there.at(self.poses))
 
     def between(self) -> np.ndarray:
         """Positions (m, n_axes) [m] in the middle of every cell of the grid; single positions stay."""

@@ -2,8 +2,8 @@
 
 The geometric Jacobian J (6, n) maps axis motions to the motion of the tool as seen from the work: displacement above,
 rotation below. The column of a rotary axis that carries the work is -[d x (q - c); d], d its direction, c a point on
-it and q the tool centre point, both in space at the pose; of one that carries the tool it is the opposite. Offsets are
--J^+ [w; tilt], for angles at zero, where the model knows its errors. Tilt about other directions stays.
+it and q the tool centre point, all in space at the pose; of one that carries the tool it is the opposite. Offsets are
+-J^+ [w; tilt]. Tilt about other directions stays.
 """
 
 from __future__ import annotations
@@ -73,16 +73,20 @@ def rotary_axes(artefact: Artefact) -> tuple[RotaryAxis, ...]:
 def geometric_jacobian(
     artefact: Artefact, linear: tuple[str, ...], rotary: tuple[RotaryAxis, ...], position: Mapping[str, float]
 ) -> np.ndarray:
-    """J (6, n_linear + n_rotary) at positions [m] of the linear axes, others at zero. Raises ModelError."""
+    """J (6, n_linear + n_rotary) at positions [m] of linear axes and angles [rad] of those that turn, others at zero.
+
+    Raises ModelError.
+    """
     structure = artefact.model.structure
     assert isinstance(structure, ElasticStructure)
     system = structure.system
     shift = np.einsum("bak,a->bk", system.shifts, system.vector(position))
-    tool_point = system.tool_point + shift[system.tool.body]
+    tool_point = system.tool_centre(position)
     columns = [np.vstack([axis_jacobian(artefact, linear), np.zeros((3, len(linear)))])]
     for axis in rotary:
-        lever = tool_point - axis.point - shift[axis.body]
-        turned = np.concatenate([np.cross(axis.direction, lever), axis.direction])
+        point, direction = system.in_space(axis.name, axis.point, axis.direction, position)
+        lever = tool_point - point - shift[axis.body]
+        turned = np.concatenate([np.cross(direction, lever), direction])
         columns.append(axis.sign * turned[:, None])
     return np.hstack(columns)
 
@@ -99,7 +103,8 @@ def fit_rotary(artefact: Artefact, errors: PoseErrors, lever: float = 0.1) -> Ro
         raise ModelError("the artefact does not tell the tilt of the tool", artefact.model.name, "build it again")
     offsets, rest = [], []
     for pose, error in zip(errors.poses, np.hstack([errors.tcp, tilt]), strict=True):
-        J = geometric_jacobian(artefact, errors.axes, rotary, dict(zip(errors.axes, pose, strict=True)))
+        where = dict(zip((*errors.axes, *artefact.model.turning), (*pose, *errors.angles), strict=False))
+        J = geometric_jacobian(artefact, errors.axes, rotary, where)
         offsets.append(offset_matrix(J, lever) @ error)
         rest.append(error + J @ offsets[-1])
     degrees = [min(2, len(nodes) - 1) for nodes in errors.grid]

@@ -20,7 +20,7 @@ from twin.rom.following_flags import following_flags
 from twin.rom.model import MachineModel
 from twin.rom.poses import outside_grid
 from twin.rom.rest import rest_before
-from twin.rom.tcp import by_body, is_exact, tcp_at
+from twin.rom.tcp import by_body, is_exact, places, tcp_at
 from twin.run.checkpoint import CheckpointFolder, Steps, chain
 from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalanced
 from twin.run.results import Result
@@ -63,6 +63,7 @@ def replay(
             initial = at_rest(model, drive, air)
     # a position that is not logged is at its default all the time
     first = [signals.get(axis.position, drive.position[:, k]) for k, axis in enumerate(model.load_model.axes)]
+    first += [signals.get(axis.position, drive.angle[:, k]) for k, axis in enumerate(model.load_model.rotary)]
     position = np.array([values[np.argmax(np.isfinite(values))] for values in first])
     return replay_drive(artefact, drive, position, substeps, initial, checkpoints, progress)
 
@@ -83,7 +84,10 @@ def replay_drive(
     checkpoints: CheckpointFolder | None = None,
     progress: Progress = silent,
 ) -> Result:
-    """The same for loads that are evaluated already; position (n_axes,) [m] at the start. See `replay`."""
+    """The same for loads that are evaluated already. See `replay`.
+
+    position (n_axes,) [m] at the start, behind it the angles [rad] of the rotary axes that turn.
+    """
     model = artefact.model
     if substeps is None:
         substeps = int(artefact.certificate.get("substeps", 1))
@@ -97,10 +101,11 @@ def replay_drive(
     temperature, tcp = _observe(prepared, states)
     _refuse_glowing(prepared, model, drive.time, states, temperature)
     air = measured_air(model.load_model, drive)[:, [i for _, i in model.ambient_sensors]]
-    positions = np.concatenate([position[None], drive.position])
     axes = [a.name for a in model.load_model.axes]
-    to_poses = positions[:, [axes.index(a) for a in model.pose_axes]]
-    outside = outside_grid(model.pose_grid, to_poses)
+    everything = np.concatenate([position[None], np.hstack([drive.position, drive.angle])])
+    positions = everything[:, : len(axes)]
+    to_poses = places(model, positions, everything[:, len(axes) :])
+    outside = outside_grid(model.pose_grid, to_poses[:, : len(model.pose_axes)])
     flags = {"position outside the pose grid, TCP error of its border": outside[1:] | outside[:-1]}
     modal = prepared.to_artefact(states)
     certified = artefact.certificate.get("step")
@@ -143,6 +148,8 @@ def replay_drive(
         artefact=artefact.digest,
         substeps=substeps,
         moves=model.moves,
+        turning=model.turning,
+        angle=everything[:, len(axes) :],
         exact=is_exact(model),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -51,6 +51,8 @@ class Result:
     artefact: str  # sha256 of the model
     substeps: int
     moves: bool = True  # False: the machine has no TCP, or no temperature moves it, and `tcp` is zero
+    turning: tuple[str, ...] = ()  # rotary axes that turn the tool or the work
+    angle: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # (n + 1, n_turning) rad
     exact: bool = True  # `tcp_actual` is that of the position; False: interpolated between the poses
 
     @property
@@ -129,7 +131,8 @@ def write_results(folder: Path, result: Result, facts: Mapping[str, Any]) -> dic
         "temperatures.csv": lambda path: write_table(path, temperatures),
     }
     if result.moves:
-        tcp = Tcp(result.time, result.axes, result.position, result.tcp_actual)
+        angles = dict(zip(result.turning, result.angle.T, strict=False))
+        tcp = Tcp(result.time, result.axes, result.position, result.tcp_actual, angle=angles)
         writers["tcp.csv"] = lambda path: write_tcp(path, tcp)
     with ExitStack() as stack:  # the last one entered is renamed first
         last = stack.enter_context(atomic_path(folder / "summary.json"))
@@ -162,6 +165,9 @@ def _write_hdf5(path: Path, result: Result) -> None:
         put(f, "tcp_actual", result.tcp_actual, "m", ("time", "component"), at_position)
         put(f, "pose_position", result.poses, "m", ("pose", "pose_axis"))
         put(f, "position", result.position, "m", ("time", "axis"))
+        if result.turning:
+            scale(f, "rotary_axis", result.turning)
+            put(f, "angle", result.angle, "rad", ("time", "rotary_axis"), "of axes that turn tool or work")
         put(f, "power", result.power, "W", ("step", "source"))
         put(f, "film_heat", result.film_heat, "W", ("step", "film"), "from environments into the machine")
         put(f, "film_coefficient", result.film_coefficient, "W/(m^2*K)", ("step", "film"), "convection and radiation")

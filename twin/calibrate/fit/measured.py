@@ -13,7 +13,7 @@ import numpy as np
 
 from twin.errors import LogError
 from twin.logs.faults.usable import aside_words, usable
-from twin.logs.run import Run, Table
+from twin.logs.run import Run, Table, tcp_places
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 from twin.rom.poses import Kind, outside_grid
@@ -42,7 +42,7 @@ class Measured:
     tcp_sigma: np.ndarray | None  # (k,) m, where the run tells
     from_first: bool  # deviations count from the first row
     skipped: tuple[str, ...]  # what the run holds and the fit does not use, in words
-    position: np.ndarray  # (k, n_pose_axes) m of the TCP rows
+    position: np.ndarray  # (k, n_pose_axes) m of the TCP rows, angles [rad] of axes that turn behind them
 
     def row_weight(self, sigma: float) -> np.ndarray:
         """(k,) how much better than `sigma` [m] each TCP row is measured; 1 where the run does not tell."""
@@ -57,13 +57,16 @@ class Measured:
 
 
 def tcp_positions(model: MachineModel, runs: Sequence[Run]) -> np.ndarray:
-    """(m, n_pose_axes) m: where the runs measured the TCP displacement, within the poses of the model's grid."""
-    found = [np.zeros((0, len(model.pose_axes)))]
+    """(m, n_pose_axes) m: where the runs measured the TCP displacement, within the poses of the model's grid.
+
+    With the angles [rad] of rotary axes that turn behind them (`twin.rom.tcp`).
+    """
+    found = [np.zeros((0, len(model.pose_axes) + len(model.turning)))]
     for run in runs:
         if run.tcp is not None and set(model.pose_axes) <= set(run.tcp.axes):
-            position = run.tcp.position[:, [run.tcp.axes.index(a) for a in model.pose_axes]]
+            position = tcp_places(run.tcp, model.pose_axes, model.turning)
             position = position[np.isfinite(position).all(axis=1)]
-            found.append(position[~outside_grid(model.pose_grid, position)])
+            found.append(position[~outside_grid(model.pose_grid, position[:, : len(model.pose_axes)])])
     return np.concatenate(found)
 
 
@@ -180,7 +183,7 @@ def _tcp_rows(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, np.ndarray, np.ndarray]:
     tcp = run.tcp
     if tcp is None:
-        none, weights, positions = np.zeros(0), np.zeros((0, len(model.poses))), np.zeros((0, len(model.pose_axes)))
+        none, weights, positions = np.zeros(0), np.zeros((0, len(model.poses))), tcp_positions(model, [])
         return none.astype(int), none, weights, np.zeros((0, 3)), None, none, positions
     missing = [a for a in model.pose_axes if a not in tcp.axes]
     if missing:
@@ -188,7 +191,7 @@ def _tcp_rows(
             f"no position of {', '.join(missing)}", str(run.folder / "tcp.csv"),
             "give the position of every linear axis in a column of its name",
         )  # fmt: skip
-    position = tcp.position[:, [tcp.axes.index(a) for a in model.pose_axes]]
+    position = tcp_places(tcp, model.pose_axes, model.turning)
     known = np.isfinite(tcp.displacement)
     whole = known[:, known.any(axis=0)].all(axis=1) & known.any(axis=1) & np.isfinite(position).all(axis=1)
     good = (tcp.time >= edges[0]) & (tcp.time <= edges[-1]) & whole

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from twin.errors import LogError
-from twin.logs.run import Run, Tcp
+from twin.logs.run import Run, Tcp, tcp_places
 from twin.rom.artefact import Artefact
 from twin.rom.tcp import by_body, tcp_at
 from twin.run.results import Result
@@ -111,7 +111,7 @@ def left_out(run: Run, result: Result) -> LeftOut:
 
 
 def tcp_positions(tcp: Tcp, result: Result) -> np.ndarray:
-    """(n, n_pose_axes) m at the rows of tcp.csv.
+    """(n, n_pose_axes) m at the rows of tcp.csv, behind them the angles [rad] of axes that turn.
 
     Raises LogError for an axis without a column: loads tell too coarsely where a moving axis stood.
     """
@@ -119,7 +119,7 @@ def tcp_positions(tcp: Tcp, result: Result) -> np.ndarray:
     if missing:
         remedy = "give the position of every linear axis in a column of its name"
         raise LogError(f"no position of {', '.join(missing)}", "tcp.csv", remedy)
-    return tcp.position[:, [tcp.axes.index(a) for a in result.pose_axes]]
+    return tcp_places(tcp, result.pose_axes, result.turning)
 
 
 def simulated_tcp(artefact: Artefact, result: Result, time: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -147,6 +147,7 @@ def _inside(time: np.ndarray, result: Result) -> np.ndarray:
 
 def _beyond(position: np.ndarray, result: Result) -> np.ndarray:
     """(n,) bool: beyond the range of the poses along any axis; not a number is not beyond."""
+    position = position[:, : len(result.pose_axes)]
     if not position.shape[1]:
         return np.zeros(len(position), dtype=bool)
     low, high = result.poses.min(axis=0), result.poses.max(axis=0)

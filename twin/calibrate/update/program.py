@@ -21,6 +21,7 @@ from twin.logs.run import Run
 from twin.progress import Progress, silent
 from twin.rom.model import MachineModel
 from twin.rom.poses import pose_weights
+from twin.rom.turning import STRAIGHT
 from twin.run.results import Result
 
 S = TypeVar("S")
@@ -178,7 +179,9 @@ def replay_update(
     reference, rows = _rows(run, base)
     if not rows:
         where = str(run.folder / "tcp.csv")
-        raise LogError("no TCP measurement inside the time of the loads", where, "check the times of tcp.csv")
+        straight = f"; measure with {', '.join(base.turning)} at zero" if base.turning else ""
+        remedy = f"check the times of tcp.csv{straight}"
+        raise LogError("no TCP measurement inside the time of the loads", where, remedy)
     model, n, m = program.model, len(base.time) - 1, len(rows)
     values, readings = _temperatures(run, base.time, sensors)
     of_step = np.searchsorted(base.time, [r.time for r in rows], side="left") - 1
@@ -262,12 +265,16 @@ def _worth(program: Program[S], live: Live[S], position: np.ndarray, time: float
 
 def _rows(run: Run, base: Result) -> tuple[Measurement | None, list[Measurement]]:
     """The rows of tcp.csv inside the computed time, with a position and a value, in the order of time; before them the
-    one that all count from, where they do."""
+    one that all count from, where they do.
+
+    Without those of a turned tool or work: what is learnt is told at the poses, whose angles are zero.
+    """
     tcp = run.tcp
     if tcp is None or not len(tcp.time):
         return None, []
-    position = tcp_positions(tcp, base)
-    good = (tcp.time >= base.time[0]) & (tcp.time <= base.time[-1]) & np.isfinite(position).all(axis=1)
+    position, n = tcp_positions(tcp, base), len(base.pose_axes)
+    position, straight = position[:, :n], np.abs(position[:, n:]).max(axis=1, initial=0.0) <= STRAIGHT
+    good = straight & (tcp.time >= base.time[0]) & (tcp.time <= base.time[-1]) & np.isfinite(position).all(axis=1)
     from_first = run.tcp_reference == "first"
     if from_first and not good[0]:
         raise LogError(

@@ -38,7 +38,7 @@ def put_elastic(out: Arrays, model: MachineModel, back: Sequence[np.ndarray]) ->
         out.integers("grid_first", np.cumsum([0, *(len(g) for g in grid)])[:-1])
         out.integers("grid_count", [len(g) for g in grid])
         return sizes | {"GRID": max((len(g) for g in grid), default=1)}
-    W = [inputs(model, b) @ X for b, X in enumerate(back)]
+    W = [_straight(model, b) @ X for b, X in enumerate(back)]
     first = np.cumsum([0, *(len(w) for w in W)])
     out.integers("input_count", [len(w) for w in W])
     out.integers("input_first", first[:-1])
@@ -50,6 +50,15 @@ def put_elastic(out: Arrays, model: MachineModel, back: Sequence[np.ndarray]) ->
         return sizes | _put_lumped(out, structure, first)
     assert isinstance(structure, ElasticStructure)
     return sizes | _put_meshed(out, structure, first)
+
+
+def _straight(model: MachineModel, body: int) -> np.ndarray:
+    """The elastic inputs of a body but those of pieces that turn, which come last: here rotary axes stand at zero."""
+    structure, W = model.structure, inputs(model, body)
+    cut = structure.cut if isinstance(structure, ElasticStructure) else None
+    if cut is None or cut.owners.count(body) == 1:
+        return W
+    return W[: min(int(at.min()) for owner, at in zip(cut.owners, cut.inputs, strict=True) if owner == body)]
 
 
 def _put_scales(out: Arrays, scales: Sequence[AddedScale], first: np.ndarray) -> dict[str, int]:

@@ -12,6 +12,7 @@ from twin.physics.laws import LAWS
 from twin.rom.drive import outside_flag
 from twin.rom.law_values import states_of
 from twin.rom.load_model import Film, LawUse, LoadModel, Source
+from twin.rom.turning import off_zero
 
 
 def put_signals(out: Arrays, load: LoadModel) -> None:
@@ -41,7 +42,9 @@ def _needed(load: LoadModel) -> tuple[set[str], set[str]]:
     """Signals that anything reads, and those of laws that follow a temperature."""
     uses = [*(s.use for s in load.sources), *(f.use for f in load.films)]
     needed = {n for use in uses for n in use.signals.values()}
-    needed |= {a.position for a in load.axes} | {e.signal for e in load.environments}
+    needed |= (
+        {a.position for a in load.axes} | {a.position for a in load.rotary} | {e.signal for e in load.environments}
+    )
     needed |= {e.switch for e in load.environments} | {j.switch for j in load.joints} | {p.switch for p in load.pairs}
     return needed, {n for use in uses if states_of(use) for n in use.signals.values()}
 
@@ -52,6 +55,7 @@ def _put_axes(out: Arrays, load: LoadModel, place: Mapping[str, int]) -> None:
     out.reals("axis_low", [a.low for a in load.axes])
     out.reals("axis_high", [a.high for a in load.axes])
     out.reals("axis_margin", [_margin(a.low, a.high) for a in load.axes])
+    out.integers("turn_signal", [place[a.position] for a in load.rotary])
     defaults = {s.name: s.default or 0.0 for s in load.signals}
     out.reals("axis_default", [defaults[a.position] for a in load.axes])
 
@@ -212,6 +216,8 @@ def flags(load: LoadModel, shortest: float, step: float) -> tuple[dict[str, int]
     names += [f"signals.{s.name} missing, last value held" for s in load.signals]
     at["flag_stroke"] = len(names)
     names += [f"axes.{a.name} beyond its stroke" for a in load.axes]
+    at["flag_turn"] = len(names)
+    names += [off_zero(a.name) for a in load.rotary]
     at["flag_rail"] = len(names)
     names += [f"contacts.{p.contact}: {load.ports[p.pad_port]} beyond the stations of its rail" for p in load.pairs]
     used = [("source", k, s.name, s.use) for k, s in enumerate(load.sources)]

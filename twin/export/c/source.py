@@ -121,6 +121,7 @@ def _sizes(prepared: Prepared, model: MachineModel, elastic: dict[str, int]) -> 
     return {
         "BODIES": len(sizes), "STATES": N, "LARGEST": max(sizes), "FACTOR": factor, "SYMMETRIC": int(layout.symmetric),
         "WORK": max(factor + 9 * N + max(sizes), touching, tcp), "SIGNALS": len(load.signals), "AXES": len(load.axes),
+        "TURNS": len(load.rotary),
         "ENVIRONMENTS": len(load.environments), "SOURCES": len(load.sources), "FILMS": len(load.films),
         "JOINTS": len(load.joints), "THETA": len(load.films) + len(load.joints), "PORTS": len(load.ports),
         "PAIRS": len(load.pairs), "READS": most_reads(load), "STRUCTURAL": len(model.sensors),
