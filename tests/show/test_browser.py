@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.support.descriptions import SLIDE
 from twin.face.show import show
 
+FIVE_AXIS = Path(__file__).parents[2] / "models" / "five_axis"
 CANVAS = "#machine-canvas"
 MARKED = "document.querySelector('#groups button[aria-pressed=true]')?.textContent"
 
@@ -50,6 +52,26 @@ def test_a_click_on_the_machine_names_the_surface_there(described, shown):
         page.do("document.getElementById('clear').click()")
     page.tab.mouse.click(5 + page.tab.locator(CANVAS).bounding_box()["x"], y)
     assert page.do(MARKED) is None  # beside the machine
+    assert page.wrong == []
+
+
+def test_what_a_rotary_axis_carries_turns_about_it(shown, tmp_path):
+    """A corner of the table's face is where two rotary axes and a linear one bring it, and is clicked there."""
+    page = shown().open(show(FIVE_AXIS, tmp_path / "five_axis.html").path.as_uri())
+    assert not [note for note in page.do("page.content.notes") if "turns nothing" in note]
+    for axis, value in (("z", 0.2), ("b", 0.6), ("c", 0.8)):
+        page.slide(f"#axis-{axis}", value)
+    z, b, c = (float(page.do(f"document.getElementById('axis-{axis}').value")) for axis in "zbc")
+    x, y = 0.25 * np.cos(0.3 + c), 0.25 * np.sin(0.3 + c)  # of the face, about its axis at y = 1.22 m
+    depth = 1.0 - 1.1  # from the axis of the swivel, x = 0 and z = 1.1 m
+    place = (x * np.cos(b) + depth * np.sin(b), 1.22 + y, 1.1 + depth * np.cos(b) - x * np.sin(b) + z)
+    along = (np.sin(b), 0.0, np.cos(b))
+    start = [float(p - 0.1 * a) for p, a in zip(place, along, strict=True)]
+    seen = page.do(f"""() => {{ const m = page.machine, hit = m.hit({start}, {list(map(float, along))});
+        return [m.told.names[hit.surface], hit.depth]; }}""")
+    assert seen[0] == "table.top"
+    assert seen[1] == pytest.approx(0.1, abs=1e-3)
+    assert page.do("document.querySelector('#axis-b').nextSibling.textContent") == f"{np.rad2deg(b):.0f}°"
     assert page.wrong == []
 
 

@@ -1,8 +1,9 @@
-"""Functions of the place on a bearing, and their moments of displacements: what holds turned parts (`rom.turning`).
+"""Functions of the place on a bearing, and displacements fitted by them: what holds turned parts (`rom.turning`).
 
 Polynomials up to DEGREE in the distance from the axis, along it and round it, f(rho, z) cos(m phi) and sin(m phi): a
-rotation about the axis mixes only the two of a pair. The f of each m are made orthonormal over the bearing; those that
-the others make up there are left out (on a plane all with z, on a cylinder all with the square of rho).
+rotation about the axis mixes only the two of a pair. Those that others make up on the bearing are left out (on a plane
+all with z, on a cylinder all with the square of rho). Displacements are fitted over the area by least squares, so that
+rigid motions are told exactly whatever its outline: moments of a square's would differ when it has turned.
 """
 
 from __future__ import annotations
@@ -28,29 +29,40 @@ class Side:
 
     part: str
     nodes: np.ndarray  # (m,) unknowns of the part
-    values: np.ndarray  # (k, m) 1: moments (1/A) int f N dA, A the common area
+    values: np.ndarray  # (k, m) 1: coefficients of the functions, fitted to N
 
 
 def bearing_sides(
     body: BodyMesh, pairs: Sequence[tuple[str, str]], point: np.ndarray, direction: np.ndarray, where: str
 ) -> tuple[np.ndarray, list[Side], list[Side]]:
-    """Harmonics (k,) of the functions, and their moments over the inner and the outer surfaces of a bearing.
+    """Harmonics (k,) of the functions, and how they fit displacements of the inner and the outer surfaces of a bearing.
 
     body: uncut, with both; pairs: "part.surface" inner and outer of every fixed contact; point (3,) m on the axis.
     Raises DescriptionError where no contact has a common area.
+    """
+    inner, outer = common_points(body, pairs, where)
+    functions = _Functions.over([at for _, at in inner], point, _frame(direction))
+    gram = np.sum([_products(at, functions) for _, at in inner], axis=0)
+    sides = [[_side(part, at, functions, gram) for part, at in own] for own in (inner, outer)]
+    return functions.harmonics, sides[0], sides[1]
+
+
+Points = list[tuple[PartMesh, SurfacePoints]]
+
+
+def common_points(body: BodyMesh, pairs: Sequence[tuple[str, str]], where: str) -> tuple[Points, Points]:
+    """Quadrature points of the common area of surfaces that lie on each other, of the first and the second of a pair.
+
+    Raises DescriptionError where there is no common area.
     """
     inner, outer = [], []
     for a, b in pairs:
         of_a, of_b, triangles = common_pieces(body, a, b)
         inner.append(_points(body, a, of_a, triangles[:, :, :3]))
         outer.append(_points(body, b, of_b, triangles[:, :, 3:]))
-    area = sum(float(at.weight.sum()) for _, at in inner)
-    if not area > 0.0:
+    if not sum(float(at.weight.sum()) for _, at in inner) > 0.0:
         raise DescriptionError("its two sides have no common area", where, "a bearing is where they lie on each other")
-    frame = _frame(direction)
-    functions = _Functions.over([at for _, at in inner], point, frame)
-    sides = [[_side(part, at, functions, area) for part, at in own] for own in (inner, outer)]
-    return functions.harmonics, sides[0], sides[1]
+    return inner, outer
 
 
 @dataclass(frozen=True)
@@ -119,11 +131,17 @@ def _points(body: BodyMesh, surface: str, facets: np.ndarray, pieces: np.ndarray
     name, face = split_surface(surface)
     part, _ = body.part(name)
     nodes = facet_nodes(part, part.facets(face))[facets]
-    return part, surface_points(part, nodes, pieces, 2 + DEGREE)
+    return part, surface_points(part, nodes, pieces, max(2 + DEGREE, 2 * DEGREE))
 
 
-def _side(part: PartMesh, at: SurfacePoints, functions: _Functions, area: float) -> Side:
+def _products(at: SurfacePoints, functions: _Functions) -> np.ndarray:
+    """(k, k) m^2: integrals of the products of the functions."""
+    f = functions.at(at.x)
+    return np.asarray(np.einsum("kmq,lmq,mq->kl", f, f, at.weight))
+
+
+def _side(part: PartMesh, at: SurfacePoints, functions: _Functions, gram: np.ndarray) -> Side:
     nodes, inverse = np.unique(at.nodes, return_inverse=True)
     local = np.einsum("kmq,mq,mqi->kmi", functions.at(at.x), at.weight, at.shape)
-    values = np.array([np.bincount(inverse.ravel(), own.ravel(), nodes.size) for own in local]) / area
-    return Side(part.name, nodes, values)
+    moments = np.array([np.bincount(inverse.ravel(), own.ravel(), nodes.size) for own in local])
+    return Side(part.name, nodes, np.linalg.solve(gram, moments))

@@ -18,7 +18,7 @@ from twin.machine.bodies import Body, bodies_of
 from twin.machine.description import Machine
 from twin.machine.turning import Turning, pieces_of, turning_axes
 from twin.rom.elastic_structure import CutStructure, ElasticStructure
-from twin.rom.turning import HELD, Bearing, MomentPort
+from twin.rom.turning import HELD, Bearing, FittedPort
 
 Condense = Callable[[Machine, BodyMesh, list[str], csr_array], BodyFlexibility]
 
@@ -90,7 +90,7 @@ def _bearing(
 
 def _port(
     name: str, sides: list[Side], pieces: tuple[Body, ...], meshes: tuple[BodyMesh, ...], ports: PortTable
-) -> MomentPort:
+) -> FittedPort:
     """Of all contacts of a bearing together."""
     owner = {next(i for i, piece in enumerate(pieces) if side.part in piece.parts) for side in sides}
     if len(owner) > 1:
@@ -99,4 +99,4 @@ def _port(
     (body,) = owner
     nodes = np.concatenate([side.nodes + meshes[body].part(side.part)[1] for side in sides])
     values = np.hstack([side.values for side in sides])
-    return ports.moments(name, body, nodes, values)
+    return ports.fitted(name, body, nodes, values)

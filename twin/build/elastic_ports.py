@@ -8,17 +8,19 @@ of a port spreads a force over its patch, so that every force and moment that pa
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from twin.build.mesh import BodyMesh, PartMesh
-from twin.build.surface import Patch, facet_nodes, patch, segments
+from twin.build.bearing import common_points
+from twin.build.mesh import BodyMesh, PartMesh, body_mesh
+from twin.build.surface import Patch, SurfacePoints, facet_nodes, patch, patch_of, segments
 from twin.errors import DescriptionError
 from twin.machine.bodies import split_surface
 from twin.rom.elastic_ports import AxialPort, MeanPort, RailPort, RigidPort
-from twin.rom.turning import MomentPort
+from twin.rom.turning import FittedPort
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
@@ -49,18 +51,27 @@ class PortTable:
         assert isinstance(port, MeanPort)
         return port
 
-    def rigid(self, surface: str, *more: str) -> RigidPort:
-        """The rigid port of a "part.surface", or of several of one part together."""
-        key = ("rigid", surface, *more)
+    def rigid(self, surface: str) -> RigidPort:
+        """The rigid port of a "part.surface"."""
+        key = ("rigid", surface)
         if key not in self._known:
-            body, offset, whole = self._patch(surface, *more)
-            label = ", ".join((surface, *more))
-            first = self._add_mean(body, offset, label, whole)
-            self._add_rotation(body, offset, label, whole)
-            self._known[key] = RigidPort(body, first, whole.centroid, whole.normal)
+            body, offset, whole = self._patch(surface)
+            self._known[key] = self._rigid(body, offset, surface, whole)
         port = self._known[key]
         assert isinstance(port, RigidPort)
         return port
+
+    def seat(self, pairs: Sequence[tuple[str, str]], where: str) -> RigidPort:
+        """The rigid port of the first surface's part over what it shares with those that lie on it.
+
+        pairs: ("part.surface", the other's). Raises DescriptionError where they share nothing.
+        """
+        body, offset, part, _ = self._surface(pairs[0][0])
+        parts = {split_surface(s)[0]: self._surface(s)[2] for pair in pairs for s in pair}
+        inner, _ = common_points(body_mesh(where, tuple(parts.values())), pairs, where)
+        own = [at for of, at in inner if of.name == part.name]
+        joined = SurfacePoints(*(np.concatenate([getattr(at, f.name) for at in own]) for f in fields(SurfacePoints)))
+        return self._rigid(body, offset, where, patch_of(part, joined))
 
     def rail(self, surface: str, direction: np.ndarray, n: int) -> RailPort:
         """The segments of a rail surface, `n` equal lengths along the unit vector `direction`."""
@@ -95,14 +106,14 @@ class PortTable:
         assert isinstance(port, AxialPort)
         return port
 
-    def moments(self, name: str, body: int, nodes: np.ndarray, values: np.ndarray) -> MomentPort:
-        """Moments of the displacements of a body: values (k, m) at its nodes (m,), one row per function."""
+    def fitted(self, name: str, body: int, nodes: np.ndarray, values: np.ndarray) -> FittedPort:
+        """Functions fitted to the displacements of a body: values (k, m) at its nodes (m,), one row per function."""
         first = len(self.names[body])
         for k, row in enumerate(values):
             for a in range(3):
                 self.names[body].append(f"{name}[{k}].{COMPONENTS[a]}")
                 self._rows[body].append((3 * nodes + a, row))
-        return MomentPort(body, first)
+        return FittedPort(body, first)
 
     def slices(self, surface: str, direction: np.ndarray, n: int) -> tuple[int, int, list[Patch]]:
         """Body, first node of the part within it, and `n` equal lengths of a surface along the unit vector."""
@@ -140,9 +151,14 @@ class PortTable:
         known = ", ".join(part.name for body in self.bodies for part in body.parts)
         raise DescriptionError(f"unknown part in '{surface}'", "machine.toml", f"parts are: {known}")
 
-    def _patch(self, surface: str, *more: str) -> tuple[int, int, Patch]:
+    def _patch(self, surface: str) -> tuple[int, int, Patch]:
         body, offset, part, facets = self._surface(surface)
-        return body, offset, patch(part, np.concatenate([facets, *(self._surface(s)[3] for s in more)]))
+        return body, offset, patch(part, facets)
+
+    def _rigid(self, body: int, offset: int, label: str, whole: Patch) -> RigidPort:
+        first = self._add_mean(body, offset, label, whole)
+        self._add_rotation(body, offset, label, whole)
+        return RigidPort(body, first, whole.centroid, whole.normal)
 
     def _add_mean(self, body: int, offset: int, label: str, p: Patch) -> int:
         first = len(self.names[body])

@@ -52,7 +52,7 @@ def spring_system(machine: Machine, bodies: tuple[Body, ...], ports: PortTable) 
     scales = [added_scale(machine, scale, *ports.surface_mean(scale.surface)) for scale in machine.scales.values()]
     turns = tuple(
         Turn(t.axis, direction(machine, t.axis), np.array(machine.axes[t.axis].point, dtype=float),
-             ports.rigid(*t.seat), t.sign) for t in turning_axes(machine)
+             ports.seat(t.surfaces, f"axes.{t.axis}"), t.sign) for t in turning_axes(machine)
     )  # fmt: skip
     return SpringSystem(
         axes=axes,

@@ -83,7 +83,7 @@ def facet_nodes(part: PartMesh, facets: np.ndarray) -> np.ndarray:
 def patch(part: PartMesh, facets: np.ndarray) -> Patch:
     """Functionals of a set of facets. Raises DescriptionError where there are none."""
     nodes = facet_nodes(part, facets)
-    return _patch(part, surface_points(part, nodes, np.broadcast_to(np.eye(3), (len(nodes), 3, 3)), 3))
+    return patch_of(part, surface_points(part, nodes, np.broadcast_to(np.eye(3), (len(nodes), 3, 3)), 3))
 
 
 def segments(part: PartMesh, facets: np.ndarray, direction: np.ndarray, n: int) -> list[Patch]:
@@ -109,7 +109,7 @@ def segments(part: PartMesh, facets: np.ndarray, direction: np.ndarray, n: int) 
         if i < n - 1:
             pieces, counts = clip(pieces, counts, high - np.einsum("mkc,mc->mk", pieces, s[rows]))
         triangles, owner = fan(pieces, counts)
-        result.append(_patch(part, surface_points(part, nodes[rows[owner]], triangles, 3)))
+        result.append(patch_of(part, surface_points(part, nodes[rows[owner]], triangles, 3)))
     return result
 
 
@@ -143,7 +143,8 @@ def surface_points(part: PartMesh, nodes: np.ndarray, triangles: np.ndarray, deg
     return SurfacePoints(nodes, shape, x, weight * np.linalg.norm(normal, axis=2), weight[:, :, None] * normal)
 
 
-def _patch(part: PartMesh, at: SurfacePoints) -> Patch:
+def patch_of(part: PartMesh, at: SurfacePoints) -> Patch:
+    """Functionals of what the quadrature points stand for. Raises DescriptionError where they have no area."""
     area = float(at.weight.sum())
     if not area > 0:
         raise _no_area(part)

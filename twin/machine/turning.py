@@ -25,12 +25,6 @@ class Turning:
     surfaces: tuple[tuple[str, str], ...]  # of each: "part.surface" that it turns on, and the one that turns
     sign: int  # 1: it turns the tool, -1: the work
 
-    @property
-    def seat(self) -> tuple[str, ...]:
-        """Surfaces of the part that it turns on; of the first where there are several."""
-        inner = [a for a, _ in self.surfaces]
-        return tuple(dict.fromkeys(a for a in inner if owner_of(a) == owner_of(inner[0])))
-
 
 def turning_axes(machine: Machine) -> tuple[Turning, ...]:
     """Those of a machine of parts with a TCP: of the tool, then of the work, each from the guides outwards."""
@@ -70,9 +64,9 @@ def _turning(machine: Machine, name: str) -> Turning | str:
         return "it carries parts of several bodies"
     body = body_of(bodies, axis.carries[0])
     held = {part for part in _held(machine) if part in body.parts}
-    if set(axis.carries) & held:
-        return "what it carries stands on guides, supports or a scale, which would have to turn, too"
-    standing = _reached(machine, body, held, axis)
+    standing = _reached(machine, body, next((part for part in body.parts if part in held), ""), axis)
+    if not held <= standing:
+        return "guides, supports or a scale stand on what it carries, and would have to turn, too"
     parts = tuple(part for part in body.parts if part not in standing)
     joints = {
         contact: (a, b) if owner_of(a) in standing else (b, a)
@@ -105,9 +99,9 @@ def _held(machine: Machine) -> Iterator[str]:
         yield from (owner_of(s) for s in (axis.encoder.scale, axis.encoder.reader) if s is not None)
 
 
-def _reached(machine: Machine, body: Body, held: set[str], axis: Axis) -> set[str]:
-    """Parts of a body that fixed contacts join to those held, not by way of what the axis carries."""
-    reached = set(held)
+def _reached(machine: Machine, body: Body, held: str, axis: Axis) -> set[str]:
+    """Parts of a body that fixed contacts join to one that is held, not by way of what the axis carries."""
+    reached = {held} - set(axis.carries)
     while True:
         more = {
             owner_of(far)

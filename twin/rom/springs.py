@@ -82,7 +82,7 @@ class SpringSystem:
         if isinstance(positions, Mapping):
             unknown = set(positions) - set(names)
             if unknown:
-                raise ValueError(f"no axis {sorted(unknown)}; axes are {names}")
+                raise ValueError(f"no linear axis {sorted(unknown)}; axes are {names}")
             vector = np.array([float(positions.get(a, 0.0)) for a in names])
             return vector[:n], vector[n:]
         vector = np.asarray(positions, dtype=float)

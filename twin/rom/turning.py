@@ -1,9 +1,9 @@
 """Rotary axes in the structure: where parts stand that turned, and what holds them to their bearings.
 
-The two sides of a bearing are held together by moments of their displacements over the area that they share, about the
-axis: with functions f_k cos(m_k phi), f_k sin(m_k phi) of the place on it (`twin.build.bearing`),
+The two sides of a bearing are held together by their displacements over the area that they share: by the coefficients
+a_k, b_k (3,) of functions f_k(rho, z) cos(m_k phi), f_k sin(m_k phi) of the place (`twin.build.bearing`),
 
-    gap = int f_k (cos, sin)(m_k phi) u_inner dA - R(theta) D_k(theta) int f_k (cos, sin)(m_k phi) u_outer dA
+    gap = (a_k, b_k)_inner - D_k(theta) R(theta) (a_k, b_k)_outer
 
 in the coordinates of the inner side; R turns vectors by the angle theta, D_k the pair of functions by m_k theta. So the
 inner side sees the outer one bend as it stands, and a turned bearing needs no other mesh.
@@ -19,8 +19,8 @@ import numpy as np
 from twin.rom.elastic_ports import RigidPort
 from twin.rom.parallel import rotated
 
-# N/m, of the springs that hold a bearing's moments: rings are bolted to their parts, whose own stiffness against such
-# loads is E times the radius, 1e10 to 1e11. Bearings yield like their description's glued contact: not at all.
+# N/m, of the springs that hold the two sides of a bearing: rings are bolted to their parts, whose own stiffness against
+# such loads is E times the radius, 1e10 to 1e11. Bearings yield like their description's glued contact: not at all.
 HELD = 1e14
 
 
@@ -44,8 +44,8 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class MomentPort:
-    """Three columns per function: moments of the displacement [m] over one side of a bearing."""
+class FittedPort:
+    """Three columns per function: its coefficients [m] in the displacement of one side of a bearing."""
 
     body: int
     first: int  # column within the body's ports
@@ -56,8 +56,8 @@ class Bearing:
     """The bearing of an axis: three springs per function."""
 
     turn: int
-    inner: MomentPort
-    outer: MomentPort
+    inner: FittedPort
+    outer: FittedPort
     harmonics: np.ndarray  # (k,) m of every function; cosine before sine, alone where m is zero
     first: int  # its first spring
 

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from twin.machine.bodies import bodies_of, body_of, owner_of
+from twin.machine.bodies import Body, bodies_of, owner_of
 from twin.machine.description import Machine
-from twin.machine.kinematics import displacement, linear_axes
+from twin.machine.kinematics import direction, displacement, linear_axes
+from twin.machine.turning import pieces_of, standing_axes, turning_axes
+from twin.machine.wiring import signal
 from twin.page.creases import creases
 from twin.page.packed import packed
 from twin.pictures.network import layout
@@ -37,8 +39,8 @@ def described_told(machine: Machine) -> dict[str, Any]:
         "notes": _notes(machine, surfaces),
         "uncovered": [line for line, _ in bare],
         "problems": [str(p) for p in surfaces.problems] if surfaces else [],
-        "axes": [] if surfaces is None else _axes(machine, surfaces),
-        "surface": None if surfaces is None else _surface(surfaces),
+        "axes": [] if surfaces is None else _axes(machine),
+        "surface": None if surfaces is None else _surface(machine, surfaces),
         "network": _network(machine) if surfaces is None else None,
         "entries": [
             *(_uncovered_entry(part, line, surfaces) for line, part in bare if surfaces),
@@ -73,27 +75,37 @@ def _notes(machine: Machine, surfaces: Surfaces | None) -> list[str]:
         notes.append("lumped machine: it has no meshes, so its network of nodes and bars is drawn")
     elif machine.nodes:
         notes.append(f"nodes beside parts have no surface and are in the list only: {', '.join(machine.nodes)}")
-    if turning := [name for name, axis in machine.axes.items() if axis.kind == "rotary"]:
-        notes.append(f"rotary axes turn nothing here, as in the structure: {', '.join(turning)}")
+    for name, why in standing_axes(machine).items():
+        notes.append(f"rotary axis {name} turns nothing here, as in the structure: {why}")
     if surfaces is not None and machine.sensors:
         air = [name for name, s in machine.sensors.items() if s.environment]
         notes += [f"sensors in the air are in the list only: {', '.join(air)}"] if air else []
     return notes
 
 
-def _axes(machine: Machine, surfaces: Surfaces) -> list[dict[str, Any]]:
-    """Linear axes: stroke [m] and how each body moves with them, m/m."""
-    return [
-        {
-            "name": axis,
-            "stroke": list(machine.axes[axis].stroke),
-            "moves": [displacement(machine, body, {axis: 1.0}).tolist() for body in surfaces.bodies],
-        }
-        for axis in linear_axes(machine)
-    ]
+def _pieces(machine: Machine) -> tuple[Body, ...]:
+    """Bodies, cut where rotary axes turn parts of them: what moves as a whole."""
+    turning = turning_axes(machine)
+    return tuple(piece for body in bodies_of(machine) for piece in pieces_of(body, turning))
 
 
-def _surface(surfaces: Surfaces) -> dict[str, Any]:
+def _axes(machine: Machine) -> list[dict[str, Any]]:
+    """Linear axes: stroke [m] and how each piece moves with them, m/m. Then those that turn: stroke [rad] and which
+    pieces, the inner before the outer."""
+    pieces, found = _pieces(machine), []
+    for axis in linear_axes(machine):
+        moves = [displacement(machine, piece.name, {axis: 1.0}).tolist() for piece in pieces]
+        found.append({"name": axis, "stroke": list(machine.axes[axis].stroke), "moves": moves})
+    for t in turning_axes(machine):
+        entry = machine.axes[t.axis]
+        angle = signal(entry.position, machine.signals[entry.position])
+        turns = [set(piece.parts) <= set(t.parts) for piece in pieces]
+        along = {"point": list(entry.point or ()), "direction": direction(machine, t.axis).tolist()}
+        found.append({"name": t.axis, "stroke": [angle.low, angle.high], "turns": turns, **along})
+    return found
+
+
+def _surface(machine: Machine, surfaces: Surfaces) -> dict[str, Any]:
     """Points (n, 3) m body by body, triangles and edges into them, and of each triangle its surface and bare share."""
     points: list[np.ndarray] = []
     triangles: list[np.ndarray] = []
@@ -110,9 +122,10 @@ def _surface(surfaces: Surfaces) -> dict[str, Any]:
     def each(values: list[int], of: list[np.ndarray]) -> np.ndarray:
         return np.repeat(values, [len(k) for k in of])
 
-    numbers, bodies = list(range(len(surfaces.named))), [s.body for s in surfaces.named]
+    pieces = _pieces(machine)
+    numbers, bodies = list(range(len(surfaces.named))), [_place_of(pieces, s.part) for s in surfaces.named]
     return {
-        "bodies": list(surfaces.bodies),
+        "bodies": [piece.name for piece in pieces],
         "names": [s.path for s in surfaces.named],
         "points": packed(np.vstack(points)),
         "body": packed(each(bodies, points), "u4"),  # of each point
@@ -121,6 +134,10 @@ def _surface(surfaces: Surfaces) -> dict[str, Any]:
         "bare": packed(np.concatenate([_drawn_bare(s) for s in surfaces.named])),
         "edges": packed(np.vstack(edges), "u4"),
     }
+
+
+def _place_of(pieces: tuple[Body, ...], part: str) -> int:
+    return next(i for i, piece in enumerate(pieces) if part in piece.parts)
 
 
 def _drawn_bare(s: NamedSurface) -> np.ndarray:
@@ -149,7 +166,7 @@ def _entry(machine: Machine, e: Entry, surfaces: Surfaces | None) -> dict[str, A
         names = list(machine.members)
         places = [names.index(owner_of(p)) for p in e.places if owner_of(p) in names]
         return _told(e.group, e.name, e.path, e.facts, places)
-    body = surfaces.bodies.index(body_of(bodies_of(machine), e.on).name) if e.on in machine.parts else None
+    body = _place_of(_pieces(machine), e.on) if e.on in machine.parts else None
     point = None if e.point is None or body is None else {"at": list(e.point), "body": body}
     return _told(e.group, e.name, e.path, e.facts, surfaces.numbers(*e.places), point)
 

@@ -3,6 +3,14 @@
 
 const GREY = [0.74, 0.76, 0.79], PALE = [0.86, 0.87, 0.89], BARE = [0.8, 0.23, 0.18], CHOSEN = [0, 0.447, 0.698], SENSOR = [0.9, 0.624, 0];
 
+const UPRIGHT = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+const plus = (a, b) => a.map((x, k) => x + b[k]), times = (rows, v) => rows.map((r) => r[0] * v[0] + r[1] * v[1] + r[2] * v[2]);
+function rotation([x, y, z], angle) { // about a unit vector (Rodrigues)
+  const c = Math.cos(angle), s = Math.sin(angle), k = 1 - c;
+  return [[c + k * x * x, k * x * y - s * z, k * x * z + s * y], [k * y * x + s * z, c + k * y * y, k * y * z - s * x],
+    [k * z * x - s * y, k * z * y + s * x, c + k * z * z]];
+}
+
 class Described {
   constructor(content) {
     const told = content.surface;
@@ -10,7 +18,7 @@ class Described {
     this.points = unpack(told.points); this.body = unpack(told.body); this.triangles = unpack(told.triangles);
     this.of = unpack(told.of); this.bare = unpack(told.bare); this.edges = unpack(told.edges);
     this.stage = new Stage(document.getElementById("machine-canvas"), content.vertical);
-    this.shift = told.bodies.map(() => [0, 0, 0]);
+    this.places = told.bodies.map(() => ({ turn: UPRIGHT, shift: [0, 0, 0] }));
     this.chosen = new Set(); this.marked = null;
     this.size = new THREE.Box3().setFromArray(this.points).getSize(new THREE.Vector3()).length();
     const grey = new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, side: THREE.DoubleSide,
@@ -36,7 +44,7 @@ class Described {
     const mesh = new THREE.Mesh(geometry, grey), behind = new THREE.Mesh(through, seen);
     const creases = new THREE.LineSegments(this.geometry(Float32Array.from(lines)), ink);
     behind.renderOrder = 2; behind.visible = false;
-    for (const made of [mesh, behind, creases]) { made.frustumCulled = false; this.stage.scene.add(made); }
+    for (const made of [mesh, behind, creases]) { made.frustumCulled = made.matrixAutoUpdate = false; this.stage.scene.add(made); }
     return { rows, place, colour, behind, all: [mesh, behind, creases] };
   }
   at(point) { return this.points.subarray(3 * point, 3 * point + 3); }
@@ -61,17 +69,27 @@ class Described {
     this.placed();
   }
   placed() {
-    this.bodies.forEach((body, b) => body.all.forEach((made) => made.position.set(...this.shift[b])));
+    this.bodies.forEach((body, b) => body.all.forEach((made) => {
+      const { turn: [r, s, t], shift: [x, y, z] } = this.places[b];
+      made.matrix.set(...r, x, ...s, y, ...t, z, 0, 0, 0, 1);
+      made.matrixWorldNeedsUpdate = true;
+    }));
     for (const { entry, mesh, usual, chosen } of this.points3) {
-      const marked = this.marked === entry, s = this.shift[entry.point.body];
-      mesh.position.set(...entry.point.at.map((x, k) => x + s[k]));
+      const marked = this.marked === entry, { turn, shift } = this.places[entry.point.body];
+      mesh.position.set(...plus(times(turn, entry.point.at), shift));
       mesh.scale.setScalar((marked ? 0.013 : 0.006) * this.size);
       mesh.material = marked ? chosen : usual; mesh.renderOrder = marked ? 3 : 1;
     }
     this.stage.ask();
   }
-  move(axes, positions) { // m
-    this.shift = this.told.bodies.map((_, b) => [0, 1, 2].map((k) => axes.reduce((sum, a, i) => sum + a.moves[b][k] * positions[i], 0)));
+  move(axes, positions) { // m, rad; rotary axes come last, the inner before the outer
+    this.places = this.told.bodies.map((_, b) => axes.reduce(({ turn, shift }, a, i) => {
+      if (!a.turns) return { turn, shift: shift.map((x, k) => x + a.moves[b][k] * positions[i]) };
+      if (!a.turns[b]) return { turn, shift };
+      const about = rotation(a.direction, positions[i]), lever = plus(a.point, times(about, a.point).map((x) => -x));
+      const [x, y, z] = [0, 1, 2].map((k) => times(turn, about.map((row) => row[k])));
+      return { turn: [0, 1, 2].map((k) => [x[k], y[k], z[k]]), shift: plus(times(turn, lever), shift) };
+    }, { turn: UPRIGHT, shift: [0, 0, 0] }));
     this.placed();
   }
   choose(entry) { // or nothing
@@ -110,8 +128,10 @@ class Described {
     let depth = Infinity, surface = null;
     const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2], minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    const [whence, whither] = [start, along];
     this.bodies.forEach(({ rows, place }, b) => {
-      const from = minus(start, this.shift[b]);
+      const { turn, shift } = this.places[b], back = [0, 1, 2].map((k) => turn.map((row) => row[k]));
+      const from = times(back, minus(whence, shift)), along = times(back, whither);
       rows.forEach((t, i) => {
         const corner = [0, 3, 6].map((c) => place.subarray(9 * i + c, 9 * i + c + 3));
         const u = minus(corner[1], corner[0]), v = minus(corner[2], corner[0]), p = cross(along, v), det = dot(u, p);

@@ -87,12 +87,13 @@ class Page {
   sliders() {
     const { axes } = this.content, positions = axes.map(() => 0);
     by("axes").replaceChildren(...(this.machine ? axes : []).map((axis, k) => {
-      const slider = element("input"), shown = element("output", "0 mm");
+      const told = (v) => (axis.turns ? `${((180 / Math.PI) * v).toFixed(0)}°` : `${(1000 * v).toFixed(0)} mm`);
+      const slider = element("input"), shown = element("output", told(0));
       const [low, high] = axis.stroke;
       Object.assign(slider, { type: "range", id: `axis-${axis.name}`, min: low, max: high, step: (high - low) / 200, value: 0 });
       slider.addEventListener("input", () => {
         positions[k] = +slider.value;
-        shown.textContent = `${(1000 * positions[k]).toFixed(0)} mm`;
+        shown.textContent = told(positions[k]);
         this.machine.move(axes, positions);
       });
       const label = element("label", `${axis.name} `, [slider, shown]);
