@@ -13,7 +13,7 @@ for variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
 NAMES = (
-    "machines", "certificate", "case", "plate", "poses", "moved", "step", "laws", "replay", "load_pipeline",
+    "machines", "certificate", "case", "plate", "poses", "moved", "turned", "step", "laws", "replay", "load_pipeline",
     "growth", "hexapod_blocks", "pymor", "steel_profile", "steel_profile_fit", "matrices", "correction", "exports",
     "c_runtime", "fmu", "calibration", "update",
     "spindle_drift", "spindle_diagnosis", "log_faults", "lathe_channels",

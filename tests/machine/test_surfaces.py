@@ -48,9 +48,11 @@ def test_surfaces_without_any_exchange_are_named():
 
 
 def test_surfaces_with_two_uses_are_named():
-    said = faults(with_film("floor", "foot_1.*", "foot_2.*", "foot_3.*", "foot_1.z_min", "bed.z_max"))
+    floor = with_film("floor", "foot_1.*", "foot_2.*", "foot_3.*", "foot_1.z_min", "bed.z_max")
+    bed = floor.parts["bed"].model_copy(update={"adiabatic": ("z_max",)})
+    said = faults(floor.model_copy(update={"parts": {**floor.parts, "bed": bed}}))
     assert said == [
-        "parts.bed: surface 'bed.z_max' belongs to fixed contacts and films.floor",
+        "parts.bed: surface 'bed.z_max' belongs to the adiabatic list and fixed contacts and films.floor",
         "parts.foot_1: surface 'foot_1.z_min' belongs to the adiabatic list and films.floor",
     ]
 
@@ -62,3 +64,9 @@ def test_two_stars_on_one_part_and_unknown_names_are_refused():
         "films.floor.surfaces: unknown surface 'bed.top'",
         "films.floor.surfaces: unknown part in 'bad.*'",
     ]
+
+
+def test_a_film_may_name_what_fixed_contacts_leave_free():
+    films = film_surfaces(with_film("floor", "foot_1.*", "foot_2.*", "foot_3.*", "bed.z_max"), NAMES)
+    assert ("bed", "z_max") in films["floor"]
+    assert ("bed", "z_min") not in films["structure"]  # "bed.*" does not take it

@@ -80,6 +80,7 @@ FILMS = {
     "forced_bar": {"speed": -1.6, "height": 0.1, "constant": 0.102, "exponent": 0.675, **TEMPERATURES},
     "rotating_cylinder": {"speed": -20.0, "diameter": 0.05, **TEMPERATURES},
     "mixed_plate": {"speed": -0.6, "length": 0.3, "height": 0.5, **TEMPERATURES},
+    "mixed_plate_two_axes": {"speed": -0.6, "speed_across": 0.3, "length": 0.3, "height": 0.5, **TEMPERATURES},
     "mixed_horizontal_up": {"speed": -0.6, "length": 0.3, "area_over_perimeter": 0.1, **TEMPERATURES},
     "mixed_horizontal_down": {"speed": -0.6, "length": 0.3, "area_over_perimeter": 0.1, **TEMPERATURES},
     "mixed_cylinder": {"speed": -0.6, "diameter": 0.05, **TEMPERATURES},
@@ -92,4 +93,13 @@ FILMS = {
 JOINTS = {"bolted_joint": {"pressure": 5e6, "factor": 1.2, **JOINT, **BOLTS}}
 POINTS = {**LOSSES, **FILMS, **JOINTS}
 # what stands still or is at the temperature of the air
-REST = {"speed": 0.0, "current": 0.0, "force": 0.0, "torque": 0.0, "flow": 0.0, "switch": 0.0, "surface": 22.0}
+REST = {
+    "speed": 0.0,
+    "speed_across": 0.0,
+    "current": 0.0,
+    "force": 0.0,
+    "torque": 0.0,
+    "flow": 0.0,
+    "switch": 0.0,
+    "surface": 22.0,
+}

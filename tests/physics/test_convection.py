@@ -117,6 +117,18 @@ def test_mixed_flow_at_rest_is_free_and_fast_is_forced():
     assert np.all(np.diff(np.asarray(forced.mixed_plate(speeds, 30.0, 20.0, 0.2, 0.5))) >= 0.0)
 
 
+def test_two_axes_make_one_wind():
+    """3 and 4 are 5; one axis alone is that of mixed_plate, and a standing machine has free convection."""
+
+    def both(v: float, w: float) -> float:
+        return float(forced.mixed_plate_two_axes(v, w, 30.0, 20.0, 0.2, 0.5))
+
+    assert both(0.3, -0.4) == pytest.approx(float(forced.mixed_plate(0.5, 30.0, 20.0, 0.2, 0.5)), rel=1e-12)
+    assert both(-0.6, 0.0) == pytest.approx(float(forced.mixed_plate(0.6, 30.0, 20.0, 0.2, 0.5)), rel=1e-12)
+    assert both(0.0, 0.0) == pytest.approx(float(free.free_vertical_plate(30.0, 20.0, 0.5)), rel=1e-12)
+    assert not bool(forced.mixed_plate_two_axes_holds(300.0, 300.0, 30.0, 20.0, 0.5, 1.0))
+
+
 @pytest.mark.parametrize("way", ["up", "down"])
 @pytest.mark.parametrize(("surface", "ambient"), [(40.0, 20.0), (20.0, 40.0)])
 def test_mixed_flow_along_horizontal_surfaces(way, surface, ambient):

@@ -135,16 +135,18 @@ def common_areas(body: BodyMesh, a: str, b: str, gap: float | None = None) -> tu
     return of_a, of_b
 
 
-def common_pieces(body: BodyMesh, a: str, b: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The common area of two surfaces that lie on each other as k triangles: which facet of `a` and of `b` each is on
-    (k,), in the order of the surfaces' facets, and its corners (k, 3, 6) in barycentric coordinates of both.
+def common_pieces(
+    body: BodyMesh, a: str, b: str, gap: float | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The area over which two surfaces face each other as k triangles: which facet of `a` and of `b` each is on (k,),
+    in the order of the surfaces' facets, and its corners (k, 3, 6) in barycentric coordinates of both.
     """
     fa, fb = _facets(body, a), _facets(body, b)
-    pairs = _facing(fa, fb, None)
+    pairs = _facing(fa, fb, gap)
     found = [(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 3, 6)))]
     for start in range(0, len(pairs), PAIRS):
         i, j = pairs[start : start + PAIRS].T
-        triangles, owner, _ = _common(fa, fb, i, j, None)
+        triangles, owner, _ = _common(fa, fb, i, j, gap)
         found.append((i[owner], j[owner], triangles))
     of_a, of_b, triangles = (np.concatenate(column) for column in zip(*found, strict=True))
     return of_a, of_b, triangles

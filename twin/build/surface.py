@@ -113,10 +113,13 @@ def segments(part: PartMesh, facets: np.ndarray, direction: np.ndarray, n: int) 
     return result
 
 
-def mass(part: PartMesh, facets: np.ndarray) -> sp.csr_array:
-    """int N N^T dA [m^2] over facets, (n, n): the film matrix per W/(m^2 K)."""
+def mass(part: PartMesh, facets: np.ndarray, pieces: np.ndarray | None = None) -> sp.csr_array:
+    """int N N^T dA [m^2] over facets, (n, n): the film matrix per W/(m^2 K).
+
+    pieces: (m, 3, 3) triangles in barycentric coordinates of the facets (m,), which may occur twice; by default whole.
+    """
     nodes = facet_nodes(part, facets)
-    at = surface_points(part, nodes, np.broadcast_to(np.eye(3), (len(nodes), 3, 3)), 4)
+    at = surface_points(part, nodes, np.broadcast_to(np.eye(3), (len(nodes), 3, 3)) if pieces is None else pieces, 4)
     local = np.einsum("mq,mqi,mqj->mij", at.weight, at.shape, at.shape)
     return scatter(nodes, nodes, local, part.n)
 

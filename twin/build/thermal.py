@@ -10,12 +10,13 @@ import scipy.sparse as sp
 from skfem import BilinearForm
 from skfem.helpers import dot, grad
 
+from twin.build.film_area import film_matrix
 from twin.build.free_nodes import with_free_nodes
 from twin.build.interface import interface
 from twin.build.mesh import BodyMesh, PartMesh
 from twin.build.ports import ContactPorts, contact_ports, port_averages
 from twin.build.probe import probe
-from twin.build.surface import mass, patch
+from twin.build.surface import patch
 from twin.build.tanks import with_tanks
 from twin.build.terms import Term, columns, joint_term
 from twin.build.wiring import load_model
@@ -127,7 +128,7 @@ def _body(
     A0 = sp.csr_array(sp.block_diag([a for _, a in parts], format="csr"))
     one = np.ones(body.n)
     height = body.nodes[:, "xyz".index(machine.machine.vertical)]
-    terms = [*_film_terms(body, films, load, height), *_joint_terms(machine, body, load)]
+    terms = [*_film_terms(machine, body, films, load, height), *_joint_terms(machine, body, load)]
     B = _source_loads(machine, body, load)
     P, port_numbers = port_averages(body, ports)
     sensors = _structural(machine)
@@ -155,13 +156,15 @@ def _body(
     return with_tanks(machine, body, bare)
 
 
-def _film_terms(body: BodyMesh, films: FilmSurfaces, load: LoadModel, height: np.ndarray) -> Iterator[Term]:
+def _film_terms(
+    machine: Machine, body: BodyMesh, films: FilmSurfaces, load: LoadModel, height: np.ndarray
+) -> Iterator[Term]:
     """height (n,) m of the nodes."""
     own = {part.name for part in body.parts}
     for k, film in enumerate(load.films):
         surfaces = [(p, s) for p, s in films[film.name] if p in own]
         if surfaces:
-            matrix = _film_matrix(body, surfaces)
+            matrix = film_matrix(machine, body, surfaces, film.name, film.additional)
             yield Term(k, matrix, matrix @ np.ones(body.n), matrix @ height)
 
 
@@ -191,24 +194,15 @@ def _structural(machine: Machine) -> tuple[str, ...]:
 
 
 def _film_areas(machine: Machine, bodies: tuple[BodyMesh, ...], films: FilmSurfaces) -> dict[str, float]:
-    """m^2 of every film's surfaces."""
+    """m^2 of what every film acts on."""
     nodes = free_nodes(machine)
-    areas = {
-        name: sum(float(nodes[s].area or 0.0) for s in machine.films[name].surfaces if s in nodes) for name in films
-    }
-    for body in bodies:
-        for part in body.parts:
-            for name, surfaces in films.items():
-                areas[name] += sum(patch(part, part.facets(s)).area for p, s in surfaces if p == part.name)
+    areas = {}
+    for name, surfaces in films.items():
+        entry = machine.films[name]
+        areas[name] = sum(float(nodes[s].area or 0.0) for s in entry.surfaces if s in nodes)
+        for body in bodies:
+            areas[name] += float(film_matrix(machine, body, surfaces, name, entry.additional).sum())
     return areas
-
-
-def _film_matrix(body: BodyMesh, surfaces: list[tuple[str, str]]) -> sp.csr_array:
-    blocks = []
-    for part in body.parts:
-        facets = [part.facets(s) for p, s in surfaces if p == part.name]
-        blocks.append(mass(part, np.concatenate(facets)) if facets else sp.csr_array((part.n, part.n)))
-    return sp.csr_array(sp.block_diag(blocks, format="csr"))
 
 
 def _spread(body: BodyMesh, surface: str) -> np.ndarray:

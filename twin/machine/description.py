@@ -144,8 +144,8 @@ class Encoder(Entry):
 class Axis(Entry):
     kind: Literal["linear", "rotary"] = "linear"
     direction: Vector
-    stroke: tuple[Length, Length] = (0.0, 0.0)  # rotary axes carry no stroke: structure is evaluated at angle zero
-    point: Point | None = None  # rotary axes: a point on the axis, at axis positions zero
+    stroke: tuple[Length, Length] = (0.0, 0.0)  # of rotary axes the range of their signal stands for it
+    point: Point | None = None  # rotary axes: a point on the axis, at axis positions zero; with it the structure turns
     carries: tuple[str, ...]  # parts that move with the axis (their whole bodies do)
     position: str  # signal
     encoder: Encoder = Encoder()

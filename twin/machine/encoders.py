@@ -19,7 +19,7 @@ def encoder_problems(name: str, axis: Axis) -> Iterator[Problem]:
     encoder, where = axis.encoder, f"axes.{name}.encoder"
     if axis.kind == "rotary":
         if "encoder" in axis.model_fields_set:
-            remedy = "remove it: encoders are modelled on linear axes, the structure stands with rotary axes at zero"
+            remedy = "remove it: encoders are modelled on linear axes"
             yield Problem("an encoder on a rotary axis", where, remedy)
     elif encoder.kind == "rotary":
         for key in _OF_A_SCALE:

@@ -1,7 +1,7 @@
 """Rigid motion of the bodies with the linear axes.
 
 An axis moves the bodies of the parts it carries and all that these carry in turn: the column carries the headstock
-because the Y guides join them, so X moves both. Rotary axes turn nothing here: the structure stands at angle zero.
+because the Y guides join them, so X moves both. Rotary axes turn parts of bodies: `twin.machine.turning`.
 """
 
 from __future__ import annotations

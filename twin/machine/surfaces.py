@@ -22,7 +22,8 @@ class SurfaceUses:
     """What every named surface is used for, right or wrong."""
 
     films: Mapping[str, tuple[tuple[str, str], ...]]  # (part, surface) of every film, additional ones too
-    users: Mapping[tuple[str, str], tuple[str, ...]]  # (part, surface) -> "films.NAME" and the above: one is right
+    # (part, surface) -> "films.NAME" and the above: one is right, or a film on what fixed contacts leave free
+    users: Mapping[tuple[str, str], tuple[str, ...]]
     problems: tuple[Problem, ...]
 
 
@@ -30,8 +31,8 @@ def film_surfaces(machine: Machine, surfaces: Mapping[str, Collection[str]]) -> 
     """(part, surface) of every film, with "part.*" expanded to what no film, fixed contact or adiabatic list names.
 
     `surfaces` holds the named surfaces of every part's mesh. A fixed contact may share its surface with others; what
-    they leave uncovered exchanges no heat. Nodes beside parts are left out. Raises DescriptionError with all unknown,
-    unused and doubly used surfaces.
+    they leave free exchanges no heat, unless a film names the surface itself: it acts on that. Nodes beside parts are
+    left out. Raises DescriptionError with all unknown, unused and doubly used surfaces.
     """
     uses = surface_uses(machine, surfaces)
     if uses.problems:
@@ -99,7 +100,7 @@ class _Uses:
         for (part, name), users in self._users.items():
             if not users and part in rest:
                 left.append((part, name))
-            elif len(users) != 1:
+            elif len(users) != 1 and not (len(users) == 2 and FIXED in users and ADIABATIC not in users):
                 what = f"surface '{part}.{name}' belongs to {' and '.join(users) or 'no film'}"
                 remedy = "put each surface into exactly one of: a film, a fixed contact, the part's adiabatic list"
                 self.problems.append(Problem(what, f"parts.{part}", remedy))

@@ -166,6 +166,14 @@ FILMS: dict[str, Law] = {
         f"{_MIXED} of forced_plate and free_vertical_plate",
         Validity(forced_convection.mixed_plate_holds, f"Re < 1e7, 0.1 < Ra < 1e12 {_SLIGHT}, {_AIR}"),
     ),
+    "mixed_plate_two_axes": Law(
+        forced_convection.mixed_plate_two_axes, "film",
+        "VDI-Waermeatlas; mixed_plate at the length of the velocity vector",
+        {**_WIND, "speed_across": Argument("m/s", "speed of an axis square to the first", low=_ANY)},
+        {"length": Argument("m", "length along the motion", None, _TINY), **_HEIGHT}, _STATES,
+        "mixed_plate at v = sqrt(v1^2 + v2^2)",
+        Validity(forced_convection.mixed_plate_two_axes_holds, f"Re < 1e7, 0.1 < Ra < 1e12 {_SLIGHT}, {_AIR}"),
+    ),
     "mixed_horizontal_up": Law(
         forced_convection.mixed_horizontal_up, "film", "VDI-Waermeatlas; forced_plate and free_horizontal_up",
         _WIND, _LEVEL, _STATES,

@@ -27,6 +27,7 @@ from twin.physics.free_convection import (
     free_horizontal_up_holds,
     within,
 )
+from twin.physics.powers import power
 
 LEAST_REYNOLDS = 10.0
 
@@ -124,6 +125,26 @@ def mixed_plate_holds(speed, surface, ambient, length, height):
     """Re < 1e7 along the motion, 0.1 < Ra < 1e12 over the height."""
     ra = free_flow(surface, ambient, height).ra
     return within(surface, ambient, ra, 0.1, 1e12) & _in_range(speed, surface, ambient, length, 0.0, 1e7)
+
+
+def mixed_plate_two_axes(speed, speed_across, surface, ambient, length, height):
+    """h of a vertical plate that two axes square to each other move: mixed_plate at sqrt(v1^2 + v2^2).
+
+    Velocities of axes are components of one vector, so the air passes at its length; which way does not matter to
+    correlation G3 beyond the length along the motion. Taking the larger speed was rejected: 29 % less where both are
+    equal, and a corner in between.
+    """
+    return mixed_plate(_together(speed, speed_across), surface, ambient, length, height)
+
+
+def mixed_plate_two_axes_holds(speed, speed_across, surface, ambient, length, height):
+    """As mixed_plate."""
+    return mixed_plate_holds(_together(speed, speed_across), surface, ambient, length, height)
+
+
+def _together(speed, speed_across):
+    """sqrt(v1^2 + v2^2) with a finite derivative at rest."""
+    return power(jnp.asarray(speed) ** 2 + jnp.asarray(speed_across) ** 2, 0.5)
 
 
 def mixed_horizontal_up(speed, surface, ambient, length, area_over_perimeter):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from twin.machine.bodies import owner_of
 from twin.machine.description import Machine
 from twin.machine.explain import Explanation, Load, explain, load_of
+from twin.machine.surfaces import FIXED
 from twin.show.surface import NamedSurface, Surfaces
 
 Facts = list[tuple[str, str]]
@@ -58,7 +59,8 @@ def _films(machine: Machine, surfaces: Surfaces | None, load: Load) -> Iterator[
         if film.radiant:
             facts.append(("radiates to", _air(machine, film.radiant)))
         if surfaces:
-            area = sum(s.area for s in surfaces.named if s.path in on)
+            own = [s for s in surfaces.named if s.path in on]
+            area = sum(s.area if film.additional else s.of_film for s in own)
             area += sum(float(machine.nodes[n].area or 0.0) for n in nodes)
             facts.append(("area", square(area)))
         elif film.area is not None:
@@ -117,6 +119,8 @@ def _film_words(machine: Machine, s: NamedSurface) -> str:
     if s.film is None:
         return "none" + (f": {s.part}.* of films.{rest} takes only what nothing else names" if rest else "")
     moving = any(machine.contacts[c].kind == "moving" for c in s.contacts)
+    if FIXED in s.uses:
+        return f"{s.film}, which names it: on {square(s.of_film)} that its fixed contacts leave free"
     below = "; it acts on all of the surface, under the pads, too" if moving else ""
     if s.path not in machine.films[s.film].surfaces:
         return f"{s.film}, by {s.part}.*: nothing else names this surface{below}"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.build.film_area import ROUNDED
 from twin.build.interface import common_areas
 from twin.build.mesh import BodyMesh, load_body_meshes
 from twin.build.surface import facet_nodes, patch
@@ -14,10 +15,6 @@ from twin.errors import Problem
 from twin.machine.bodies import split_surface
 from twin.machine.description import Machine
 from twin.machine.surfaces import ADIABATIC, FIXED, surface_uses
-
-# Share of a surface below which what its fixed contacts leave free is not told: rounded coordinates and the chords of
-# facetted cylinders, whose common area is that of one of the two sides.
-ROUNDED = 0.01
 
 
 @dataclass(frozen=True)
@@ -28,6 +25,7 @@ class NamedSurface:
     name: str
     body: int  # number of its body
     area: float  # m^2
+    joined: float  # m^2 of it within fixed contacts
     corners: np.ndarray  # (m, 3 corners, 3) m, of its facets; right-handed seen from outside
     bare: np.ndarray  # (m,) share of each facet that exchanges no heat: no film, no contact
     uses: tuple[str, ...]  # "films.NAME", "fixed contacts", "the adiabatic list"; one, where the description is right
@@ -42,6 +40,11 @@ class NamedSurface:
     def film(self) -> str | None:
         """The film that accounts for it."""
         return next((use.removeprefix("films.") for use in self.uses if use.startswith("films.")), None)
+
+    @property
+    def of_film(self) -> float:
+        """m^2 that its film acts on: all, or what fixed contacts leave free."""
+        return self.area - self.joined if FIXED in self.uses else self.area
 
     @property
     def uncovered(self) -> float:
@@ -93,7 +96,8 @@ def named_surfaces(machine: Machine) -> Surfaces:
                 if not films and path not in moving:
                     bare = np.clip(1.0 - joined.get(path, bare) / facet_areas(corners), 0.0, 1.0)
                 found.append(NamedSurface(
-                    part.name, name, b, patch(part, facets).area, corners, bare, uses.users[key],
+                    part.name, name, b, patch(part, facets).area, float(np.sum(joined.get(path, 0.0))), corners, bare,
+                    uses.users[key],
                     tuple(f for f in films if machine.films[f].additional), tuple(contacts.get(path, ())),
                 ))  # fmt: skip
     films_of = {film: tuple(f"{p}.{s}" for p, s in surfaces) for film, surfaces in uses.films.items()}
