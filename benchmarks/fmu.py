@@ -49,7 +49,8 @@ def distance(found: dict[str, np.ndarray], expected: Result) -> str:
     T = np.stack([found[n][rows] for n in names], axis=1)
     w = np.stack([found[f"tcp_{c}"][rows] for c in "xyz"], axis=1)
     kelvin = np.abs(T - expected.temperature[1:][there]).max()
-    um = 1e6 * np.abs(w - expected.tcp_actual[1:][there]).max()
+    straight = np.abs(expected.angle[1:][there]).max(axis=1, initial=0.0) == 0.0  # an FMU has rotary axes at zero
+    um = 1e6 * np.abs(w - expected.tcp_actual[1:][there])[straight].max()
     of = np.ptp(expected.temperature, axis=0).max(initial=0.0), 1e6 * np.abs(expected.tcp_actual).max(initial=0.0)
     return f"{kelvin:.1e} of {of[0]:.1f} K, {um:.1e} of {of[1]:.1f} um over {len(rows)} steps"
 
