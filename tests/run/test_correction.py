@@ -457,3 +457,10 @@ def test_no_rotary_axis_to_correct_with(slide_artefact, slide_result, tmp_path):
     with pytest.raises(TwinError, match="no rotary axis"):
         call(slide_artefact, slide_result, "-o", tmp_path / "c.json", "--rotary")
     assert not (tmp_path / "c.json").exists()
+
+
+@pytest.mark.parametrize("angles", ["c=30 deg", "30 deg", ""])
+def test_angles_are_of_axes_that_turn(slide_artefact, slide_result, tmp_path, angles):
+    with pytest.raises(TwinError, match="turns tool or work"):
+        call(slide_artefact, slide_result, "-o", tmp_path / "c.json", "--angles", angles)
+    assert not (tmp_path / "c.json").exists()

@@ -18,6 +18,7 @@ from twin.machine.bodies import Body, bodies_of
 from twin.machine.description import Machine
 from twin.machine.turning import Turning, pieces_of, turning_axes
 from twin.rom.elastic_structure import CutStructure, ElasticStructure
+from twin.rom.springs import SpringSystem
 from twin.rom.turning import HELD, Bearing, FittedPort
 
 Condense = Callable[[Machine, BodyMesh, list[str], csr_array], BodyFlexibility]
@@ -39,35 +40,43 @@ def cut_structure(
     pieces = tuple(piece for own in parts for piece in own)
     meshes = tuple(_mesh(piece, bodies[i]) for piece, i in zip(pieces, owners, strict=True))
     ports = PortTable(meshes)
-    system = spring_system(machine, pieces, ports)
-    first, bearings = len(system.names), []
-    for k, t in enumerate(turning):
-        bearings.append(_bearing(machine, t, k, bodies, pieces, meshes, ports, first))
-        first += 3 * len(bearings[-1].harmonics)
-    more = [f"axes.{turning[b.turn].axis}.bearing[{i}]" for b in bearings for i in range(3 * len(b.harmonics))]
-    system = replace(
-        system,
-        offsets=np.cumsum([0] + [len(n) for n in ports.names]),
-        names=(*system.names, *more),
-        stiffness=np.concatenate([system.stiffness, np.full(len(more), HELD)]),
-        bearings=tuple(bearings),
-    )
+    system = _held(machine, turning, bodies, pieces, meshes, ports)
     loose = {c for t in turning for c in t.bearing}
     apart = machine.model_copy(update={"contacts": {n: c for n, c in machine.contacts.items() if n not in loose}})
-    flexible = []
-    for mesh, i, names, U in zip(meshes, owners, ports.names, ports.matrices(), strict=True):
+
+    def flexible(i: int, mesh: BodyMesh, names: list[str], U: csr_array) -> BodyFlexibility:
         if owners.count(i) == 1:
-            flexible.append(whole[i])
-            continue
+            return whole[i]
         own = condense(apart, mesh, names, U)
         columns = np.concatenate([bodies[i].part(p.name)[1] + np.arange(p.n) for p in mesh.parts])
         H = np.zeros((len(own.H), whole[i].H.shape[1]))
         H[:, columns] = own.H
-        flexible.append(replace(own, H=H))
+        return replace(own, H=H)
+
+    each = tuple(map(flexible, owners, meshes, ports.names, ports.matrices()))
     middles = np.array([mesh.nodes.mean(axis=0) for mesh in meshes])
     size = max(float(np.linalg.norm(b.nodes - m, axis=1).max()) for b, m in zip(meshes, middles, strict=True))
-    structure = ElasticStructure(tuple(flexible), system, middles, size)
+    structure = ElasticStructure(each, system, middles, size)
     return CutStructure(structure, tuple(mesh.name for mesh in meshes), owners, ())
+
+
+def _held(
+    machine: Machine, turning: tuple[Turning, ...], bodies: tuple[BodyMesh, ...], pieces: tuple[Body, ...],
+    meshes: tuple[BodyMesh, ...], ports: PortTable,
+) -> SpringSystem:  # fmt: skip
+    """The springs of the machine and those that hold pieces together at bearings."""
+    system = spring_system(machine, pieces, ports)
+    names, bearings = list(system.names), []
+    for k, t in enumerate(turning):
+        bearings.append(_bearing(machine, t, k, bodies, pieces, meshes, ports, len(names)))
+        names += [f"axes.{t.axis}.bearing[{i}]" for i in range(3 * len(bearings[-1].harmonics))]
+    return replace(
+        system,
+        offsets=np.cumsum([0] + [len(n) for n in ports.names]),
+        names=tuple(names),
+        stiffness=np.concatenate([system.stiffness, np.full(len(names) - len(system.names), HELD)]),
+        bearings=tuple(bearings),
+    )
 
 
 def _mesh(piece: Body, whole: BodyMesh) -> BodyMesh:

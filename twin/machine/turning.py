@@ -68,17 +68,23 @@ def _turning(machine: Machine, name: str) -> Turning | str:
     if not held <= standing:
         return "guides, supports or a scale stand on what it carries, and would have to turn, too"
     parts = tuple(part for part in body.parts if part not in standing)
-    joints = {
-        contact: (a, b) if owner_of(a) in standing else (b, a)
-        for contact, (a, b) in _glued(machine)
-        if owner_of(a) in body.parts and (owner_of(a) in standing) != (owner_of(b) in standing)
-    }
-    tool, work = (owner_of(side.surface) in parts for side in (machine.tcp.tool, machine.tcp.work))
+    joints = _bearing(machine, standing, parts)
     if not joints:
         return "no fixed contact joins what it carries to a part that it turns on"
+    tool, work = (owner_of(side.surface) in parts for side in (machine.tcp.tool, machine.tcp.work))
     if tool == work:
         return "it turns the tool and the work alike" if tool else "it turns neither the tool nor the work"
     return Turning(name, body.name, parts, tuple(joints), tuple(joints.values()), 1 if tool else -1)
+
+
+def _bearing(machine: Machine, standing: set[str], turned: tuple[str, ...]) -> dict[str, tuple[str, str]]:
+    """Fixed contacts between parts that stand and parts that turn: the surface that stands first."""
+    found = {}
+    for contact, pair in _glued(machine):
+        for a, b in (pair, pair[::-1]):
+            if owner_of(a) in standing and owner_of(b) in turned:
+                found[contact] = (a, b)
+    return found
 
 
 def _glued(machine: Machine) -> Iterator[tuple[str, tuple[str, str]]]:
