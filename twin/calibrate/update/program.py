@@ -179,7 +179,7 @@ def replay_update(
     reference, rows = _rows(run, base)
     if not rows:
         where = str(run.folder / "tcp.csv")
-        remedy = f"check the times of tcp.csv; rotary axes ({', '.join(base.turning) or 'none'}) stand at zero there"
+        remedy = "check the times of tcp.csv; a rotary axis that turns tool or work must be at zero"
         raise LogError("no TCP measurement inside the time of the loads", where, remedy)
     model, n, m = program.model, len(base.time) - 1, len(rows)
     values, readings = _temperatures(run, base.time, sensors)
