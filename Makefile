@@ -8,6 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 OUT ?= out
+WHEELS ?= out/wheelhouse
 PYTEST_ARGS ?=
 
 .PHONY: help
@@ -79,8 +80,8 @@ fuzz: $(READY) ## 2,000 damaged descriptions, artefacts and run folders, 1,000 f
 .PHONY: wheelhouse
 wheelhouse: $(READY) ## wheels of twin and all that `twin live` needs, for pip install --no-index beside the machine
 	@mkdir -p .cache && sed -e '/--hash/d' -e 's/ *\\$$//' requirements.lock > .cache/constraints.txt
-	$(BIN)/python -m pip wheel -q --disable-pip-version-check -c .cache/constraints.txt -w out/wheelhouse '.[live,mqtt]'
-	@ls out/wheelhouse | wc -l | xargs -I{} echo "out/wheelhouse: {} wheels"
+	$(BIN)/python -m pip wheel -q --disable-pip-version-check -c .cache/constraints.txt -w $(WHEELS) '.[live,mqtt]'
+	@$(BIN)/python -V | xargs echo "$(WHEELS): $$(ls $(WHEELS) | wc -l) wheels, $$(du -sh $(WHEELS) | cut -f1), for"
 
 .PHONY: demo
 demo: $(READY) ## build, verify and run the shipped five-axis machine; leaves out/ with pictures

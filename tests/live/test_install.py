@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -16,6 +17,7 @@ from twin.cli.main import run
 from twin.live.install.unit import unit_of
 
 ROOT = Path(__file__).parents[2]
+RUN = ROOT / "tests" / "machines" / "spindle" / "runs" / "warm_up"
 GIVEN = ["out/my machine.h5", "--source", "mqtt:broker/loads%1", "--out", "file:out/$now.json", "--state", "out/live"]
 
 
@@ -43,31 +45,147 @@ def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path):
     assert "twin-live" in wrong.stdout + wrong.stderr
 
 
-def test_the_container_file_copies_and_installs_what_the_wheelhouse_makes():
+def container_steps() -> list[tuple[str, str]]:
     text = (resources.files("twin.live.install") / "Containerfile").read_text(encoding="utf-8")
-    steps = [line.split(None, 1) for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    assert [word for word, _ in steps] == ["FROM", "RUN", "COPY", "RUN", "STOPSIGNAL", "ENTRYPOINT"]
-    told = dict(steps[2:])
-    source, target = told["COPY"].split()
-    assert f"-w {source}" in (ROOT / "Makefile").read_text(encoding="utf-8")
-    assert f"--find-links {target} 'twin[live,mqtt]'" in steps[3][1]
+    lines = [line for line in text.replace("\\\n", " ").splitlines() if line.strip() and not line.startswith("#")]
+    return [(word, rest.strip()) for word, _, rest in (line.partition(" ") for line in lines)]
+
+
+def test_the_container_file_installs_what_the_wheelhouse_makes():
+    steps = container_steps()
+    assert [word for word, _ in steps] == ["ARG", "FROM", "RUN", "RUN", "STOPSIGNAL", "ENTRYPOINT"]
+    install = steps[3][1]
+    assert re.search(r"^WHEELS \?= out/wheelhouse$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M)
+    assert "source=out/wheelhouse,target=/wheels" in install
+    assert "--find-links /wheels 'twin[live,mqtt]'" in install
     extras = re.findall(r"^(\w+) = \[", (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.M)
     assert {"live", "mqtt"} <= set(extras)
 
 
-@pytest.mark.slow
-def test_wheels_install_and_run_without_a_network(tmp_path):
-    """Needs a package index to make them; the installation itself is told that there is none."""
-    wheels, venv = tmp_path / "wheels", tmp_path / "venv"
-    made = subprocess.run([sys.executable, "-m", "pip", "wheel", "-q", "-w", str(wheels), f"{ROOT}[live,mqtt]"],
-                          capture_output=True, text=True, check=False)  # fmt: skip
+NEITHER = """
+import sys
+class Nothing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition('.')[0] in ('jax', 'jaxlib', 'numpy', 'scipy', 'h5py', 'pint', 'asyncua', 'paho'):
+            raise ImportError(f'{name} is not installed')
+sys.meta_path.insert(0, Nothing())
+from twin.cli.main import run
+sys.exit(run(sys.argv[1:]))
+"""
+
+
+def without_packages(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """`twin` where only click is installed."""
+    return subprocess.run([sys.executable, "-c", NEITHER, *arguments], capture_output=True, text=True, check=False,
+                          timeout=120)  # fmt: skip
+
+
+def test_a_compiled_machine_runs_without_jax_and_numpy_to_the_same_numbers(spindle, compiled, tmp_path):
+    given = ["--source", f"replay:{RUN}", "--speed", "0", "--out", f"file:{tmp_path / 'now.json'}"]
+    shutil.copytree(compiled, tmp_path / "a" / "engine")
+    assert run(["live", str(spindle), *given, "--state", str(tmp_path / "a")]) == 0
+    (machine,) = compiled.iterdir()
+    carried = tmp_path / "mill"
+    shutil.copytree(machine, carried)
+    done = without_packages("live", str(carried), *given, "--state", str(tmp_path / "b"))
+    assert done.returncode == 0, done.stderr
+    one, other = ((tmp_path / s / "step.json").read_text() for s in "ab")
+    assert json.loads(one) == json.loads(other)
+    assert json.loads(one)["step"] >= 5
+
+
+def test_what_is_no_compiled_machine_is_refused(spindle, compiled, tmp_path, capsys):
+    given = ["--source", f"csv:{tmp_path / 'x.csv'}", "--out", f"file:{tmp_path / 'now.json'}"]
+    state = ["--state", str(tmp_path / "state")]
+    assert run(["live", str(tmp_path), *given, *state]) == 2
+    assert "a folder without a compiled machine" in capsys.readouterr().err
+    (machine,) = compiled.iterdir()
+    assert run(["live", str(machine), *given, *state, "--engine", "jax"]) == 2
+    assert "runs in C alone" in capsys.readouterr().err
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("x")
+    command = [sys.executable, "-m", "twin.live.prepare", str(spindle), str(tmp_path / "mine")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "holds no compiled machine" in done.stderr
+    assert (tmp_path / "mine" / "thesis.txt").is_file()
+
+
+BARE = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
+
+
+@pytest.fixture(scope="module")
+def wheels(tmp_path_factory) -> Path:
+    """What `make wheelhouse` makes; needs a package index."""
+    folder = tmp_path_factory.mktemp("wheels")
+    command = ["make", "-o", f"{sys.prefix}/.ready", f"VENV={sys.prefix}", f"WHEELS={folder}", "wheelhouse"]
+    made = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
     if made.returncode:
         pytest.skip(f"no wheels to be had: {made.stderr[-200:]}")
+    return folder
+
+
+def installed(venv: Path, wheels: Path, *what: str) -> Path:
+    """The Python of a new environment with this, and nothing of a network."""
     subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True)
-    install = ["-m", "pip", "install", "-q", "--no-index", "--find-links", str(wheels), "twin[live,mqtt]"]
-    subprocess.run([str(venv / "bin" / "python"), *install], check=True, env={"PATH": "/usr/bin:/bin"})
-    told = subprocess.run([str(venv / "bin" / "twin"), "live", *GIVEN, "--print-unit"], capture_output=True, text=True,
-                          check=True, cwd=tmp_path, env={"PATH": "/usr/bin:/bin"})  # fmt: skip
-    assert "ExecStart=" in told.stdout
-    code = "import twin.live.mqtt, twin.live.opcua, twin.live.engine_jax, twin.live.prepare, paho.mqtt, asyncua"
-    subprocess.run([str(venv / "bin" / "python"), "-c", code], check=True, cwd=tmp_path, env={"PATH": "/usr/bin:/bin"})
+    python = venv / "bin" / "python"
+    subprocess.run([str(python), "-m", "pip", "install", "-q", "--no-index", "--find-links", str(wheels), *what],
+                   check=True, env=BARE)  # fmt: skip
+    return python
+
+
+@pytest.mark.slow
+def test_wheels_install_and_run_without_a_network(wheels, spindle, tmp_path):
+    python = installed(tmp_path / "all", wheels, "twin[live,mqtt]")
+    twin = str(python.parent / "twin")
+    given = ["--source", f"replay:{RUN}", "--speed", "0", "--out", "file:now.json", "--state"]
+
+    def ran(*command: str) -> None:
+        subprocess.run(command, check=True, cwd=tmp_path, env=BARE)
+
+    ran(twin, "live", str(spindle), *given, "c", "--engine", "c")
+    ran(twin, "live", str(spindle), *given, "jax", "--engine", "jax")
+    ran(str(python), "-c", "import twin.live.mqtt, twin.live.opcua, paho.mqtt, asyncua")
+    ran(str(python), "-m", "twin.live.prepare", str(spindle), "mill")
+    alone = installed(tmp_path / "alone", wheels, "--no-deps", "twin", "click")
+    ran(str(alone.parent / "twin"), "live", "mill", *given, "alone")
+    told = subprocess.run([str(alone.parent / "twin"), "live", str(spindle), *given, "x"], capture_output=True, text=True,
+                          check=False, cwd=tmp_path, env=BARE)  # fmt: skip
+    assert told.returncode == 2
+    assert "compile it where JAX is" in told.stderr
+    one, other = (json.loads((tmp_path / s / "step.json").read_text()) for s in ("c", "alone"))
+    assert one["states"] == other["states"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (shutil.which("buildah") and shutil.which("debootstrap")), reason="no buildah, no debootstrap")
+def test_the_container_is_built_and_runs(wheels, spindle, tmp_path):
+    """On a base that debootstrap makes of the same Debian: an image of a registry would have to be fetched."""
+    if sys.version_info[:2] != (3, 11):
+        pytest.skip("Debian 12 has Python 3.11")
+    base = tmp_path / "base"
+    told = ["debootstrap", "--variant=minbase", "bookworm", str(base)]
+    if subprocess.run(told, capture_output=True, check=False).returncode:
+        pytest.skip("no Debian to be had")
+    shutil.copytree(wheels, tmp_path / "context" / "out" / "wheelhouse")
+    file = tmp_path / "context" / "Containerfile"
+    file.write_text((resources.files("twin.live.install") / "Containerfile").read_text(encoding="utf-8"))
+    store = ["buildah", "--storage-driver", "vfs", "--root", str(tmp_path / "store"), "--runroot", str(tmp_path / "r")]
+
+    def buildah(*arguments: str) -> str:
+        done = subprocess.run([*store, *arguments], capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr[-1000:]
+        return done.stdout.strip()
+
+    (tmp_path / "Base").write_text("FROM scratch\nADD base /\n")
+    buildah("bud", "--isolation", "chroot", "-f", "Base", "-t", "base", ".")
+    buildah("bud", "--isolation", "chroot", "--pull-never", "--build-arg", "BASE=localhost/base", "-f", str(file),
+            "-t", "twin-live", str(file.parent))  # fmt: skip
+    entry = json.loads(buildah("inspect", "--type", "image", "twin-live"))["OCIv1"]["config"]["Entrypoint"]
+    shutil.copytree(RUN, tmp_path / "srv" / "run")
+    shutil.copy(spindle, tmp_path / "srv" / "a.h5")
+    container = buildah("from", "--pull-never", "twin-live")
+    told = buildah("run", "--isolation", "chroot", "-v", f"{tmp_path / 'srv'}:/srv/twin", container, "--", *entry,
+                   "/srv/twin/a.h5", "--source", "replay:/srv/twin/run", "--speed", "0", "--out",
+                   "file:/srv/twin/now.json", "--state", "/srv/twin/state")  # fmt: skip
+    assert re.search(r" [1-9]\d* steps, ", told)

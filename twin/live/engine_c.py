@@ -28,7 +28,8 @@ class CEngine:
         try:
             code = ctypes.CDLL(str(library))
         except OSError as e:
-            raise TwinError(f"cannot be loaded: {e}", str(library), "remove its folder: it is compiled again") from e
+            remedy = "remove its folder: it is compiled again (or compile it on a computer of this kind)"
+            raise TwinError(f"cannot be loaded: {e}", str(library), remedy) from e
         real, machine = ctypes.c_double, ctypes.c_void_p
 
         def function(name: str, result: object, *arguments: object) -> ctypes._NamedFuncPointer:

@@ -13,6 +13,7 @@ from typing import Any
 from twin.errors import TwinError
 
 FACTS_VERSION = 1
+FACTS, LIBRARY = "facts.json", "machine.so"  # files of a compiled machine
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 from twin import __version__
 from twin.errors import ArtefactError, TwinError
 from twin.live.engine import Engine
-from twin.live.facts import read_facts
+from twin.live.facts import FACTS, LIBRARY, read_facts
 
 
 def _files(package: Path) -> list[Path]:
@@ -21,8 +21,11 @@ def _files(package: Path) -> list[Path]:
 def open_engine(artefact: Path, kind: str, folder: Path) -> Engine:
     """The artefact's machine, stepped by "c" or "jax"; compiled code is kept in `folder`, one artefact's at a time.
 
-    Raises ArtefactError for files that are no artefact, TwinError without a compiler.
+    artefact: A.h5, or the folder of a machine compiled elsewhere (`python -m twin.live.prepare`), for computers without
+    JAX or a compiler. Raises ArtefactError for what is neither, TwinError without a compiler.
     """
+    if artefact.is_dir():
+        return _compiled_elsewhere(artefact, kind)
     if kind == "jax":
         from twin.live.engine_jax import JaxEngine
 
@@ -30,13 +33,24 @@ def open_engine(artefact: Path, kind: str, folder: Path) -> Engine:
     from twin.live.engine_c import CEngine
 
     own = folder / _key(artefact)
-    if not (own / "machine.so").is_file():
+    if not (own / LIBRARY).is_file():
         import shutil
 
         for older in folder.glob("*"):
             shutil.rmtree(older, ignore_errors=True)
         _prepare(artefact, own)
-    return CEngine(read_facts(own / "facts.json"), own / "machine.so")
+    return CEngine(read_facts(own / FACTS), own / LIBRARY)
+
+
+def _compiled_elsewhere(machine: Path, kind: str) -> Engine:
+    from twin.live.engine_c import CEngine
+
+    if not (machine / LIBRARY).is_file():
+        remedy = "give A.h5, or the folder that `python -m twin.live.prepare A.h5 FOLDER` has made"
+        raise ArtefactError("a folder without a compiled machine", str(machine), remedy)
+    if kind != "c":
+        raise TwinError("a compiled machine runs in C alone", "--engine", "give A.h5 for --engine jax")
+    return CEngine(read_facts(machine / FACTS), machine / LIBRARY)
 
 
 def _key(artefact: Path) -> str:
@@ -62,5 +76,8 @@ def _prepare(artefact: Path, folder: Path) -> None:
     if done.returncode:
         lines = done.stderr.strip().splitlines() or ["no message"]
         what = lines[0] if done.returncode in (1, 2) and "Traceback" not in lines[0] else lines[-1]
-        remedy = next((line.partition("remedy: ")[2] for line in lines if "remedy: " in line), "try --engine jax")
+        other = "try --engine jax"
+        if "ModuleNotFoundError" in lines[-1]:
+            other = "compile it where JAX is, `python -m twin.live.prepare A.h5 FOLDER`, and give FOLDER here"
+        remedy = next((line.partition("remedy: ")[2] for line in lines if "remedy: " in line), other)
         raise TwinError(f"no C engine: {what}", "--engine", remedy)

@@ -20,7 +20,7 @@ from twin.errors import TwinError
 from twin.export.c.source import Source, source_of
 from twin.export.c.text import identifier, named
 from twin.export.compiler import own_compiler
-from twin.live.facts import Axis, Channel, Facts, write_facts
+from twin.live.facts import FACTS, LIBRARY, Axis, Channel, Facts, write_facts
 from twin.rom.artefact import Artefact, read_artefact
 from twin.rom.drive import needed_signals
 from twin.run.correction import PoseErrors, default_degrees
@@ -28,7 +28,6 @@ from twin.run.correction_axes import axis_jacobian, offset_matrix
 from twin.run.correction_polynomial import design_matrix, normalised_axes
 from twin.run.correction_struts import on_struts
 
-FACTS, LIBRARY = "facts.json", "machine.so"
 _FLAGS = ("-std=c99", "-O3", "-shared", "-fPIC")
 
 
@@ -78,8 +77,11 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
 def prepare(path: Path, folder: Path) -> None:
     """Write the facts and the library of the artefact at `path` to `folder`.
 
-    Raises ArtefactError for files that are none, TwinError without a C compiler and where compiling fails.
+    Raises ArtefactError for files that are none, TwinError without a C compiler, where compiling fails, and for a folder
+    of other things.
     """
+    if folder.exists() and not (folder / LIBRARY).is_file():
+        raise TwinError("is there and holds no compiled machine", str(folder), "name a new folder")
     artefact = read_artefact(path)
     source = source_of(artefact)
     facts = facts_of(artefact, source.flags)
@@ -105,6 +107,8 @@ def _compile(source: Source, folder: Path) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit("usage: python -m twin.live.prepare A.h5 FOLDER    (the folder runs with `twin live FOLDER ...`)")
     try:
         prepare(Path(sys.argv[1]), Path(sys.argv[2]))
     except TwinError as error:
