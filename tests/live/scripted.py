@@ -92,7 +92,7 @@ class Lag:
 class Listed:
     """Gives what it is told to, in order; an element may be None: nothing arrives."""
 
-    numbered, speed = True, 0.0
+    numbered, speed, error = True, 0.0, ""
 
     def __init__(self, arrivals: Sequence[Block | Damaged | None], stored: Sequence[Block] = (), numbered: bool = True):
         self.arrivals, self.store, self.numbered = list(arrivals), {b.sequence: b for b in stored}, numbered
@@ -117,6 +117,9 @@ class Listed:
 
     def fetch(self, stream: int, numbers: Sequence[int]) -> Sequence[Block]:
         return [self.store[n] for n in numbers if n in self.store]
+
+    def release(self, held: Sequence[Block]) -> None:
+        self.held = held
 
     def close(self) -> None:
         return

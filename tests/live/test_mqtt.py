@@ -9,15 +9,23 @@ import socket
 import subprocess
 import time
 from array import array
+from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
 
 import pytest
 
 paho = pytest.importorskip("paho.mqtt.client")
+x509 = pytest.importorskip("cryptography.x509")
+
+from cryptography.hazmat.primitives import hashes, serialization  # noqa: E402
+from cryptography.hazmat.primitives.asymmetric import ec  # noqa: E402
+from cryptography.x509.oid import NameOID  # noqa: E402
 
 from tests.live.scripted import FACTS, NAMES, UNITS, Kept, runtime  # noqa: E402
 from twin.errors import TwinError  # noqa: E402
 from twin.live.block import Block, frame_of  # noqa: E402
 from twin.live.channels import Channels, read_channels  # noqa: E402
+from twin.live.journal import Position  # noqa: E402
 from twin.live.mqtt import MqttSink, MqttSource, read_message  # noqa: E402
 from twin.live.sinks import Sent  # noqa: E402
 from twin.live.source import Mark  # noqa: E402
@@ -32,7 +40,7 @@ BEGIN = 1.7e9
 class Broker:
     """A broker in a process of its own, which keeps sessions over its own death."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, lines=""):
         self.folder = folder
         with socket.socket() as s:
             s.bind(("127.0.0.1", 0))
@@ -40,7 +48,7 @@ class Broker:
         subprocess.run(["mosquitto_passwd", "-b", "-c", "users", "twin", "right"], cwd=folder, check=True)
         (folder / "broker.conf").write_text(
             f"listener {self.port} 127.0.0.1\npassword_file {folder}/users\npersistence true\n"
-            f"persistence_location {folder}/\nuser root\n"
+            f"persistence_location {folder}/\nuser root\n{lines}"
         )
         self.start()
 
@@ -57,13 +65,15 @@ class Broker:
         self.process.terminate()
         self.process.wait(10)
 
-    def channels(self, password="right") -> Channels:
-        (self.folder / "channels.toml").write_text('[mqtt]\nuser = "twin"\npassword_file = "secret"\n')
+    def channels(self, password="right", more="") -> Channels:
+        (self.folder / "channels.toml").write_text('[mqtt]\nuser = "twin"\npassword_file = "secret"\n' + more)
         (self.folder / "secret").write_text(password + "\n")
         return read_channels(self.folder / "channels.toml", FACTS)
 
-    def sender(self):
+    def sender(self, ca=None):
         client = paho.Client(paho.CallbackAPIVersion.VERSION2)
+        if ca:
+            client.tls_set(ca)
         client.username_pw_set("twin", "right")
         client.connect("127.0.0.1", self.port)
         client.loop_start()
@@ -116,7 +126,7 @@ def test_blocks_arrive_and_what_came_while_nobody_listened_comes_later(broker, t
     assert polled(first, 1, 2.0) == []
     send(client, "machine/loads", 0, 1)
     assert [b.sequence for b in polled(first, 2)] == [0, 1]
-    first.poll(0.0)  # acknowledged
+    first.release(())  # both are in the journal
     first.close()
     send(client, "machine/loads", 2, 3)
     broker.stop()
@@ -132,19 +142,41 @@ def test_blocks_arrive_and_what_came_while_nobody_listened_comes_later(broker, t
     client.loop_stop()
 
 
-def test_what_was_taken_but_not_kept_comes_again(broker):
+def test_what_was_taken_but_is_not_in_the_journal_comes_again(broker):
     place, client = f"127.0.0.1:{broker.port}/loads", broker.sender()
     killed = MqttSource(place, broker.channels())
     killed.resume(None)
     polled(killed, 1, 1.0)
-    send(client, "loads", 0)
-    assert len(polled(killed, 1)) == 1
-    killed._connection.client.loop_stop()  # dies before the next poll
+    send(client, "loads", 0, 2)
+    assert [b.sequence for b in polled(killed, 2)] == [0, 2]
+    killed.release((block(2),))  # it waits for block 1
+    time.sleep(0.3)
+    killed._connection.client.loop_stop()  # dies
     killed._connection.client._sock_close()
     after = MqttSource(place, broker.channels())
     after.resume(None)
-    assert [b.sequence for b in polled(after, 1)] == [0]
+    assert [b.sequence for b in polled(after, 2, 3.0)] == [2]
     after.close()
+    client.loop_stop()
+
+
+def test_blocks_that_wait_for_a_missing_one_are_not_acknowledged(broker, tmp_path):
+    client = broker.sender()
+    source = MqttSource(f"127.0.0.1:{broker.port}/loads", broker.channels())
+    made = runtime(tmp_path / "state", source, Kept())
+    made.begin(True)
+    made.once(1.0)
+    send(client, "loads", 0, 2, 3, 0)
+    until = time.monotonic() + 15.0
+    while made.resolver.counts.repeated < 1 and time.monotonic() < until:
+        made.once(0.3)
+    assert [b.sequence for _, b in source._taken] == [2, 3]
+    send(client, "loads", 1)
+    while made.resolver.counts.delivered < 4 and time.monotonic() < until:
+        made.once(0.3)
+    assert source._taken == []
+    assert [b.sequence for b in made.journal.since(Position(0, 0))] == [0, 1, 2, 3]
+    made.close()
     client.loop_stop()
 
 
@@ -197,3 +229,73 @@ def test_the_process_counts_lost_and_repeated_blocks(broker, tmp_path):
 def test_a_place_without_a_topic_is_refused():
     with pytest.raises(TwinError, match="names no topic of a broker"):
         MqttSource("127.0.0.1:1883", Channels())
+
+
+def authority(folder, name):
+    """A certificate authority, NAME.pem, and a broker's certificate by it, NAME-broker.pem with its key."""
+    now = datetime.now(UTC)
+
+    def written(stem, subject, issuer, public, signer, extension):
+        made = (
+            x509.CertificateBuilder()
+            .subject_name(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, subject)]))
+            .issuer_name(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, issuer)]))
+            .public_key(public).serial_number(x509.random_serial_number())
+            .not_valid_before(now - timedelta(days=1)).not_valid_after(now + timedelta(days=1))
+            .add_extension(extension, critical=False).sign(signer, hashes.SHA256())
+        )  # fmt: skip
+        (folder / f"{stem}.pem").write_bytes(made.public_bytes(serialization.Encoding.PEM))
+
+    root, own = (ec.generate_private_key(ec.SECP256R1()) for _ in range(2))
+    written(name, name, name, root.public_key(), root, x509.BasicConstraints(ca=True, path_length=None))
+    address = x509.SubjectAlternativeName([x509.IPAddress(ip_address("127.0.0.1"))])
+    written(f"{name}-broker", "broker", name, own.public_key(), root, address)
+    (folder / f"{name}-broker.key").write_bytes(
+        own.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
+    )
+
+
+@pytest.fixture
+def encrypted(tmp_path):
+    for name in ("plant", "stranger"):
+        authority(tmp_path, name)
+    made = Broker(tmp_path, f"certfile {tmp_path}/plant-broker.pem\nkeyfile {tmp_path}/plant-broker.key\n")
+    yield made
+    made.stop()
+
+
+def test_blocks_and_corrections_go_encrypted_with_a_password(encrypted, tmp_path):
+    place, client = f"127.0.0.1:{encrypted.port}", encrypted.sender(str(tmp_path / "plant.pem"))
+    channels = encrypted.channels(more='ca = "plant.pem"\n')
+    source = MqttSource(f"{place}/loads", channels)
+    source.resume(None)
+    polled(source, 1, 1.0)
+    send(client, "loads", 0)
+    assert polled(source, 1) == [block(0)]
+    assert source.error == ""
+    source.close()
+    for count in (1, 2):
+        sink = MqttSink(FACTS, "grid", f"{place}/offsets", channels)
+        assert sink.last() == (None if count == 1 else ((1e-6, 2e-6, 3e-6),))
+        sink.write(Sent(count, 1e9, 1e9 + 5.0, "following", "", ((count * 1e-6, 2e-6, 3e-6),)))
+        time.sleep(0.3)
+        sink.close()
+    client.loop_stop()
+
+
+@pytest.mark.parametrize(
+    ("password", "more", "told"),
+    [
+        ("right", 'ca = "stranger.pem"\n', "CERTIFICATE_VERIFY_FAILED"),
+        ("wrong", 'ca = "plant.pem"\n', "refused: Not authorized"),
+        ("right", "", "cannot be reached"),  # not encrypted
+    ],
+)
+def test_a_broker_of_another_authority_a_wrong_password_and_no_encryption_are_refused(encrypted, password, more, told):
+    source = MqttSource(f"127.0.0.1:{encrypted.port}/loads", encrypted.channels(password, more))
+    source.resume(None)
+    assert polled(source, 1, 2.5) == []
+    assert told in source.error
+    source.close()
+    with pytest.raises(TwinError, match="ca, certificate or key"):
+        MqttSource("127.0.0.1:1/loads", encrypted.channels(more='ca = "secret"\n'))

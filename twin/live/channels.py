@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ _KEYS = {"opcua", "mqtt", "channels", "outputs"}
 _CHANNEL = {"node", "unit", "low", "high", "rate"}
 _OPCUA = {"interval", "certificate", "key", "server_certificate", "user", "password_file", "heartbeat"}
 _MQTT = {"user", "password_file", "ca", "certificate", "key", "client"}
+_FILES = ("certificate", "key", "server_certificate", "ca", "password_file")
 _OUTPUTS = {"offsets", "count", "good_until", "mode"}
 
 
@@ -28,6 +30,13 @@ class Channels:
     nodes: dict[str, tuple[str, str]] = field(default_factory=dict)  # column -> node, unit
     limits: dict[str, dict[str, float]] = field(default_factory=dict)  # column -> low, high, rate in SI
     outputs: dict[str, str] = field(default_factory=dict)
+
+    def refuse_missing(self, name: str) -> None:
+        """Raises TwinError for a file that the table `name` names and that is not there."""
+        told = {"opcua": self.opcua, "mqtt": self.mqtt}[name]
+        for key in _FILES:
+            if key in told and not (self.folder / told[key]).is_file():
+                raise TwinError(f"{key}: no file '{told[key]}'", name, "paths are relative to the channels file")
 
 
 def read_channels(path: Path | None, facts: Facts) -> Channels:
@@ -45,9 +54,13 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
     _known(told.get("opcua", {}), _OPCUA, path, "opcua")
     _known(told.get("mqtt", {}), _MQTT, path, "mqtt")
     _known(told.get("outputs", {}), _OUTPUTS, path, "outputs")
+    _whole(told.get("opcua", {}), path, "opcua")
+    _whole(told.get("mqtt", {}), path, "mqtt")
     units = {c.column: c.unit for c in facts.channels} | dict.fromkeys(facts.sensors, "degC")
     nodes, limits = {}, {}
-    for column, own in told.get("channels", {}).items():
+    named = told.get("channels", {})
+    _known(named, set(named), path, "channels")
+    for column, own in named.items():
         if column not in units:
             raise TwinError(f"no channel '{column}'", str(path), f"channels are: {', '.join(units)}")
         _known(own, _CHANNEL, path, f"channels.{column}")
@@ -56,10 +69,34 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
             nodes[column] = (str(own["node"]), str(own.get("unit", unit)))
             _checked(own.get("unit", unit), unit, where)
         limits[column] = {k: _si(own[k], unit, k, where) for k in ("low", "high", "rate") if k in own}
+        if limits[column].get("low", -math.inf) >= limits[column].get("high", math.inf):
+            raise TwinError("low is not below high", where, "exchange them")
     return Channels(path.parent, told.get("opcua", {}), told.get("mqtt", {}), nodes, limits, told.get("outputs", {}))
 
 
+def _whole(told: dict[str, Any], path: Path, name: str) -> None:
+    """Raises TwinError for what is of no use without its companion, and for what is no text."""
+    for key, other in (("user", "password_file"), ("certificate", "key"), ("key", "certificate")):
+        if key in told and other not in told and (name, key) != ("mqtt", "user"):
+            raise TwinError(f"{key} without {other}", f"{path}: {name}", f"write {other} = \"...\" beside it")
+    for key, value in told.items():
+        if not isinstance(value, str) and key != "interval":
+            raise TwinError(f"{key} is no text", f"{path}: {name}", f'write {key} = "..."')
+    _interval(told.get("interval", "0.1 s"), path, name)
+
+
+def _interval(value: Any, path: Path, name: str) -> None:
+    try:
+        sound = 0.0 < to_si(value, "s") < 3600.0
+    except (ValueError, TypeError):
+        sound = False
+    if not sound:
+        raise TwinError(f"interval: {value!r} is no time above zero", f"{path}: {name}", 'write interval = "0.1 s"')
+
+
 def _known(table: dict[str, Any], keys: set[str], path: Path, name: str) -> None:
+    if not isinstance(table, dict):
+        raise TwinError(f"{name} is no table", str(path), f"write [{name}] and keys below it")
     unknown = [k for k in table if k not in keys]
     if unknown:
         raise TwinError(

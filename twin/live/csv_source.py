@@ -49,6 +49,13 @@ class CsvSource:
     def fetch(self, stream: int, numbers: Sequence[int]) -> Sequence[Block]:
         return ()
 
+    def release(self, held: Sequence[Block]) -> None:
+        return
+
+    @property
+    def error(self) -> str:
+        return "" if self._file.path.is_file() else f"there is no file {self._file.path} yet"
+
     def poll(self, wait: float) -> Sequence[Block | Damaged]:
         until = clock.monotonic() + wait
         while True:

@@ -1,9 +1,8 @@
 """MQTT 3.1.1: blocks of load records from a topic, corrections to another one (package paho-mqtt, extra `mqtt`).
 
 A message is one block: a frame as in docs/load_blocks.md, or the same as JSON. The session is kept by the broker under
-one client name, and a message is acknowledged only when the next poll shows that it was taken in: what comes while this
-process is dead, and what it had not yet taken in, is delivered later (QoS 1), perhaps twice, which the numbers of the
-blocks show. Messages of QoS 0 are lost then, which the numbers show, too.
+one client name, and a message is acknowledged only when its block is in the journal: what comes while this process is
+dead, and what had not yet come that far, is delivered later (QoS 1), perhaps twice, which the numbers of the blocks show. Messages of QoS 0 are lost then, which the numbers show, too.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ import json
 import math
 import queue
 import socket
+import sys
 import zlib
 from array import array
 from collections.abc import Sequence
@@ -52,9 +52,7 @@ class _Connection:
         own = channels.mqtt
         if not host or not self.topic or not (port or "1883").isdigit():
             raise TwinError(f"'{place}' names no topic of a broker", "mqtt", "write mqtt:HOST:PORT/TOPIC")
-        for key in ("ca", "certificate", "key", "password_file"):
-            if key in own and not (channels.folder / own[key]).is_file():
-                raise TwinError(f"{key}: no file '{own[key]}'", "mqtt", "paths are relative to the channels file")
+        channels.refuse_missing("mqtt")
         self.error = f"{at} cannot be reached"
         self.client = paho.Client(paho.CallbackAPIVersion.VERSION2, name, clean_session=not keep, manual_ack=True)
         if "user" in own:
@@ -64,9 +62,14 @@ class _Connection:
             )
         if "ca" in own:
             files = {k: str(channels.folder / own[k]) if k in own else None for k in ("ca", "certificate", "key")}
-            self.client.tls_set(files["ca"], files["certificate"], files["key"])
+            try:
+                self.client.tls_set(files["ca"], files["certificate"], files["key"])
+            except (OSError, ValueError) as e:  # ssl.SSLError is an OSError
+                remedy = "give files in PEM, the key to its certificate and without a password"
+                raise TwinError(f"ca, certificate or key: {e}", "mqtt", remedy) from e
         self.client.reconnect_delay_set(1, AGAIN)
         self.client.on_connect = self._connected
+        self.client.on_connect_fail = self._unreachable
         self.client.on_disconnect = self._lost
         self.subscribed = ""
         self._place = (host, int(port or ("8883" if "ca" in own else "1883")))
@@ -84,6 +87,9 @@ class _Connection:
             client.subscribe(self.subscribed, qos=1)
         else:
             self.error = ""
+
+    def _unreachable(self, client: Any, _: Any) -> None:
+        self.error = f"{self._place[0]}:{self._place[1]} cannot be reached: {sys.exc_info()[1]}"  # called while it is handled
 
     def _lost(self, client: Any, _: Any, flags: Any, reason: Any, properties: Any) -> None:
         self.error = self.error or f"connection lost: {reason}"
@@ -105,26 +111,39 @@ class MqttSource:
         name = channels.mqtt.get("client", f"twin-live-{zlib.crc32(f'{socket.gethostname()} {place}'.encode()):08x}")
         self._connection = _Connection(place, channels, name, keep=True)
         self._arrived: queue.Queue[Any] = queue.Queue(WAITING)
-        self._taken: list[Any] = []  # given out, not acknowledged
+        self._taken: list[tuple[Any, Block | Damaged]] = []  # given out, not acknowledged
         self._connection.client.on_message = lambda client, _, message: self._arrived.put(message)
 
     def resume(self, mark: Mark | None) -> None:
         self._connection.begin(subscribe=True)
 
+    @property
+    def error(self) -> str:
+        return self._connection.error
+
     def poll(self, wait: float) -> Sequence[Block | Damaged]:
-        for message in self._taken:
-            self._connection.client.ack(message.mid, message.qos)
-        self._taken = []
+        messages: list[Any] = []
         try:
-            self._taken.append(self._arrived.get(timeout=wait))
-            while len(self._taken) < WAITING:
-                self._taken.append(self._arrived.get_nowait())
+            messages.append(self._arrived.get(timeout=wait))
+            while len(messages) < WAITING:
+                messages.append(self._arrived.get_nowait())
         except queue.Empty:
             pass
-        return [read_message(message.payload) for message in self._taken]
+        found = [read_message(message.payload) for message in messages]
+        self._taken += zip(messages, found, strict=True)
+        return found
 
     def fetch(self, stream: int, numbers: Sequence[int]) -> Sequence[Block]:
         return ()
+
+    def release(self, held: Sequence[Block]) -> None:
+        waiting = {(block.stream, block.sequence) for block in held}
+        before, self._taken = self._taken, []
+        for message, block in before:
+            if isinstance(block, Block) and (block.stream, block.sequence) in waiting:
+                self._taken.append((message, block))
+            else:
+                self._connection.client.ack(message.mid, message.qos)
 
     def close(self) -> None:
         self._connection.close()

@@ -44,11 +44,10 @@ class Connection:
             raise TwinError("the package asyncua is missing", url, "python -m pip install 'twin[live]'") from e
         self.url, self.channels, self._api = url, channels, asyncua.sync
         self._client: Any = None
+        self.error = f"{url} cannot be reached"
         self._tried = -math.inf
         own = channels.opcua
-        for key in ("certificate", "key", "password_file", "server_certificate"):
-            if key in own and not (channels.folder / own[key]).is_file():
-                raise TwinError(f"{key}: no file '{own[key]}'", "opcua", "paths are relative to the channels file")
+        channels.refuse_missing("opcua")
         for key in ("certificate", "server_certificate"):
             if key in own:
                 _refuse_expired(channels.folder / own[key], key)
@@ -58,7 +57,7 @@ class Connection:
         if self._client is not None:
             return self._client
         if time.monotonic() - self._tried < AGAIN:
-            raise ConnectionError(f"{self.url} cannot be reached")
+            raise ConnectionError(self.error or f"{self.url} cannot be reached")
         self._tried = time.monotonic()
         client = self._api.Client(self.url, timeout=TIMEOUT)
         own = self.channels.opcua
@@ -74,8 +73,9 @@ class Connection:
             client.connect()
         except Exception as e:  # refused, wrong password, certificate: whatever it is, it is tried again
             self._drop(client)
-            raise ConnectionError(f"{self.url}: {type(e).__name__} {e}"[:200]) from e
-        self._client = client
+            self.error = f"{self.url}: {type(e).__name__} {e}"[:200]
+            raise ConnectionError(self.error) from e
+        self._client, self.error = client, ""
         return client
 
     def lose(self) -> None:
@@ -144,6 +144,13 @@ class OpcUaSource:
 
     def fetch(self, stream: int, numbers: Sequence[int]) -> Sequence[Block]:
         return ()
+
+    def release(self, held: Sequence[Block]) -> None:
+        return
+
+    @property
+    def error(self) -> str:
+        return self._connection.error
 
     def poll(self, wait: float) -> Sequence[Block | Damaged]:
         until = time.time() + wait

@@ -30,6 +30,10 @@ class RingSource:
     def resume(self, mark: Mark | None) -> None:
         self._at = None if mark is None else (mark.stream, mark.sequence + 1)
 
+    @property
+    def error(self) -> str:
+        return "" if self._reader is not None else f"there is no ring {self.path} yet"
+
     def poll(self, wait: float) -> Sequence[Block | Damaged]:
         until = time.monotonic() + wait
         while True:
@@ -42,6 +46,9 @@ class RingSource:
         if self._reader is None:
             return ()
         return [b for n in numbers if (b := self._reader.read(stream, n)) is not None]
+
+    def release(self, held: Sequence[Block]) -> None:
+        return
 
     def close(self) -> None:
         if self._reader is not None:

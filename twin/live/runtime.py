@@ -115,6 +115,7 @@ class Runtime:
         for block in blocks:
             self._take(block)
             self.latency.take(time.perf_counter() - arrived)
+        self.source.release(self.resolver.held())
         self._tell()
         return bool(arrivals)
 
@@ -244,8 +245,10 @@ class Runtime:
             "certificate": facts.certificate,
             "mode": publisher.mode,
             "words": publisher.words,
-            "trust": _trust(publisher, flags, alarms, [f"{k} {v}" for k, v in intake.wrong.items()]),
+            "trust": _trust(publisher, flags, alarms, [f"{k} {v}" for k, v in intake.wrong.items()],
+                            self.source.error),
             "input": {
+                "source_error": self.source.error,
                 "age_s": publisher.age(self.clock.now()),
                 "records": intake.records,
                 "records_before_start": intake.dropped,
@@ -321,6 +324,7 @@ class Runtime:
         self._write_step()
         self.files.write(self.health())
         self.journal.close()
+        self.source.release(self.resolver.held())
         self.source.close()
         self.publisher.close()
         os.close(self._lock)
@@ -334,10 +338,10 @@ def _resident() -> int:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _trust(publisher: Publisher, flags: list[str], alarms: list[str], wrong: list[str]) -> str:
+def _trust(publisher: Publisher, flags: list[str], alarms: list[str], wrong: list[str], error: str) -> str:
     """Can I trust it? In one line."""
     if publisher.mode != "following":
-        return f"no: {publisher.words}"
+        return f"no: {publisher.words}" + (f"; {error}" if error else "")
     doubts = [*alarms, *(f"outside what was certified: {f}" for f in flags), *(f"column {w}" for w in wrong)]
     if publisher.limited:
         doubts.append("the correction is cut to its absolute limit")

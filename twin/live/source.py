@@ -28,6 +28,10 @@ class Source(Protocol):
     speed: float  # times real time; 0: as fast as they are taken
     ended: bool  # nothing more will come
 
+    @property
+    def error(self) -> str:
+        """Why nothing can come now; empty where something can."""
+
     def resume(self, mark: Mark | None) -> None:
         """Go on after the last block of the journal, as far as what came since is stored; None: from the beginning.
 
@@ -39,6 +43,9 @@ class Source(Protocol):
 
     def fetch(self, stream: int, numbers: Sequence[int]) -> Sequence[Block]:
         """Those of these blocks that are stored at the source."""
+
+    def release(self, held: Sequence[Block]) -> None:
+        """All that was given out is in the journal or was left out for good, but for `held`, which waits."""
 
     def close(self) -> None: ...
 

@@ -144,6 +144,10 @@ class Resolver(Generic[B]):
         """Blocks that wait for missing ones."""
         return len(self._waiting)
 
+    def held(self) -> tuple[B, ...]:
+        """Blocks that have arrived and neither gone out nor been left out for good."""
+        return (*self._waiting.values(), *(() if self._leapt is None else (self._leapt,)))
+
     def go_on(self, stream: int, following: int) -> None:
         """Before the first arrival: everything of a stream below the number `following` has been given before."""
         self._begin(stream, following)
