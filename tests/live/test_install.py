@@ -143,8 +143,8 @@ def test_wheels_install_and_run_without_a_network(wheels, spindle, tmp_path):
     def ran(*command: str) -> None:
         subprocess.run(command, check=True, cwd=tmp_path, env=BARE)
 
-    ran(twin, "live", str(spindle), *given, "c", "--engine", "c")
-    ran(twin, "live", str(spindle), *given, "jax", "--engine", "jax")
+    ran(twin, "live", str(spindle), *given, "state-c", "--engine", "c")
+    ran(twin, "live", str(spindle), *given, "state-jax", "--engine", "jax")
     ran(str(python), "-c", "import twin.live.mqtt, twin.live.opcua, paho.mqtt, asyncua")
     ran(str(python), "-m", "twin.live.prepare", str(spindle), "mill")
     alone = installed(tmp_path / "alone", wheels, "--no-deps", "twin", "click")
@@ -153,7 +153,7 @@ def test_wheels_install_and_run_without_a_network(wheels, spindle, tmp_path):
                           check=False, cwd=tmp_path, env=BARE)  # fmt: skip
     assert told.returncode == 2
     assert "compile it where JAX is" in told.stderr
-    one, other = (json.loads((tmp_path / s / "step.json").read_text()) for s in ("c", "alone"))
+    one, other = (json.loads((tmp_path / s / "step.json").read_text()) for s in ("state-c", "alone"))
     assert one["states"] == other["states"]
 
 
