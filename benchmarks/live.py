@@ -259,26 +259,30 @@ def long_replay(folder: Path, engines: Path) -> None:
     state = folder / "state"
     shutil.copytree(engines, state / "engine")
     began = time.perf_counter()
-    process = subprocess.Popen(command(f"replay:{csv.parent}", [f"file:{folder / 'c.json'}"], state, "--speed", "0",
+    process = subprocess.Popen(command(f"replay:{csv.parent}", [f"ring:{folder / 'c'}"], state, "--speed", "0",
                                        "--journal", "1"), stdout=subprocess.PIPE, text=True)  # fmt: skip
     seen: list[tuple[float, float, float]] = []
+    spent = 0.0
     while process.poll() is None:
-        time.sleep(0.2)
+        time.sleep(1.0)
         try:
             day = json.loads((state / "health.json").read_text())["model"]["time_s"] / 86400.0
-            resident = memory(process.pid, "VmRSS")
+            resident, spent = memory(process.pid, "VmRSS"), max(cpu(process.pid), spent)
         except (OSError, ValueError):
             continue
         disk = sum(p.stat().st_size for p in state.rglob("*") if p.is_file() and "engine" not in p.parts) / 2**20
-        seen.append((day, resident, disk))
-    took = time.perf_counter() - began
+        if resident:
+            seen.append((day, resident, disk))
     told = json.loads((state / "health.json").read_text())
-    after = np.array([s for s in seen if s[0] >= min(6.0, DAYS / 4)])
-    first, last = after[: len(after) // 4], after[-(len(after) // 4) :]
-    print(f"   {told['model']['time_s'] / 86400:.0f} days, {told['model']['steps']:,} steps in {took:.0f} s "
-          f"({1e3 * took / told['model']['steps']:.1f} ms each): resident {first[:, 1].mean():.1f} MB then "
-          f"{last[:, 1].mean():.1f} MB, at most {after[:, 1].max():.1f}; state folder {first[:, 2].mean():.2f} then "
-          f"{last[:, 2].mean():.2f} MB, at most {after[:, 2].max():.2f} (journal of 1 MB)")  # fmt: skip
+    after = np.array([s for s in seen if s[0] >= 1.0])
+    first, last = after[0], after[-max(len(after) // 10, 1) :]
+    full = after[after[:, 2].argmax()]
+    steps = told["model"]["steps"]
+    print(f"   {told['model']['time_s'] / 86400:.0f} days, {steps:,} steps in {time.perf_counter() - began:.0f} s, "
+          f"{1e3 * spent / steps:.2f} ms of a core each: resident {first[1]:.1f} MB after day {first[0]:.0f}, then at "
+          f"most {after[:, 1].max():.1f}, in the last tenth {last[:, 1].mean():.1f}; state folder {first[2]:.2f} MB, at "
+          f"most {full[2]:.2f} on day {full[0]:.0f}, in the last tenth {last[:, 2].mean():.2f} (journal of 1 MB, full "
+          f"after five days)")  # fmt: skip
 
 
 def main() -> None:

@@ -149,8 +149,8 @@ def test_wheels_install_and_run_without_a_network(wheels, spindle, tmp_path):
     ran(str(python), "-m", "twin.live.prepare", str(spindle), "mill")
     alone = installed(tmp_path / "alone", wheels, "--no-deps", "twin", "click")
     ran(str(alone.parent / "twin"), "live", "mill", *given, "alone")
-    told = subprocess.run([str(alone.parent / "twin"), "live", str(spindle), *given, "x"], capture_output=True, text=True,
-                          check=False, cwd=tmp_path, env=BARE)  # fmt: skip
+    command = [str(alone.parent / "twin"), "live", str(spindle), *given, "x"]
+    told = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, env=BARE)
     assert told.returncode == 2
     assert "compile it where JAX is" in told.stderr
     one, other = (json.loads((tmp_path / s / "step.json").read_text()) for s in ("state-c", "alone"))

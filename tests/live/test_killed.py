@@ -21,6 +21,7 @@ from twin.face.live import LiveOptions, live, wired
 from twin.live.block import Block
 from twin.live.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from twin.live.csv_rows import GrowingFile
+from twin.live.csv_source import replay_of
 from twin.live.journal import Journal, Position
 from twin.live.ring import RingReader, RingWriter
 from twin.logs.block_file import read_blocks
@@ -239,3 +240,16 @@ def test_the_journal_of_a_file_is_the_run_again(spindle, state, tmp_path):
     given, again = read_run(RUN).loads, read_run(tmp_path / "again").loads
     assert again.time.tolist() == given.time[:100].tolist()
     assert again.columns["x_position"] == pytest.approx(given.columns["x_position"][:100], rel=1e-14)
+
+
+def test_a_column_that_loads_and_temperatures_share_is_taken_once_and_the_journal_can_be_read(tmp_path):
+    (tmp_path / "loads.csv").write_text("time [s],air [degC],x_current [A]\n0,20,1\n10,20,2\n20,20,3\n")
+    (tmp_path / "temperatures.csv").write_text("time [s],front [degC],air [degC]\n0,21,99\n10,22,99\n")
+    (found,) = replay_of(tmp_path, 0.0).poll(1.0)
+    assert isinstance(found, Block)
+    assert found.names == ("air", "x_current", "front")
+    assert list(found.values) == [20, 1, 21, 20, 2, 22, 20, 3, 22]
+    journal = Journal(tmp_path / "journal", 1 << 20)
+    journal.append(found)
+    journal.close()
+    assert list(Journal(tmp_path / "journal", 1 << 20).since(Position(0, 0))) == [found]

@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 import math
 import os
+from array import array
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +17,14 @@ import twin
 from tests.live.scripted import FACTS, Kept, Lag, Listed, block
 from twin.cli.main import run as command
 from twin.errors import TwinError
-from twin.face.live import LiveOptions, live
+from twin.face.live import LiveOptions, live, wired
+from twin.live.block import Block
 from twin.live.clock import RecordClock
+from twin.live.csv_source import replay_of
+from twin.live.filter_gain import GainFilter
 from twin.live.gate import limits_of
 from twin.live.intake import Intake
+from twin.live.learner import Learner
 from twin.live.learning import Learning
 from twin.live.limiter import Limits
 from twin.live.offsets import neutral, offsets
@@ -33,7 +40,7 @@ ALL = [block(k, (0.25, 8.0, 20.0)) for k in range(600)]  # 100 min
 def runtime(folder: Path, source: Listed, events: Path) -> Runtime:
     sink = Kept()
     publisher = Publisher([sink], neutral(FACTS, "grid"), "grid", Limits(200e-6, 1e-6, 1.0), Patience(60.0, 600.0))
-    learning = Learning(FACTS, events, folder)
+    learning = Learning(FACTS, Learner(FACTS, GainFilter(FACTS.all_poses)), events, folder)
     intake = Intake(Lag(), limits_of(FACTS, {}), None, True, learning)
     return Runtime(intake, source, publisher, RecordClock(), Keeping(folder, checkpoint=1200.0, pause=0.0))
 
@@ -68,6 +75,61 @@ def test_a_machine_that_is_warmer_is_followed_as_by_twin_update(spindle, compile
     assert np.abs(moved - corrected).max() < 0.05 * np.abs(expected.correction[-1]).max()
 
 
+def cut_up(block: Block, n: int = 3) -> Iterator[Block]:
+    """The same rows as blocks of n."""
+    for k in range(0, block.records, n):
+        values = block.values[k * len(block.names) : (k + n) * len(block.names)]
+        yield replace(block, sequence=k + n, time=block.time + k * block.interval, values=values)
+
+
+def test_temperatures_and_r_tests_are_followed_as_by_the_filter_state_of_twin_update(spindle, tmp_path):
+    warmer = twin.load(MACHINE).edited({"sources.motor.gain": 1.4}, tmp_path / "warmer.toml")
+    options = twin.SimulateOptions(tcp_every="5 min")
+    twin.simulate(warmer, MACHINE / "runs" / "warm_up", output=tmp_path / "truth", options=options)
+    expected = twin.update(spindle, tmp_path / "truth", twin.UpdateOptions(method="state", slew="1 mm")).numbers
+    given = LiveOptions(engine="jax", learn="state", speed=0.0, events=tmp_path / "truth" / "tcp.csv",
+                        initial=read_run(tmp_path / "truth").initial_temperature)  # fmt: skip
+    whole_run = replay_of(tmp_path / "truth", 0.0)
+    parts = [part for found in whole_run.poll(1.0) if isinstance(found, Block) for part in cut_up(found)]
+
+    def begun(folder: str) -> Runtime:
+        place = f"replay:{tmp_path / 'truth'}"
+        made = wired(spindle, place, [f"file:{tmp_path / 'out.json'}"], tmp_path / folder, given)
+        made.keeping = Keeping(tmp_path / folder, checkpoint=1200.0, pause=0.0)
+        made.source = Listed(parts, numbered=False)
+        made.begin(False)
+        return made
+
+    made = begun("once")
+    made.run(lambda: False)
+    told = learnt(made)
+    assert told["measurements"] == len(expected.row_time)
+    assert told["learnt"]["readings"] > 100
+    moved = np.array(made.intake.displacements()).reshape(-1, 3)
+    corrected = expected.base[-1] + expected.correction[-1]
+    assert np.abs(expected.correction[-1]).max() > 1e-6
+    assert np.abs(moved - corrected).max() < 0.05 * np.abs(expected.correction[-1]).max()
+
+    cut = begun("cut")
+    left, feed = [100], cut.intake.engine.feed
+
+    def killed(times: array, rows: array) -> int:
+        left[0] -= 1
+        if not left[0]:
+            raise KeyboardInterrupt
+        return feed(times, rows)
+
+    cut.intake.engine.feed = killed
+    with pytest.raises(KeyboardInterrupt):
+        cut.run(lambda: False)
+    again = begun("cut")
+    again.run(lambda: False)
+    assert again.taken_again > 0
+    assert again.intake.engine.steps == made.intake.engine.steps
+    assert again.intake.displacements() == made.intake.displacements()
+    assert learnt(again)["learnt"] == told["learnt"]
+
+
 def test_a_process_that_was_killed_learns_the_same(tmp_path):
     events = tmp_path / "tcp.csv"
     events.write_text(HEAD + "".join(row(t, 3.0 + 0.01 * t) for t in (10.5, 31, 49.5, 80)))
@@ -84,7 +146,7 @@ def test_a_process_that_was_killed_learns_the_same(tmp_path):
         again = whole(runtime(state, Listed(ALL), events))
         assert again.taken_again > 0
         assert again.intake.displacements() == once.intake.displacements()
-        assert learnt(again)["gain_slow_offset"] == learnt(once)["gain_slow_offset"]
+        assert learnt(again)["learnt"] == learnt(once)["learnt"]
         assert learnt(again)["measurements"] == 4
 
 
@@ -135,7 +197,7 @@ def test_what_was_measured_with_offsets_active_is_freed_of_them(tmp_path):
         if k == 400:  # the tool stands where it should: the offsets are right, so nothing is to be learnt
             with events.open("a") as f:
                 f.write(row(66, 0.0, corrected=1.0))
-    gain, slow, offset = learnt(made)["gain_slow_offset"]["dx"]
+    gain, slow, offset = learnt(made)["learnt"]["dx"]
     assert made.publisher.outlets[0].now[0][1] == pytest.approx(
         offsets(FACTS, made.intake.displacements(), "grid")[0][1], abs=1e-7
     )
@@ -146,7 +208,7 @@ def test_what_was_measured_with_offsets_active_is_freed_of_them(tmp_path):
 
 def test_no_place_is_refused(tmp_path, capsys, spindle):
     with pytest.raises(TwinError, match="no file and no folder"):
-        Learning(FACTS, tmp_path / "none", tmp_path)
+        Learning(FACTS, Learner(FACTS, GainFilter(FACTS.all_poses)), tmp_path / "none", tmp_path)
     told = ["--source", f"replay:{MACHINE / 'runs' / 'warm_up'}", "--out", "file:o.json", "--speed", "0"]
     assert command(["live", str(spindle), *told, "--state", str(tmp_path / "s"), "--events", str(tmp_path / "x")]) == 2
     assert "no file and no folder" in capsys.readouterr().err

@@ -9,19 +9,14 @@ import socket
 import subprocess
 import time
 from array import array
-from datetime import UTC, datetime, timedelta
-from ipaddress import ip_address
 
 import pytest
 
 paho = pytest.importorskip("paho.mqtt.client")
-x509 = pytest.importorskip("cryptography.x509")
-
-from cryptography.hazmat.primitives import hashes, serialization  # noqa: E402
-from cryptography.hazmat.primitives.asymmetric import ec  # noqa: E402
-from cryptography.x509.oid import NameOID  # noqa: E402
+pytest.importorskip("cryptography")
 
 from tests.live.scripted import FACTS, NAMES, UNITS, Kept, runtime  # noqa: E402
+from tests.support.authority import authority  # noqa: E402
 from twin.errors import TwinError  # noqa: E402
 from twin.live.block import Block, frame_of  # noqa: E402
 from twin.live.channels import Channels, read_channels  # noqa: E402
@@ -231,35 +226,11 @@ def test_a_place_without_a_topic_is_refused():
         MqttSource("127.0.0.1:1883", Channels())
 
 
-def authority(folder, name):
-    """A certificate authority, NAME.pem, and a broker's certificate by it, NAME-broker.pem with its key."""
-    now = datetime.now(UTC)
-
-    def written(stem, subject, issuer, public, signer, extension):
-        made = (
-            x509.CertificateBuilder()
-            .subject_name(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, subject)]))
-            .issuer_name(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, issuer)]))
-            .public_key(public).serial_number(x509.random_serial_number())
-            .not_valid_before(now - timedelta(days=1)).not_valid_after(now + timedelta(days=1))
-            .add_extension(extension, critical=False).sign(signer, hashes.SHA256())
-        )  # fmt: skip
-        (folder / f"{stem}.pem").write_bytes(made.public_bytes(serialization.Encoding.PEM))
-
-    root, own = (ec.generate_private_key(ec.SECP256R1()) for _ in range(2))
-    written(name, name, name, root.public_key(), root, x509.BasicConstraints(ca=True, path_length=None))
-    address = x509.SubjectAlternativeName([x509.IPAddress(ip_address("127.0.0.1"))])
-    written(f"{name}-broker", "broker", name, own.public_key(), root, address)
-    (folder / f"{name}-broker.key").write_bytes(
-        own.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
-    )
-
-
 @pytest.fixture
 def encrypted(tmp_path):
     for name in ("plant", "stranger"):
         authority(tmp_path, name)
-    made = Broker(tmp_path, f"certfile {tmp_path}/plant-broker.pem\nkeyfile {tmp_path}/plant-broker.key\n")
+    made = Broker(tmp_path, f"certfile {tmp_path}/plant-host.pem\nkeyfile {tmp_path}/plant-host.key\n")
     yield made
     made.stop()
 

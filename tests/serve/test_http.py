@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import shutil
 import socket
+import ssl
+from urllib.parse import urlsplit
 
 import pytest
 
 from twin.cli.main import run
 
 pytest.importorskip("starlette")
+pytest.importorskip("cryptography")
 
+from tests.support.authority import authority
 from twin.serve.guard import Guard
 
 TOKEN = "a token of the tests 123"
@@ -148,3 +153,24 @@ def test_damaged_files_of_the_state_are_waited_out(slide_artefact, state, tmp_pa
     assert live.told(-1)["rows"] == []
     shutil.copy(state / "step.json", folder / "step.json")
     assert len(live.told(-1)["rows"]) == 1
+
+
+def test_the_page_goes_encrypted_where_a_certificate_is_given(server, slide_artefact, slide_result, tmp_path, capsys):
+    authority(tmp_path, "plant")
+    given = ["--certificate", str(tmp_path / "plant-host.pem"), "--key", str(tmp_path / "plant-host.key")]
+    one = server(str(slide_artefact), str(slide_result), "--token", TOKEN, *given)
+    assert one.url.startswith("https://127.0.0.1:")
+    place = urlsplit(one.url)
+    trusted = ssl.create_default_context(cafile=str(tmp_path / "plant.pem"))
+    connection = http.client.HTTPSConnection("127.0.0.1", place.port, context=trusted, timeout=30)
+    connection.request("GET", f"/?token={TOKEN.replace(' ', '+')}")
+    answer = connection.getresponse()
+    assert answer.status == 303
+    assert "Secure" in answer.headers["Set-Cookie"]
+    with pytest.raises(ssl.SSLCertVerificationError):
+        http.client.HTTPSConnection("127.0.0.1", place.port, timeout=30).request("GET", "/")
+    with pytest.raises((http.client.HTTPException, OSError)):
+        one.ask("/")  # not encrypted
+    for wrong in (given[:2], [*given[:3], str(tmp_path / "plant-host.pem")], [given[0], "none.pem", *given[2:]]):
+        assert run(["serve", str(slide_artefact), str(slide_result), *wrong]) == 2
+        assert "certificate" in capsys.readouterr().err

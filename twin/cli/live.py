@@ -65,6 +65,9 @@ class _Remembering(click.Command):
 )
 @click.option("--events", type=click.Path(),
               help="tcp.csv that grows, or folder of such: measured TCP errors that correct the model")  # fmt: skip
+@click.option("--learn", type=click.Choice(["gain", "state"]),
+              help="filter that learns: gain from events; state from events and temperatures, with --engine jax  "
+              "[default: gain where there are events]")  # fmt: skip
 @click.option("--fresh", is_flag=True, help="forget what is in the state folder")
 @click.option("--print-unit", is_flag=True, help="print the systemd unit of this command, and do nothing else")
 @bundled(_options)

@@ -27,6 +27,8 @@ def _options() -> type[Any]:
 @click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True, help="0: any that is free")
 @click.option("--token", envvar="TWIN_TOKEN", help="who gives it may read, 16 characters at least  [default: a random "
               "one where others reach the page]")  # fmt: skip
+@click.option("--certificate", type=click.Path(), help="PEM; with --key, the page goes by https")
+@click.option("--key", type=click.Path(), help="of the certificate, PEM without a password")
 @click.option("--name", multiple=True, help="a name of this computer that browsers may ask for; may be given again")
 @click.option("--opcua", help="also an OPC UA server there, e.g. opc.tcp://127.0.0.1:4840/twin")
 @click.option("--user", default="twin", show_default=True, help="of OPC UA")

@@ -12,7 +12,9 @@ from twin.face.inputs import Quantity, positive, quantity
 
 if TYPE_CHECKING:
     from twin.live.channels import Channels
+    from twin.live.engine import Engine
     from twin.live.facts import Facts
+    from twin.live.learning import Learning
     from twin.live.runtime import Runtime
     from twin.live.sinks import Sink
 
@@ -33,6 +35,7 @@ class LiveOptions:
     journal: int = 256  # MB
     channels: str | Path | None = None  # file with nodes of OPC UA and limits of values
     events: str | Path | None = None  # file or folder of measured TCP errors, which correct the model
+    learn: Literal["gain", "state"] | None = None  # filter of `twin update`; None: gain where there are events
     fresh: bool = False  # forget what is in the state folder
 
 
@@ -87,13 +90,34 @@ def wired(artefact: str | Path, source: str, out: Sequence[str], state: str | Pa
     sinks = [open_sink(text, facts, options.form, channels) for text in out]
     publisher = Publisher(sinks, neutral(facts, options.form), options.form, limits, patience)
     clock = RealClock(incoming.speed) if incoming.speed else RecordClock()
-    learning = None
-    if options.events is not None:
-        from twin.live.learning import Learning
-
-        learning = Learning(facts, Path(options.events), folder)
+    learning = _learning(Path(artefact), engine, folder, options)
     intake = Intake(engine, limits_of(facts, channels.limits), initial, incoming.numbered, learning)
     return Runtime(intake, incoming, publisher, clock, Keeping(folder, options.journal << 20))
+
+
+def _learning(artefact: Path, engine: Engine, folder: Path, options: LiveOptions) -> Learning | None:
+    """What learns from measured values; None: nothing. Raises TwinError where the filter chosen cannot."""
+    if options.events is None and options.learn is None:
+        return None
+    from twin.live.learner import Filter, Learner
+    from twin.live.learning import Learning
+
+    if options.learn == "state":
+        if options.engine != "jax":
+            raise TwinError("the filter state steps a tangent of the model in JAX", "--learn", "add --engine jax")
+        from twin.live.engine_jax import JaxEngine
+        from twin.live.filter_state import StateFilter
+
+        assert isinstance(engine, JaxEngine)
+        own: Filter = StateFilter(artefact, engine)
+    elif options.events is None:
+        raise TwinError("the filter gain learns from measured TCP errors alone", "--learn", "name them with --events")
+    else:
+        from twin.live.filter_gain import GainFilter
+
+        own = GainFilter(engine.facts.all_poses)
+    events = None if options.events is None else Path(options.events)
+    return Learning(engine.facts, Learner(engine.facts, own), events, folder)
 
 
 def open_sink(text: str, facts: Facts, form: Literal["grid", "polynomial"], channels: Channels) -> Sink:

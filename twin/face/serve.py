@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from twin.serve.finished_run import FinishedRun
     from twin.serve.live_state import LiveState
     from twin.serve.opcua import Access
+    from twin.serve.start import Tls
 
 SHORTEST = 16  # characters of a token that a person chooses
 
@@ -27,6 +28,8 @@ class ServeOptions:
     host: str = "127.0.0.1"  # anything else needs a token
     port: int = 8765
     token: str | None = None  # None: none on this computer, a random one where others reach it
+    certificate: str | Path | None = None  # PEM, with key: the page goes by https
+    key: str | Path | None = None
     name: tuple[str, ...] = ()  # of this computer, beside its own, that browsers may ask for
     opcua: str | None = None  # opc.tcp://HOST:PORT/PATH
     user: str = "twin"  # of OPC UA
@@ -63,6 +66,7 @@ def serve(
     from twin.serve.opcua import OpcUaServer
 
     token = _token(options, is_loopback(options.host))
+    tls = _tls(options)
     shown = _shown(artefact, output, live)
     place = listening(options.host, options.port)
     port = place.getsockname()[1]
@@ -74,11 +78,11 @@ def serve(
 
     def ready() -> None:
         host = f"[{options.host}]" if ":" in options.host else options.host
-        say(f"page: http://{host}:{port}/" + (f"?token={token}" if token else ""))
+        say(f"page: {'http' if tls is None else 'https'}://{host}:{port}/" + (f"?token={token}" if token else ""))
         if server is not None:
             say(f"OPC UA: {options.opcua}, user {told}")
 
-    run_until_signal(app, place, server, ready)
+    run_until_signal(app, place, server, tls, ready)
 
 
 def _shown(artefact: str | Path, output: str | Path | None, live: str | Path | None) -> FinishedRun | LiveState:
@@ -93,6 +97,18 @@ def _shown(artefact: str | Path, output: str | Path | None, live: str | Path | N
 
     assert output is not None
     return FinishedRun(read, Path(output))
+
+
+def _tls(options: ServeOptions) -> Tls | None:
+    from twin.serve.start import Tls
+
+    if (options.certificate is None) != (options.key is None):
+        raise TwinError("a certificate and its key go together", "--certificate, --key", "give both, or neither")
+    if options.certificate is None or options.key is None:
+        return None
+    made = Tls(Path(options.certificate), Path(options.key))
+    made.check()
+    return made
 
 
 def _token(options: ServeOptions, loopback: bool) -> str | None:

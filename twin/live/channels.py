@@ -78,7 +78,7 @@ def _whole(told: dict[str, Any], path: Path, name: str) -> None:
     """Raises TwinError for what is of no use without its companion, and for what is no text."""
     for key, other in (("user", "password_file"), ("certificate", "key"), ("key", "certificate")):
         if key in told and other not in told and (name, key) != ("mqtt", "user"):
-            raise TwinError(f"{key} without {other}", f"{path}: {name}", f"write {other} = \"...\" beside it")
+            raise TwinError(f"{key} without {other}", f"{path}: {name}", f'write {other} = "..." beside it')
     for key, value in told.items():
         if not isinstance(value, str) and key != "interval":
             raise TwinError(f"{key} is no text", f"{path}: {name}", f'write {key} = "..."')

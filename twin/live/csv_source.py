@@ -119,17 +119,27 @@ class CsvSource:
                 if header is None:
                     return []
                 self._waiting = [row for line in lines if (row := header.row(line)) is not None]
-                self._joined = self._joined or [math.nan] * len(header.names)
+                self._joined = self._joined or [math.nan] * len(self._kept())
             if not self._waiting or self._waiting[0][0] > time:
                 return self._joined
-            self._joined = self._waiting.pop(0)[1]
+            row = self._waiting.pop(0)[1]
+            self._joined = [row[k] for k in self._kept()]
+
+    def _kept(self) -> list[int]:
+        """Columns beside that the loads do not have: a block with two of one name could not be read again."""
+        own, beside = self._file.header, self._beside.header if self._beside else None
+        if own is None or beside is None:
+            return []
+        return [k for k, name in enumerate(beside.names) if name not in own.names]
 
     def _names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         header = self._file.header
         assert header is not None
         names, units = header.names, header.units
         if self._beside is not None and self._beside.header is not None:
-            names, units = names + self._beside.header.names, units + self._beside.header.units
+            beside, kept = self._beside.header, self._kept()
+            names += tuple(beside.names[k] for k in kept)
+            units += tuple(beside.units[k] for k in kept)
         return names, units
 
     def _wanted(self, time: float) -> float:

@@ -28,7 +28,7 @@ from twin.rom.following_flags import following_flags
 from twin.rom.poses import outside_grid
 from twin.rom.turning import STRAIGHT, off_zero
 from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalanced
-from twin.run.stepping import StepHeat, advance, inputs_of
+from twin.run.stepping import Inputs, StepHeat, advance, inputs_of
 from twin.run.system import prepare
 
 _COMPILED = (1, 2)  # steps after which most is compiled
@@ -51,8 +51,9 @@ class JaxEngine:
         self.facts = facts_of(artefact)
         self._prepared = prepare(artefact.model)
         self._model = replace(artefact.model, bodies=(), structure=None)  # what is stepped is in `_prepared`
-        self._substeps = int(artefact.certificate.get("substeps", 1))
+        self.substeps = int(artefact.certificate.get("substeps", 1))
         self._load = artefact.model.load_model
+        self.loads: list[tuple[Inputs, np.ndarray]] | None = None  # of steps, for a filter that takes them; None: none
         self._positions = set(self.facts.axis_channels)
         system = self._prepared.system
         self._height = np.asarray(system.film_moment) / np.maximum(np.asarray(system.film_area), 1e-30)
@@ -62,6 +63,7 @@ class JaxEngine:
         _give_back()
 
     def start(self, temperature: float) -> None:
+        self.initial = temperature  # degC
         self._z = self._prepared.uniform(temperature)
         self._steps = 0
         self._times = np.zeros(0)
@@ -99,7 +101,9 @@ class JaxEngine:
             if np.isfinite(values[:, k]).any()
         }
         drive = evaluate(self._load, time, signals, dt, 1)
-        inputs = inputs_of(self._load, drive, self._substeps)
+        inputs = inputs_of(self._load, drive, self.substeps)
+        if self.loads is not None:
+            self.loads.append((inputs, drive.contact_heat))
         states, heat = advance(self._prepared.layout, self._prepared.system, self._z, inputs)
         before, self._z = self._z, np.asarray(states)[-1]
         self._steps += 1
@@ -177,7 +181,7 @@ class JaxEngine:
 
     def saved(self) -> bytes:
         told = {"steps": self._steps, "times": self._times.tolist(), "rows": self._rows.tolist(), "air": self._air,
-                "flags": self._flags, "balance": self._balance}  # fmt: skip
+                "flags": self._flags, "balance": self._balance, "initial": self.initial}  # fmt: skip
         return json.dumps(told).encode() + b"\n" + np.ascontiguousarray(self._z, dtype="<f8").tobytes()
 
     def restore(self, saved: bytes) -> None:
@@ -190,6 +194,7 @@ class JaxEngine:
         except ValueError as e:
             raise TwinError("the state is of another engine", "state", "start afresh with --fresh") from e
         self._z, self._steps = z, told["steps"]
+        self.initial = told["initial"]
         self._times = np.array(told["times"])
         self._rows = np.array(told["rows"]).reshape(len(self._times), -1)
         self._air, self._flags, self._balance = told["air"], told["flags"], told["balance"]

@@ -117,9 +117,9 @@ class Intake:
                 self.drift.take(
                     self.measured, dict(zip(engine.facts.sensors, engine.sensors(), strict=True)), done * step
                 )
-                self.measured = {}
                 if self.learning is not None:
-                    self.learning.step(engine.steps, engine.displacements())
+                    self.learning.step(engine.steps, engine.displacements(), self.measured)
+                self.measured = {}
                 each_step()
 
     def _map(self, block: Block) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,13 +17,10 @@ if TYPE_CHECKING:  # NumPy, which a process that learns nothing does not load
 class Learning:
     """The learner, where its events come from and where those that were used are kept."""
 
-    def __init__(self, facts: Facts, path: Path, folder: Path):
-        """Raises TwinError where `path` is neither a file nor a folder."""
-        from twin.live.learner import Learner
-
-        self.facts = facts
-        self.events = Events(path, facts)
-        self.learner: Learner = Learner(facts)
+    def __init__(self, facts: Facts, learner: Learner, path: Path | None, folder: Path):
+        """path: of events; None: there are none. Raises TwinError where it is neither a file nor a folder."""
+        self.facts, self.learner = facts, learner
+        self.events = None if path is None else Events(path, facts)
         folder.mkdir(parents=True, exist_ok=True)
         self.store = Store(folder / "measured.jsonl")
         self.count = 0  # learnt
@@ -32,9 +29,9 @@ class Learning:
         self._waiting: list[Measured] = []  # by their clock, the log is not yet there
         self._back = _errors_per_offset(facts)
 
-    def step(self, steps: int, displacements: Sequence[float]) -> None:
+    def step(self, steps: int, displacements: Sequence[float], temperatures: Mapping[str, float]) -> None:
         """The machine has made so many steps; what had been learnt there before a restart is learnt again."""
-        self.learner.step(steps * self.facts.step, displacements)
+        self.learner.step(steps * self.facts.step, displacements, temperatures)
         self._steps = steps
         for used in self.store.used:
             if used.number >= self.count and used.steps <= steps:
@@ -49,7 +46,9 @@ class Learning:
         shift [s]: from the clock of the log to the time since the machine was started; active: the offsets that go out
         now, which a row measured with them active is freed of.
         """
-        told = []
+        told: list[dict[str, Any]] = []
+        if self.events is None:
+            return told
         rows, self._waiting = sorted([*self._waiting, *self.events.poll()], key=lambda r: r.time), []
         for row in rows:
             time = row.time + shift
@@ -101,10 +100,10 @@ class Learning:
             "measurements": self.count,
             "too_old": self.too_old,
             "waiting": len(self._waiting),
-            "rows_wrong": self.events.wrong,
-            "error": self.events.error,
+            "rows_wrong": 0 if self.events is None else self.events.wrong,
+            "error": "" if self.events is None else self.events.error,
             "last": self.learner.told,
-            "gain_slow_offset": self.learner.learnt(),
+            "learnt": self.learner.filter.learnt(),
         }
 
 

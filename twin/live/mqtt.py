@@ -2,7 +2,8 @@
 
 A message is one block: a frame as in docs/load_blocks.md, or the same as JSON. The session is kept by the broker under
 one client name, and a message is acknowledged only when its block is in the journal: what comes while this process is
-dead, and what had not yet come that far, is delivered later (QoS 1), perhaps twice, which the numbers of the blocks show. Messages of QoS 0 are lost then, which the numbers show, too.
+dead, and what had not yet come that far, is delivered later (QoS 1), perhaps twice, which the numbers of the blocks
+show. Messages of QoS 0 are lost then, which the numbers show, too.
 """
 
 from __future__ import annotations
@@ -89,7 +90,9 @@ class _Connection:
             self.error = ""
 
     def _unreachable(self, client: Any, _: Any) -> None:
-        self.error = f"{self._place[0]}:{self._place[1]} cannot be reached: {sys.exc_info()[1]}"  # called while it is handled
+        self.error = (
+            f"{self._place[0]}:{self._place[1]} cannot be reached: {sys.exc_info()[1]}"  # called while it is handled
+        )
 
     def _lost(self, client: Any, _: Any, flags: Any, reason: Any, properties: Any) -> None:
         self.error = self.error or f"connection lost: {reason}"

@@ -77,8 +77,8 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
 def prepare(path: Path, folder: Path) -> None:
     """Write the facts and the library of the artefact at `path` to `folder`.
 
-    Raises ArtefactError for files that are none, TwinError without a C compiler, where compiling fails, and for a folder
-    of other things.
+    Raises ArtefactError for files that are none, TwinError without a C compiler, where compiling fails, and for a
+    folder of other things.
     """
     if folder.exists() and not (folder / LIBRARY).is_file():
         raise TwinError("is there and holds no compiled machine", str(folder), "name a new folder")

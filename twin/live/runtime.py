@@ -299,7 +299,7 @@ class Runtime:
     def run(self, stop: Callable[[], bool]) -> None:
         """Until `stop` says so, or the source has ended and the outputs stand still."""
         beat = threading.Event()
-        threads = []
+        threads, whole = [], False
         if self.source.speed:
             threads.append(threading.Thread(target=self._beat, args=(beat,), daemon=True))
             threads[0].start()
@@ -308,19 +308,24 @@ class Runtime:
                 self.once()
             for block in self.resolver.finish():
                 self._take(block)
+            whole = True
         finally:
             beat.set()
             for t in threads:
                 t.join()
-            self.close()
+            self.close(whole)
 
     def _beat(self, stop: threading.Event) -> None:
         while not stop.wait(self.publisher.limits.period / max(self.source.speed, 1.0)):
             self.publisher.tick(self.clock.now())
 
-    def close(self) -> None:
-        """Keep everything; outputs stay where they are, and their readers see that they grow old."""
-        self._checkpoint(now=True)
+    def close(self, whole: bool = True) -> None:
+        """Keep everything; outputs stay where they are, and their readers see that they grow old.
+
+        whole: the last block of the journal went into the model; else the next start takes it again.
+        """
+        if whole:
+            self._checkpoint(now=True)
         self._write_step()
         self.files.write(self.health())
         self.journal.close()

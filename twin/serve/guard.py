@@ -62,7 +62,8 @@ class Guard:
             return None
         if self._same(parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]):
             answer = RedirectResponse("/", 303)  # the token leaves the address bar; never to where a path says
-            answer.set_cookie(COOKIE, self.token, httponly=True, samesite="strict", path="/")
+            encrypted = scope["scheme"] == "https"
+            answer.set_cookie(COOKIE, self.token, httponly=True, samesite="strict", path="/", secure=encrypted)
             return answer
         if self._same(_bearer(headers)) or self._same(_cookie(headers)):
             return None

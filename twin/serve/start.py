@@ -6,9 +6,12 @@ import asyncio
 import contextlib
 import signal
 import socket
+import ssl
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from ipaddress import ip_address
+from pathlib import Path
 
 import uvicorn
 from starlette.applications import Starlette
@@ -46,19 +49,46 @@ def listening(host: str, port: int) -> socket.socket:
     return made
 
 
+@dataclass(frozen=True)
+class Tls:
+    """What the page is encrypted with, both PEM; the key has no password."""
+
+    certificate: Path
+    key: Path
+
+    def check(self) -> None:
+        """Raises TwinError where the files are missing, no such files, or do not belong together."""
+        for path in (self.certificate, self.key):
+            if not path.is_file():
+                raise TwinError("no such file", str(path), "give a certificate and its key, in PEM")
+        try:
+            # a password is never asked for: a server that starts by itself would wait for ever
+            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.certificate, self.key, password=lambda: "")
+        except (OSError, ValueError) as e:  # ssl.SSLError is an OSError
+            what = f"no certificate with its key: {getattr(e, 'reason', None) or e}"
+            raise TwinError(what, f"{self.certificate}, {self.key}", "give both in PEM, the key unencrypted") from e
+
+
 def run_until_signal(
-    app: Starlette, place: socket.socket, opcua: OpcUaServer | None, ready: Callable[[], None] = lambda: None
+    app: Starlette,
+    place: socket.socket,
+    opcua: OpcUaServer | None,
+    tls: Tls | None = None,
+    ready: Callable[[], None] = lambda: None,
 ) -> None:
     """Serve until SIGTERM or SIGINT; `ready` is called when both answer. Raises TwinError where OPC UA cannot start."""
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: None)  # uvicorn raises it again when it has ended: that is no failure
-    asyncio.run(_both(app, place, opcua, ready))
+    asyncio.run(_both(app, place, opcua, tls, ready))
 
 
-async def _both(app: Starlette, place: socket.socket, opcua: OpcUaServer | None, ready: Callable[[], None]) -> None:
+async def _both(
+    app: Starlette, place: socket.socket, opcua: OpcUaServer | None, tls: Tls | None, ready: Callable[[], None]
+) -> None:
     config = uvicorn.Config(
         app, log_level="error", access_log=False, server_header=False, proxy_headers=False, ws="none", lifespan="off",
         limit_concurrency=BUSY, timeout_graceful_shutdown=2,
+        ssl_certfile=tls and tls.certificate, ssl_keyfile=tls and tls.key,
     )  # fmt: skip
     if opcua is not None:
         await opcua.start()
