@@ -122,8 +122,8 @@ class CsvSource:
                 self._joined = self._joined or [math.nan] * len(self._kept())
             if not self._waiting or self._waiting[0][0] > time:
                 return self._joined
-            row = self._waiting.pop(0)[1]
-            self._joined = [row[k] for k in self._kept()]
+            values = self._waiting.pop(0)[1]
+            self._joined = [values[k] for k in self._kept()]
 
     def _kept(self) -> list[int]:
         """Columns beside that the loads do not have: a block with two of one name could not be read again."""

@@ -180,21 +180,21 @@ class JaxEngine:
         return self._balance
 
     def saved(self) -> bytes:
-        told = {"steps": self._steps, "times": self._times.tolist(), "rows": self._rows.tolist(), "air": self._air,
-                "flags": self._flags, "balance": self._balance, "initial": self.initial}  # fmt: skip
-        return json.dumps(told).encode() + b"\n" + np.ascontiguousarray(self._z, dtype="<f8").tobytes()
+        told = {"steps": self._steps, "rows": len(self._times), "air": self._air, "flags": self._flags,
+                "balance": self._balance, "initial": self.initial}  # fmt: skip
+        numbers = np.concatenate([self._z, self._times, self._rows.ravel()])  # as text 6,000 rows take 0.1 s
+        return json.dumps(told).encode() + b"\n" + numbers.astype("<f8").tobytes()
 
     def restore(self, saved: bytes) -> None:
         line, _, state = saved.partition(b"\n")
         try:
             told = json.loads(line)
-            z = np.frombuffer(state, dtype="<f8").astype(float)
-            if z.shape != self._z.shape:
+            numbers = np.frombuffer(state, dtype="<f8").astype(float)
+            n, m, s = len(self._z), told["rows"], len(self.facts.channels)
+            if len(numbers) != n + m + m * s:
                 raise ValueError("another number of states")
-        except ValueError as e:
+        except (ValueError, KeyError) as e:
             raise TwinError("the state is of another engine", "state", "start afresh with --fresh") from e
-        self._z, self._steps = z, told["steps"]
-        self.initial = told["initial"]
-        self._times = np.array(told["times"])
-        self._rows = np.array(told["rows"]).reshape(len(self._times), -1)
+        self._z, self._times, self._rows = numbers[:n], numbers[n : n + m], numbers[n + m :].reshape(m, s)
+        self._steps, self.initial = told["steps"], told["initial"]
         self._air, self._flags, self._balance = told["air"], told["flags"], told["balance"]

@@ -88,7 +88,7 @@ async def _both(
     config = uvicorn.Config(
         app, log_level="error", access_log=False, server_header=False, proxy_headers=False, ws="none", lifespan="off",
         limit_concurrency=BUSY, timeout_graceful_shutdown=2,
-        ssl_certfile=tls and tls.certificate, ssl_keyfile=tls and tls.key,
+        ssl_certfile=tls.certificate if tls else None, ssl_keyfile=tls.key if tls else None,
     )  # fmt: skip
     if opcua is not None:
         await opcua.start()
