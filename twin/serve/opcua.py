@@ -226,13 +226,16 @@ def values_of(now: Now, sensors: tuple[str, ...]) -> dict[str, Any]:
 class _Reading:
     """What a session may ask for: no write, no call, no change of nodes."""
 
-    def check_validity(self, user: Any, action_type: Any, body: Any) -> bool:
+    def __init__(self) -> None:
         from asyncua.crypto.permission_rules import USER_TYPES, UserRole
 
         ua = _ua()
-        ids = ua.ObjectIds
-        refused = (ids.WriteRequest_Encoding_DefaultBinary, ids.CallRequest_Encoding_DefaultBinary)
-        return user.role == UserRole.User and action_type in [ua.NodeId(t) for t in USER_TYPES if t not in refused]
+        refused = (ua.ObjectIds.WriteRequest_Encoding_DefaultBinary, ua.ObjectIds.CallRequest_Encoding_DefaultBinary)
+        self._role = UserRole.User
+        self._allowed = frozenset(ua.NodeId(t) for t in USER_TYPES if t not in refused)  # once, not at every request
+
+    def check_validity(self, user: Any, action_type: Any, body: Any) -> bool:
+        return user.role == self._role and action_type in self._allowed
 
 
 class _Users:
