@@ -25,7 +25,7 @@ SCRIPTS = (
 class Front:
     """Which files of the front end make a page; the last script starts it with `class Page`."""
 
-    page: str
+    body: str  # within frame.html
     styles: tuple[str, ...]
     scripts: tuple[str, ...]
 
@@ -74,7 +74,7 @@ def write_page(path: Path, content: Mapping[str, Any], front: Front = RESULT) ->
 
 
 def _filled(front: Front, /, **parts: str) -> str:
-    page = text(front.page)
+    page = text("frame.html").replace("<!--body-->\n", text(front.body))
     for name, part in parts.items():
         page = page.replace(f"<!--{name}-->", part)
     return page
