@@ -11,7 +11,6 @@ import keyword
 import os
 import signal
 import sys
-import traceback
 
 import click
 
@@ -119,6 +118,8 @@ def run(arguments: list[str]) -> int:
         if message is None:
             raise
         if "--traceback" in arguments:
+            import traceback  # slow to import, and seldom asked for
+
             traceback.print_exc()
         click.echo(message, err=True)
         if isinstance(e, KeyboardInterrupt | click.Abort):

@@ -8,15 +8,17 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.live.block import Block
 from twin.live.condense import condense
 from twin.live.drift import Drift
 from twin.live.engine import Engine
 from twin.live.gate import Gate, Limits
-from twin.live.learning import Learning
 from twin.live.timeline import Timeline
+
+if TYPE_CHECKING:  # a tenth of a start, where nothing is learnt
+    from twin.live.learning import Learning
 
 NAN = math.nan
 

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from twin.errors import TwinError
 from twin.live.block import Block
@@ -20,11 +20,13 @@ from twin.live.engine import EngineFailure
 from twin.live.health import FORMAT, HealthFiles, Latency
 from twin.live.intake import Intake
 from twin.live.journal import Journal, Position
-from twin.live.learning import Learning
 from twin.live.offsets import offsets
 from twin.live.publisher import Publisher
 from twin.live.source import Mark, Source
 from twin.logs.resolver import Damaged, Resolver
+
+if TYPE_CHECKING:
+    from twin.live.learning import Learning
 
 WINDOW = 4  # blocks: so many later ones must have come before a missing one is given up, 40 s of blocks of 10 s
 LOOK = 0.5  # s that a source may wait for something to arrive
