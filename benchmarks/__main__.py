@@ -20,7 +20,8 @@ NAMES = (
     "members", "diagnosis", "recovery", "hidden_certify",
     "window", "live", "serve",
 )  # fmt: skip
-ASKED = ("sensitivity", "lathe_diagnosis", "lathe_calibration")  # by name alone: a day, and hours
+# by name alone: a day, hours, or a package index
+ASKED = ("sensitivity", "lathe_diagnosis", "lathe_calibration", "install")
 
 
 def main() -> None:

@@ -281,8 +281,8 @@ def long_replay(folder: Path, engines: Path) -> None:
     print(f"   {told['model']['time_s'] / 86400:.0f} days, {steps:,} steps in {time.perf_counter() - began:.0f} s, "
           f"{1e3 * spent / steps:.2f} ms of a core each: resident {first[1]:.1f} MB after day {first[0]:.0f}, then at "
           f"most {after[:, 1].max():.1f}, in the last tenth {last[:, 1].mean():.1f}; state folder {first[2]:.2f} MB, "
-          f"at most {full[2]:.2f} on day {full[0]:.0f}, in the last tenth {last[:, 2].mean():.2f} (journal of 1 MB, full "
-          f"after five days)")  # fmt: skip
+          f"at most {full[2]:.2f} on day {full[0]:.0f}, in the last tenth {last[:, 2].mean():.2f} (journal of 1 MB, "
+          f"full after five days)")  # fmt: skip
 
 
 def main() -> None:

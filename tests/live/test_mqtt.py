@@ -224,6 +224,8 @@ def test_the_process_counts_lost_and_repeated_blocks(broker, tmp_path):
 def test_a_place_without_a_topic_is_refused():
     with pytest.raises(TwinError, match="names no topic of a broker"):
         MqttSource("127.0.0.1:1883", Channels())
+    with pytest.raises(TwinError, match="names no topic of a broker"):
+        MqttSource("127.0.0.1:99999/loads", Channels())
 
 
 @pytest.fixture

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 from array import array
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -98,6 +100,13 @@ def test_the_health_record_is_plain_json_and_bounded(tmp_path):
         ("[channels.air]\nlower = 1", "unknown keys: lower"),
         ("[channels.air]\nnode = 'n'\nunit = 'mm'", "not of degC"),
         ("[channel", "not valid TOML"),
+        ("channels = 3", "channels is no table"),
+        ("[channels]\nair = 3", "channels.air is no table"),
+        ("[channels.air]\nlow = 30\nhigh = 10", "low is not below high"),
+        ("[opcua]\nuser = 'twin'", "user without password_file"),
+        ("[opcua]\ncertificate = 'c.der'", "certificate without key"),
+        ("[opcua]\ninterval = '0 s'", "interval"),
+        ("[mqtt]\nclient = 3", "client is no text"),
     ],
 )
 def test_a_bad_channels_file_is_refused(text, says, tmp_path):
@@ -114,12 +123,18 @@ def test_a_bad_channels_file_is_refused(text, says, tmp_path):
         (["--source", "csv:x", "--out", "paper"], "names no output"),
         (["--source", "csv:x", "--out", "file:o", "--limit", "3 kg"], "--limit"),
         (["--source", "csv:x", "--out", "file:o", "--speed", "-1"], "--speed"),
+        (["--source", "csv:x", "--out", "file:pipe"], "is a pipe or device"),
+        (["--source", "csv:x", "--out", "ring:pipe"], "is a pipe or device"),
+        (["--source", "csv:x", "--out", "file:o", "--learn", "state"], "add --engine jax"),
+        (["--source", "csv:x", "--out", "file:o", "--learn", "gain"], "name them with --events"),
     ],
 )
 def test_bad_options_are_one_error(more, says, spindle, state, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")  # stands for a device such as /dev/null, which a rename would replace
     assert command(["live", str(spindle), "--state", str(state), *more]) == 2
     assert says in capsys.readouterr().err
+    assert Path("pipe").is_fifo()
     assert not (tmp_path / "o").exists()
 
 

@@ -59,7 +59,8 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
     units = {c.column: c.unit for c in facts.channels} | dict.fromkeys(facts.sensors, "degC")
     nodes, limits = {}, {}
     named = told.get("channels", {})
-    _known(named, set(named), path, "channels")
+    if not isinstance(named, dict):
+        raise TwinError("channels is no table", str(path), remedy)
     for column, own in named.items():
         if column not in units:
             raise TwinError(f"no channel '{column}'", str(path), f"channels are: {', '.join(units)}")

@@ -51,7 +51,7 @@ class _Connection:
         at, _, self.topic = place.removeprefix("//").partition("/")
         host, _, port = at.partition(":")
         own = channels.mqtt
-        if not host or not self.topic or not (port or "1883").isdigit():
+        if not host or not self.topic or not (port or "1883").isdecimal() or not 0 < int(port or "1883") < 65536:
             raise TwinError(f"'{place}' names no topic of a broker", "mqtt", "write mqtt:HOST:PORT/TOPIC")
         channels.refuse_missing("mqtt")
         self.error = f"{at} cannot be reached"

@@ -114,6 +114,17 @@ def _refuse_expired(path: Path, key: str) -> None:
         raise TwinError(what, str(path), "make a new one, and let the server trust it; or set the clock")
 
 
+def _refuse_no_nodes(texts: Sequence[str]) -> None:
+    """Raises TwinError for a text that names no node."""
+    from asyncua import ua
+
+    for text in texts:
+        try:
+            ua.NodeId.from_string(text)
+        except ua.UaError as e:
+            raise TwinError(f"'{text}' names no node", "channels file", "write node = 'ns=2;s=NAME'") from e
+
+
 class OpcUaSource:
     """Nodes of a server at equal intervals."""
 
@@ -131,6 +142,7 @@ class OpcUaSource:
         units = [parse_unit(unit) for _, unit in channels.nodes.values()]
         self.units, self._units = tuple(u.si for u in units), units
         self._ids = [node for node, _ in channels.nodes.values()]
+        _refuse_no_nodes(self._ids)
         self._beat = channels.opcua.get("heartbeat")
         self._last_beat: tuple[object, float] = (None, time.monotonic())
         self._nodes: list[Any] = []
@@ -218,6 +230,7 @@ class OpcUaSink:
         if "{axis}" not in channels.outputs.get("offsets", ""):
             raise TwinError("no node for the offsets", url, "write [outputs] offsets = 'ns=2;s=offset_{axis}'")
         self._connection = Connection(url, channels)
+        _refuse_no_nodes([text.replace("{axis}", "x") for text in channels.outputs.values()])
 
     def last(self) -> Values | None:
         try:

@@ -76,6 +76,12 @@ def values_in(told: Any, facts: Facts, form: Form) -> Values | None:
         return None
 
 
+def _refuse_device(path: Path) -> None:
+    """A rename would put a file in its place: /dev/null would be gone."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise TwinError("is a pipe or device, not an ordinary file", str(path), "name a file with --out")
+
+
 class FileSink:
     """JSON, replaced as a whole: a reader sees the one before or this one."""
 
@@ -83,6 +89,7 @@ class FileSink:
         """Raises TwinError where the folder cannot be written."""
         self.name, self.facts, self.form, self.path = f"file:{path}", facts, form, path
         self._part = path.with_name(f".{path.name}.part")
+        _refuse_device(path)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as e:
@@ -110,6 +117,7 @@ class RingSink:
     def __init__(self, facts: Facts, form: Form, path: Path):
         """Raises TwinError where the ring cannot be made."""
         self.name, self.facts, self.form = f"ring:{path}", facts, form
+        _refuse_device(path)
         n = facts.poses if form == "grid" else len(facts.fit)
         self.names = ("mode", "good_until", "block", *(f"{a.name}_{k}" for a in facts.axes for k in range(n)))
         self.units = ("1", "s", "1", *("m" for _ in facts.axes for _ in range(n)))
