@@ -224,3 +224,24 @@ def test_the_health_record_says_what_was_learnt(tmp_path):
     (measured,) = [line["measured"] for line in lines if "measured" in line]
     assert measured["position_m"] == [0.25]
     assert measured["learnt"][0]["name"] == "dx"
+
+
+def test_a_state_of_one_filter_is_refused_by_the_other_and_the_filter_state_begins_first(spindle, tmp_path, capsys):
+    given = ["live", str(spindle), "--source", f"replay:{MACHINE / 'runs' / 'warm_up'}", "--speed", "0", "--out",
+             f"file:{tmp_path / 'o.json'}", "--engine", "jax", "--state"]  # fmt: skip
+    events = tmp_path / "tcp.csv"
+    events.write_text(HEAD)
+    gain, state, none = (str(tmp_path / name) for name in ("gain", "state", "none"))
+    assert command([*given, gain, "--events", str(events)]) == 0
+    assert command([*given, gain, "--learn", "state"]) == 2
+    assert "of another way to learn" in capsys.readouterr().err
+    assert command([*given, state, "--learn", "state"]) == 0
+    assert command([*given, state, "--events", str(events)]) == 2
+    assert "of another way to learn" in capsys.readouterr().err
+    lines = (MACHINE / "runs" / "warm_up" / "loads.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "loads.csv").write_text("".join(lines[:100]))
+    given[3] = f"replay:{tmp_path}"
+    assert command([*given, none]) == 0
+    (tmp_path / "loads.csv").write_text("".join(lines))
+    assert command([*given, none, "--learn", "state"]) == 2
+    assert "running before the filter state began" in capsys.readouterr().err

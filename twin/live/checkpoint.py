@@ -16,7 +16,7 @@ from typing import Any
 from twin.atomic import atomic_path
 from twin.errors import TwinError
 
-FORMAT = "twin live checkpoint 1"
+FORMAT = "twin live checkpoint 2"
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from twin.calibrate.update import gain_filter
 from twin.calibrate.update.gain_filter import GainPrior, GainState
+from twin.errors import TwinError
 
 AXES = ("dx", "dy", "dz")
 
@@ -60,5 +61,7 @@ class GainFilter:
         return {"gain": state, "base": self._base.tolist(), "slow": self._slow.tolist()}
 
     def restore(self, told: dict[str, Any]) -> None:
+        if "gain" not in told:
+            raise TwinError("the state is of another way to learn", "--learn", "give the one before, or --fresh")
         self._state = None if told["gain"] is None else GainState.from_json(told["gain"])
         self._base, self._slow = np.array(told["base"]), np.array(told["slow"])

@@ -57,6 +57,9 @@ class StateFilter:
         for own in loads:
             one: UncertainLoads = jax.tree.map(lambda a: a[0], UncertainLoads(*own))
             if self._state is None:
+                if engine.steps != len(loads):
+                    remedy = "it has to learn from the start: add --fresh, or leave it out"
+                    raise TwinError("the machine was running before the filter state began", "--learn", remedy)
                 self._state = state_filter.begin(self.machine, time - dt * len(loads), engine.initial, one)
             self._state = state_filter.advance(self.machine, self._state, one, dt)
         read = np.array([temperatures.get(name, np.nan) for name in self._sensors])

@@ -328,10 +328,10 @@ class Runtime:
         """
         if whole:
             self._checkpoint(now=True)
+            self.source.release(self.resolver.held())
         self._write_step()
         self.files.write(self.health())
         self.journal.close()
-        self.source.release(self.resolver.held())
         self.source.close()
         self.publisher.close()
         os.close(self._lock)
