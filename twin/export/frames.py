@@ -6,7 +6,6 @@ undeformed. With the full model at hand (`--field`) every node has its temperatu
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -53,7 +52,7 @@ class _Stored:
     axes: tuple[str, ...]
     position: np.ndarray  # (n + 1, n_axes) m
     chosen: np.ndarray  # rows that become frames
-    folder: Path
+    run: object  # whose loads it is of, as its summary says
 
 
 def frames_of(artefact: Artefact, options: ExportOptions) -> Frames:
@@ -69,10 +68,10 @@ def frames_of(artefact: Artefact, options: ExportOptions) -> Frames:
 
 
 def _stored(artefact: Artefact, options: ExportOptions) -> _Stored:
-    with named_result(artefact, options) as f:
+    with named_result(artefact, options) as (f, told):
         time = f["time"][...]
         chosen = np.unique(np.linspace(0, len(time) - 1, min(options.frames, len(time))).round().astype(int))
-        return _Stored(time, f["states"][...], strings(f["axis"]), f["position"][...], chosen, Path(f.filename).parent)
+        return _Stored(time, f["states"][...], strings(f["axis"]), f["position"][...], chosen, told.get("run"))
 
 
 def _surface(artefact: Artefact, stored: _Stored) -> Frames:
@@ -104,7 +103,7 @@ def _volume(artefact: Artefact, stored: _Stored) -> Frames:
     from twin.rom.drive import evaluate
 
     machine = machine_of(artefact, None, artefact.model.name)
-    run = read_run(_run_folder(stored.folder))
+    run = read_run(_run_folder(stored.run))
     full = full_model(machine)
     load, dt = full.thermal.load_model, float(stored.time[1] - stored.time[0])
     drive = evaluate(load, run.loads.time, signal_values(run, load.signals), dt, int(stored.chosen[-1]))
@@ -136,16 +135,14 @@ def _volume(artefact: Artefact, stored: _Stored) -> Frames:
     return Frames("tetra10", cells, len(stored.chosen), made())
 
 
-def _run_folder(folder: Path) -> Path:
-    """The run whose loads a result is of, as its summary.json names it."""
-    try:
-        named = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["run"]
-    except (OSError, ValueError, KeyError) as e:
+def _run_folder(named: object) -> Path:
+    """The run whose loads a result is of."""
+    if not isinstance(named, str):
         remedy = "run the artefact again, with `twin run -o`"
-        raise TwinError("does not say which run it is of", str(folder / "summary.json"), remedy) from e
+        raise TwinError("does not say which run it is of", "summary.json of --result", remedy)
     if not Path(named).is_dir():
         remedy = "call from the folder where `twin run` was called"
-        raise TwinError(f"the run '{named}' is not here", str(folder / "summary.json"), remedy)
+        raise TwinError(f"the run '{named}' is not here", "summary.json of --result", remedy)
     return Path(named)
 
 

@@ -72,7 +72,7 @@ def of_result(path: Path, artefact: str, load: LoadModel, time: float | None = N
     artefacts, and for times outside the run.
     """
     remedy = "give the folder of `twin run -o`, made with this artefact"
-    with result_file(path, artefact, remedy) as f:
+    with result_file(path, artefact, remedy) as (f, _):
         ends = f["time"][1:] - f["time"][0]
         if time is not None and not 0.0 <= time <= ends[-1]:
             what = f"the run lasts {ends[-1] / 3600:g} h"

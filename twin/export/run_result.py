@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -38,8 +39,10 @@ class RunResult:
     tables: dict[str, Quantities]
 
 
-def named_result(artefact: Artefact, options: ExportOptions) -> AbstractContextManager[h5py.File]:
-    """The open result that the options name. Raises TwinError where none is named, and as `result_file`."""
+def named_result(
+    artefact: Artefact, options: ExportOptions
+) -> AbstractContextManager[tuple[h5py.File, dict[str, Any]]]:
+    """The open result that the options name, and its summary. Raises TwinError where none is named, and as `result_file`."""
     remedy = "name the folder of `twin run -o`, made with this artefact"
     if options.result is None:
         raise TwinError("this format is of a result", "--result", remedy)
@@ -52,7 +55,7 @@ def result_of(artefact: Artefact, options: ExportOptions) -> RunResult:
     Without the offsets where no axis moves the tool. Raises TwinError where no result is named, for other files and
     results of other artefacts.
     """
-    with named_result(artefact, options) as f:
+    with named_result(artefact, options) as (f, _):
         return _read(f, artefact)
 
 

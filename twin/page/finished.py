@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +40,7 @@ def finished_told(artefact: Artefact, folder: Path) -> dict[str, Any]:
         "version": VERSION,
         "mode": "finished",
         "title": f"{artefact.model.name}: result",
-        "subtitle": _run(folder),
+        "subtitle": result.run or Path(folder).name,
         "machine": machine,
         "trust": {"level": level, "line": line},
         "hours": packed(result.hours[rows]),
@@ -49,7 +48,7 @@ def finished_told(artefact: Artefact, folder: Path) -> dict[str, Any]:
         "outside": packed(result.outside[rows].astype(float)),
         "tcp": _tcp(artefact, result, rows) if artefact.model.moves else None,
         "surface": _surface(artefact, shape, result, rows) if artefact.fields else None,
-        "measured": measured_told(Path(_run(folder)), result, rows),
+        "measured": measured_told(Path(result.run), result, rows) if result.run else None,
         "flags": _flags(result),
         "correction": correction_told(artefact, Path(folder) / "correction.json"),
         "facts": _facts(artefact, result, flagged),
@@ -61,15 +60,6 @@ _FILES = (
     "result.h5", "temperatures.csv", "tcp.csv", "summary.json",
     "temperatures.png", "tcp.png", "workspace.png", "surface.png",
 )  # fmt: skip
-
-
-def _run(folder: Path) -> str:
-    """The run that was replayed, as summary.json names it."""
-    try:
-        told = json.loads((Path(folder) / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return Path(folder).name
-    return str(told.get("run", Path(folder).name))
 
 
 def _tcp(artefact: Artefact, result: Drawn, rows: np.ndarray) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from twin.errors import TwinError
 from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
-from twin.together import result_h5
+from twin.together import open_result
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class Drawn:
     flags: np.ndarray  # (n, n_flags) bool: the step was outside what was certified
     flag_names: tuple[str, ...]
     states: np.ndarray  # (n + 1, N) artefact coordinates
+    run: str  # folder of the loads, as summary.json names it; "" where that is not known
 
     @property
     def outside(self) -> np.ndarray:
@@ -51,12 +52,12 @@ class Drawn:
 
 def read_result(folder: Path, artefact: Artefact) -> Drawn:
     """The result in `folder`. Raises TwinError where there is none, or none of this artefact."""
-    path = result_h5(Path(folder) / "result.h5")
+    path = Path(folder) / "result.h5"
     remedy = "make it with: twin run ARTEFACT RUN -o OUT"
     if not path.is_file():
         raise TwinError("no result here", str(path), remedy)
     try:
-        with h5py.File(path, "r") as f:
+        with open_result(path) as (file, told), h5py.File(file, "r") as f:
             if f.attrs.get("artefact") != artefact.digest:
                 raise TwinError("a result of another artefact", str(path), remedy)
             return Drawn(
@@ -72,6 +73,7 @@ def read_result(folder: Path, artefact: Artefact) -> Drawn:
                 flags=f["flags"][...].astype(bool),
                 flag_names=strings(f["flag"]),
                 states=f["states"][...],
+                run=str(told.get("run", "")),
             )
     except (OSError, KeyError) as e:
         raise TwinError("not a readable result of `twin run`", str(path), remedy) from e

@@ -33,7 +33,7 @@ def read_pose_errors(path: Path, artefact: str, time: float | None = None) -> tu
     step is taken; by default the last. Raises TwinError for other files, other artefacts, and times outside the run.
     """
     remedy = "give the folder of `twin run -o`, made with this artefact"
-    with result_file(path, artefact, remedy) as f:
+    with result_file(path, artefact, remedy) as (f, _):
         times = f["time"][...]
         row = len(times) - 1 if time is None else int(np.argmin(np.abs(times - times[0] - time)))
         last = float(times[-1] - times[0])

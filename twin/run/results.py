@@ -17,9 +17,8 @@ from twin.atomic import atomic_path, telling
 from twin.errors import TwinError
 from twin.logs.run import Table, Tcp
 from twin.logs.write import write_table, write_tcp
-from twin.ordinary import ordinary
 from twin.rom.hdf5_file import image_of, put, put_attributes, scale
-from twin.together import result_h5
+from twin.together import open_result
 
 FORMAT = "twin result"
 
@@ -179,19 +178,20 @@ def _write_hdf5(path: Path, result: Result) -> None:
 
 
 @contextmanager
-def result_file(path: Path, artefact: str, remedy: str) -> Iterator[h5py.File]:
-    """An open result.h5 of the model with this sha256; path: the file, or the folder of `twin run -o`.
+def result_file(path: Path, artefact: str, remedy: str) -> Iterator[tuple[h5py.File, dict[str, Any]]]:
+    """An open result.h5 of the model with this sha256, and its summary.json as far as there is one.
+
+    path: the file, or the folder of `twin run -o`.
 
     Raises TwinError for other files, for results of other artefacts, and for what is missing while it is read.
     """
-    path = result_h5(path)
     try:
-        with h5py.File(ordinary(path), "r") as f:
+        with open_result(path) as (file, told), h5py.File(file, "r") as f:
             if f.attrs.get("format") != FORMAT:
                 raise TwinError("not a result of `twin run`", str(path), remedy)
             if f.attrs["artefact"] != artefact:
                 raise TwinError("a result of another artefact", str(path), remedy)
-            yield f
+            yield f, told
     except (OSError, KeyError) as e:
         raise TwinError("not a result of `twin run`", str(path), remedy) from e
 
@@ -202,5 +202,5 @@ def read_final_state(path: Path, artefact: str) -> np.ndarray:
     Raises TwinError for other files and results of other artefacts.
     """
     remedy = "give a temperature in degC or the result.h5 of a run of this artefact"
-    with result_file(path, artefact, remedy) as f:
+    with result_file(path, artefact, remedy) as (f, _):
         return np.asarray(f["states"][-1])

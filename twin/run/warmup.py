@@ -25,7 +25,7 @@ import numpy as np
 from twin.errors import TwinError
 from twin.rom.hdf5_file import strings
 from twin.run.results import FORMAT
-from twin.together import result_h5
+from twin.together import open_result
 
 WINDOW = 600.0  # s
 HORIZON = 3600.0  # s
@@ -159,12 +159,12 @@ def read_history(path: Path) -> History:
 
     Raises TwinError for other files, and for results of fewer than two steps.
     """
-    path = result_h5(path)
+    path = Path(path) / "result.h5" if Path(path).is_dir() else Path(path)
     remedy = "make it with: twin run ARTEFACT RUN -o OUT"
     if not path.is_file():
         raise TwinError("no result here", str(path), remedy)
     try:
-        with h5py.File(path, "r") as f:
+        with open_result(path) as (file, _), h5py.File(file, "r") as f:
             if f.attrs.get("format") != FORMAT:
                 raise TwinError("not a result of `twin run`", str(path), remedy)
             history = History(
