@@ -59,6 +59,9 @@ def test_what_does_not_fit_a_mesh_is_told_with_its_line(tmp_path, capsys):
     place, _, told = problem["where"].rpartition(" (line ")
     assert place.startswith(f"{path}: sensors.")
     assert line - 5 < int(told.rstrip(")")) <= line  # of the sensor's table, or of the key
+    for command in (["build", path, "-o", tmp_path / "a.h5"], ["simulate", path, RUN, "-o", tmp_path / "out"]):
+        assert run([str(c) for c in command]) == 2  # no other words there
+        assert f"error: {problem['where']}: {problem['what']}" in capsys.readouterr().err
 
 
 def test_materials_and_meshes_are_both_reported(tmp_path, capsys):

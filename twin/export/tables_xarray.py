@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,10 @@ def export_xarray(artefact: Artefact, path: Path, options: ExportOptions) -> tup
     """The format `xarray`. Raises TwinError as `result_of`, and where xarray or h5netcdf are missing."""
     result = result_of(artefact, options)
     data = dataset(result)
+    image = io.BytesIO()  # as `twin.rom.hdf5_file.writing`: a full disk is an OSError, not the end of the process
+    data.to_netcdf(image, engine="h5netcdf")
     with atomic_path(path) as temporary:
-        data.to_netcdf(temporary, engine="h5netcdf")
+        temporary.write_bytes(image.getvalue())
     sizes = ", ".join(f"{size} {name}" for name, size in data.sizes.items())
     return (f"{path}: {', '.join(result.tables)} over {sizes}",)
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from twin.atomic import atomic_path
 from twin.export.frames import Frames, frames_of
 from twin.export.options import ExportOptions
 from twin.rom.artefact import Artefact
+from twin.rom.hdf5_file import writing
 
 CELL_TYPES = {"triangle": 5, "tetra10": 24}  # VTK_TRIANGLE, VTK_QUADRATIC_TETRA
 
@@ -22,7 +22,7 @@ CELL_TYPES = {"triangle": 5, "tetra10": 24}  # VTK_TRIANGLE, VTK_QUADRATIC_TETRA
 def export_vtkhdf(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str, ...]:
     """The format `vtkhdf`. Raises TwinError as `frames_of`, and where the file cannot be written."""
     series = frames_of(artefact, options)
-    with atomic_path(path) as temporary, h5py.File(temporary, "w") as f:  # default library version: VTK reads no later
+    with writing(path) as f:
         _write(f, series)
     return (
         f"{path}: {series.count} times, {len(series.cells)} cells ({series.cell_type})"

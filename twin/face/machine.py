@@ -97,13 +97,15 @@ def load(machine: Machine | str | Path) -> Machine:
 def sound(machine: Machine | str | Path) -> tuple[Machine, list[str]]:
     """A machine without errors in description and meshes, and the warnings of `twin.check` about it, in words.
 
-    Raises TwinError with all errors: no certificate would show a wrong unit.
+    Raises TwinError with all errors, by file, key and line: no certificate would show a wrong unit.
     """
     from twin.build.check_meshes import check_meshes
     from twin.machine.check import check_machine
+    from twin.machine.load import located
 
     loaded = load(machine)
-    problems = [*check_machine(loaded.description), *check_meshes(loaded.description).problems]
+    found = [*check_machine(loaded.description), *check_meshes(loaded.description).problems]
+    problems = located(loaded.path, found)
     if errors := [p for p in problems if not p.warning]:
         raise TwinError.collect(errors)
     return loaded, [str(p) for p in problems]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from contextlib import ExitStack
 from pathlib import Path
 
-from twin.atomic import atomic_path
+from twin.atomic import atomic_path, telling
 from twin.errors import TwinError
 from twin.export.c.measure import measured
 from twin.export.c.source import source_of
@@ -30,12 +31,13 @@ def write_c(artefact: Artefact, path: Path, options: ExportOptions) -> tuple[str
     header, example = path.with_suffix(".h"), path.with_name(f"{path.stem}_example.c")
     own = {f'"{source.name}.h"': f'"{header.name}"', f"{source.name}_example.c": example.name,
            f"{source.name}.c -lm": f"{path.name} -lm"}  # fmt: skip
-    for target, text in ((header, source.header), (path, source.code), (example, source.example)):
-        head, rest = text[:10_000], text[10_000:]  # the names of files stand at the top
-        for name, file in own.items():
-            head = re.sub(re.escape(name), file, head)
-        with atomic_path(target) as temporary:
-            temporary.write_text(head + rest, encoding="utf-8")
+    with ExitStack() as stack:  # all are written before the first is renamed
+        for target, text in ((header, source.header), (path, source.code), (example, source.example)):
+            head, rest = text[:10_000], text[10_000:]  # the names of files stand at the top
+            for name, file in own.items():
+                head = re.sub(re.escape(name), file, head)
+            with telling(target):
+                stack.enter_context(atomic_path(target)).write_text(head + rest, encoding="utf-8")
     size = path.stat().st_size / 1e6
     return (f"{path}, {header.name}, {example.name}: {size:.1f} MB, {options.precision} precision, "
             f"public names begin with {source.name}_", *told)  # fmt: skip
