@@ -21,9 +21,10 @@ _LOOK = 0.02  # s between two looks
 def open_result(path: Path, wait: float = _WAIT) -> Iterator[tuple[BinaryIO, dict[str, Any]]]:
     """result.h5 of `path`, a folder of `twin run -o` or the file itself, open, and the summary.json that names it.
 
-    What is open stays what it is, whatever is renamed over it. Where no summary.json says which file it is of (one moved
-    elsewhere, results of older versions) the file is taken as it is, with what summary.json says: nothing where it is
-    missing. Raises TwinError where the two are still of two results after `wait` [s], OSError where there is no file.
+    What is open stays what it is, whatever is renamed over it. Where no summary.json says which file it is of (one
+    moved elsewhere, results of older versions) the file is taken as it is, with what summary.json says: nothing where
+    it is missing.
+    Raises TwinError where the two are still of two results after `wait` [s], OSError where there is no file.
     """
     path = Path(path)
     path = path / "result.h5" if path.is_dir() else path

@@ -103,7 +103,9 @@ def test_a_run_that_cannot_be_meant_is_one_clear_error(tmp_path, capsys, case):
     assert what in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("name", ["loads.csv", "temperatures.csv", "tcp.csv", "run.toml", "machine.toml", "a.h5", "block.twb"])
+@pytest.mark.parametrize(
+    "name", ["loads.csv", "temperatures.csv", "tcp.csv", "run.toml", "machine.toml", "a.h5", "block.twb"]
+)
 def test_a_pipe_is_not_waited_for(tmp_path, name):
     folder = shutil.copytree(RUN, tmp_path / "run")
     shutil.copy(SLIDE, folder / "machine.toml")

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 import twin
 from tests.reference.exports import read_vtk
@@ -18,7 +20,7 @@ from twin.export.frames import frames_of
 from twin.export.options import ExportOptions
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
-from twin.rom.artefact import read_artefact
+from twin.rom.artefact import read_artefact, write_artefact
 from twin.run.replay import replay
 from twin.run.results import write_results
 
@@ -46,7 +48,8 @@ def test_the_surface_comes_back_exactly(slide_artefact, slide_result, tmp_path):
             points, data = read_vtk.arrays(grid)
             assert time == frame.time
             np.testing.assert_array_equal(points, frame.points)
-            np.testing.assert_array_equal(data["temperature"], frame.data["temperature"])
+            for name in ("temperature", "displacement"):
+                np.testing.assert_array_equal(data[name], frame.data[name])
             assert grid.GetNumberOfCells() == len(made.cells)
     # and the frames are those of the result: the hottest vertex is as hot as the hottest sensor, or hotter
     with h5py.File(slide_result / "result.h5") as f:
@@ -80,6 +83,26 @@ def test_the_volume_is_the_full_models(slide_artefact, tmp_path):
     assert data["temperature"][nearest] == pytest.approx(truth.temperatures.columns[name][-1], abs=0.3)
     assert 1e-6 < np.abs(data["displacement"]).max() < 1e-3
     assert np.abs(read_vtk.arrays(by_file[0][1])[1]["displacement"]).max() < np.abs(data["displacement"]).max()
+    # the surface of the reduced model is where the full model's vertices are: those at the same place, of either part
+    frames = list(frames_of(artefact, ExportOptions(result=tmp_path / "out", frames=3)).frames)
+    for frame, (_, grid) in zip(frames[1:], by_file[1:], strict=True):
+        points, data = read_vtk.arrays(grid)
+        true, u = data["displacement"], frame.data["displacement"]
+        there = KDTree(points).query_ball_point(frame.points, 1e-9)
+        off = np.array([np.linalg.norm(true[k] - own, axis=1).min() for k, own in zip(there, u, strict=True)])
+        assert np.sqrt(np.mean(off**2)) < 0.01 * np.sqrt(np.mean(np.sum(u**2, axis=1)))
+
+
+def test_a_surface_without_displacements_says_so(slide_artefact, slide_result, tmp_path):
+    artefact = read_artefact(slide_artefact)
+    bare = [replace(field, displacement=None, flexibility=None) for field in artefact.fields]
+    write_artefact(tmp_path / "a.h5", artefact.model, artefact.description, fields=bare)
+    (told,) = twin.export(tmp_path / "a.h5", "vtk", tmp_path / "s", ExportOptions(result=slide_result, frames=2))
+    assert "no displacement: the artefact is of an older version or has calibrated expansions" in told
+    assert "no displacement" in (tmp_path / "s" / "series.pvd").read_text()
+    assert set(next(frames_of(read_artefact(tmp_path / "a.h5"), ExportOptions(result=slide_result)).frames).data) == {
+        "temperature"
+    }
 
 
 @pytest.mark.long

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,8 @@ from twin.build.rich_basis import RichOptions, basis_of, sample_responses
 from twin.build.rich_check import SHARE, rich_error
 from twin.build.scenario import theta_bounds
 from twin.build.stored_model import restored, stored
+from twin.build.structure import Structure
+from twin.build.surface_motion import SurfaceMotion
 from twin.machine.description import Limits, Machine
 from twin.progress import Progress, silent
 from twin.rom.model import AffineBody, MachineModel
@@ -37,33 +39,43 @@ def rich_model(
     """The full model projected on the rich bases of its bodies, cached."""
 
     def make() -> MachineModel:
-        model = (full or full_model(machine, progress)).thermal
         if machine.lumped:  # small already: the rich model is the full one, in coordinates with E = 1
+            model = (full or full_model(machine, progress)).thermal
             own = (project(body, np.diag(body.E.diagonal() ** -0.5)) for body in model.bodies)
             return replace(model, bodies=tuple(own))
-        return on_rich_bases(model, options, machine.limits, progress)
+        assembled = full or full_model(machine, progress)
+        moved = SurfaceMotion(machine, assembled).by_heat if isinstance(assembled.structure, Structure) else None
+        return on_rich_bases(assembled.thermal, options, machine.limits, progress, moved)
 
     return cached("rich", __name__, (machine_hash(machine), options), make)
 
 
 def on_rich_bases(
-    model: MachineModel, options: RichOptions, limits: Limits, progress: Progress = silent
+    model: MachineModel,
+    options: RichOptions,
+    limits: Limits,
+    progress: Progress = silent,
+    displaced: Callable[[int, np.ndarray], np.ndarray] | None = None,
 ) -> MachineModel:
-    """A sparse model projected on the rich bases of its bodies, fine enough for the limits; not cached."""
+    """A sparse model projected on the rich bases of its bodies, fine enough for the limits; not cached.
+
+    displaced: U (3m, r) of a body by its number and its basis (n, r).
+    """
     low, high = theta_bounds(model.load_model)
     bodies = []
     with progress("rich basis", options.samples * len(model.bodies)) as advance:
-        for body in model.bodies:
+        for b, body in enumerate(model.bodies):
             responses = sample_responses(body, low, high, options, advance)
             tolerance = options.tolerance
-            rich = _projected(body, responses, tolerance)
+            V = basis_of(body, responses, tolerance)
+            rich = _projected(body, V)
             while tolerance > FINEST and (rich.n < FREE or not rich_error(body, rich, low, high, limits) <= SHARE):
                 tolerance /= 2.0
-                rich = _projected(body, responses, tolerance)
-            bodies.append(rich)
+                V = basis_of(body, responses, tolerance)
+                rich = _projected(body, V)
+            bodies.append(replace(rich, U=displaced(b, V)) if displaced else rich)
     return replace(model, bodies=tuple(bodies))
 
 
-def _projected(body: AffineBody, responses: Sequence[np.ndarray], tolerance: float) -> AffineBody:
-    projected = project(body, basis_of(body, responses, tolerance))
-    return replace(projected, E=np.eye(projected.n))  # it is, but for the last digits
+def _projected(body: AffineBody, V: np.ndarray) -> AffineBody:
+    return replace(project(body, V), E=np.eye(V.shape[1]))  # it is, but for the last digits

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from twin.build.pipeline import (
     rich_model,
 )
 from twin.build.same_model import same_model
+from twin.build.surface_motion import surface_flexibility
 from twin.errors import ArtefactError
 from twin.machine.description import Machine
 from twin.machine.instances import written_out
@@ -33,6 +35,7 @@ from twin.machine.load import load_machine, read_text
 from twin.machine.parameters import parameters
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact, SurfaceField, read_artefact, write_artefact
+from twin.rom.model import AffineBody
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "h5py", "jax")
 
@@ -50,11 +53,12 @@ def build_artefact(
     rich = rich_model(machine, full, options.rich, progress)
     compact = compact_model(machine, rich, options, progress)
     result = certificate(machine, rich, compact, None, options, BUILD_SEED, progress=progress)
+    flexible = surface_flexibility(machine, full) if machine.has_tcp and full.surfaces else ()
     fields = [
-        SurfaceField(body.name, surface.points, surface.triangles, np.asarray(body.F))
-        for body, surface in zip(compact.bodies if full.surfaces else (), full.surfaces, strict=True)
+        SurfaceField(body.name, surface.points, surface.triangles, np.asarray(body.F), *_moved(body, flexible, b))
+        for b, (body, surface) in enumerate(zip(compact.bodies if full.surfaces else (), full.surfaces, strict=True))
     ]
-    bare = replace(compact, bodies=tuple(replace(b, F=None) for b in compact.bodies))
+    bare = replace(compact, bodies=tuple(replace(b, F=None, U=None) for b in compact.bodies))
     description = Path(machine_path) / "machine.toml" if Path(machine_path).is_dir() else Path(machine_path)
     provenance = {
         "machine": str(description.resolve()),
@@ -71,6 +75,13 @@ def build_artefact(
     text = written_out(read_text(description))  # who reads it in the artefact knows no templates
     write_artefact(target, bare, text, result.to_json(), provenance, fields, parameters=parameters(machine))
     return result
+
+
+def _moved(body: AffineBody, flexible: Sequence[np.ndarray], number: int) -> tuple[np.ndarray, ...]:
+    """How the surface of a body moves, as a `SurfaceField` has it; nothing of machines without elastic structure."""
+    if body.U is None or not flexible:
+        return ()
+    return body.U.reshape(-1, 3, body.n), flexible[number].reshape(len(body.U) // 3, 3, -1)
 
 
 def verify_artefact(

@@ -102,13 +102,7 @@ class Structure(ElasticStructure):
 
         Without `[scales]`, which act on the TCP alone.
         """
-        shifts = np.zeros((len(self.bodies), 3))
-        if self.system.encoders:
-            w = self._port_displacements(positions, fields)
-            for e in self.system.encoders:
-                off = float(self.system.reader_row(e, positions) @ w) - self._growth(e, positions, fields)
-                shifts += off * self.system.carried_by(e)
-        return shifts
+        return self.scale_shifts(positions, self._port_displacements(positions, fields), fields)
 
     def _growth(self, encoder: LinearEncoder, positions: Positions, fields: Sequence[np.ndarray]) -> float:
         """Growth [m] of a scale from its fixing point to its reader."""

@@ -1,13 +1,14 @@
 """Frames of a result for ParaView: the surface by the artefact, or the volume by the full model stepped again.
 
-An artefact holds the temperatures of the surface, not its displacements: the machine stands where its axes are,
-undeformed. With the full model at hand (`--field`) every node has its temperature and its displacement.
+The surface has the temperatures of the reduced model, and the displacements that follow from them; the machine is drawn
+where its axes are, undeformed, as displacements are data of its points. With the full model at hand (`--field`) every
+node has both, by that model stepped again.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,9 +19,13 @@ from twin.export.options import ExportOptions
 from twin.export.run_result import named_result
 from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
+from twin.rom.surface_motion import is_known, surface_displacements
 from twin.rom.tcp import by_body
 
-UNDEFORMED = "undeformed, as the artefact holds no displacements of its surface; --field has them"
+UNDEFORMED = {  # why there is no displacement
+    True: "no displacement: the artefact is of an older version or has calibrated expansions; --field has it",
+    False: "no displacement: the machine has no tool centre point",
+}
 
 
 @dataclass(frozen=True)
@@ -29,7 +34,7 @@ class Frame:
 
     time: float  # s since the start of the run
     points: np.ndarray  # (n, 3) m, axes where they are, undeformed
-    data: dict[str, np.ndarray]  # temperature (n,) degC; displacement (n, 3) m of volumes
+    data: dict[str, np.ndarray]  # temperature (n,) degC; displacement (n, 3) m
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,11 @@ class _Stored:
     position: np.ndarray  # (n + 1, n_axes) m
     chosen: np.ndarray  # rows that become frames
     run: object  # whose loads it is of, as its summary says
+
+    def position_of(self, axes: Sequence[str], row: int) -> dict[str, float]:
+        """Positions [m] of these axes in a row of the result."""
+        found = dict(zip(self.axes, self.position[row].tolist(), strict=True))
+        return {axis: found[axis] for axis in axes if axis in found}
 
 
 def frames_of(artefact: Artefact, options: ExportOptions) -> Frames:
@@ -78,7 +88,7 @@ def _surface(artefact: Artefact, stored: _Stored) -> Frames:
     from twin.machine.description import Machine
 
     machine = Machine.model_validate(tomllib.loads(artefact.description))
-    order = [body.name for body in artefact.model.bodies]
+    order, known = [body.name for body in artefact.model.bodies], is_known(artefact.model, artefact.fields)
     sizes = np.cumsum([0, *(len(f.nodes) for f in artefact.fields)])
     triangles = np.vstack([f.triangles + first for f, first in zip(artefact.fields, sizes, strict=False)])
 
@@ -87,10 +97,15 @@ def _surface(artefact: Artefact, stored: _Stored) -> Frames:
             x = by_body(artefact.model, stored.states[row])
             warm = [f.basis.astype(float) @ x[order.index(f.body)] for f in artefact.fields]
             points = _placed(machine, [(f.body, f.nodes) for f in artefact.fields], stored, row)
-            temperature = artefact.model.reference_temperature + np.concatenate(warm)
-            yield Frame(float(stored.time[row] - stored.time[0]), points, {"temperature": temperature})
+            data = {"temperature": artefact.model.reference_temperature + np.concatenate(warm)}
+            if known:
+                at = stored.position_of(artefact.model.pose_axes, row)
+                moved = surface_displacements(artefact.model, artefact.fields, stored.states[row], at)
+                data["displacement"] = np.vstack(moved)
+            yield Frame(float(stored.time[row] - stored.time[0]), points, data)
 
-    return Frames("triangle", triangles, len(stored.chosen), made(), UNDEFORMED)
+    note = "" if known else UNDEFORMED[artefact.model.moves]
+    return Frames("triangle", triangles, len(stored.chosen), made(), note)
 
 
 def _volume(artefact: Artefact, stored: _Stored) -> Frames:
@@ -116,8 +131,7 @@ def _volume(artefact: Artefact, stored: _Stored) -> Frames:
     cells = np.vstack([b.elements + first for b, first in zip(full.bodies, sizes, strict=False)])
 
     def frame(row: int, x: list[np.ndarray]) -> Frame:
-        positions = dict(zip(stored.axes, stored.position[row], strict=True))
-        linear = {axis: positions[axis] for axis in full.structure.axes}
+        linear = stored.position_of(full.structure.axes, row)
         points = _placed(machine, [(b.name, b.nodes) for b in full.bodies], stored, row)
         nodal = [state[: b.n] for state, b in zip(x, full.bodies, strict=True)]  # tanks come after the nodes
         temperature = full.thermal.reference_temperature + np.concatenate(nodal)
@@ -152,5 +166,5 @@ def _placed(machine: object, bodies: list[tuple[str, np.ndarray]], stored: _Stor
     from twin.machine.kinematics import displacement, linear_axes
 
     assert isinstance(machine, Machine)
-    positions = {a: p for a, p in zip(stored.axes, stored.position[row], strict=True) if a in linear_axes(machine)}
+    positions = stored.position_of(linear_axes(machine), row)
     return np.vstack([nodes + displacement(machine, name, positions) for name, nodes in bodies])

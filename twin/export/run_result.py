@@ -42,7 +42,7 @@ class RunResult:
 def named_result(
     artefact: Artefact, options: ExportOptions
 ) -> AbstractContextManager[tuple[h5py.File, dict[str, Any]]]:
-    """The open result that the options name, and its summary. Raises TwinError where none is named, and as `result_file`."""
+    """The open result that the options name, and its summary. Raises TwinError without one, and as `result_file`."""
     remedy = "name the folder of `twin run -o`, made with this artefact"
     if options.result is None:
         raise TwinError("this format is of a result", "--result", remedy)

@@ -1,14 +1,14 @@
 """The shape of a warm machine for a picture: its surface displaced, by what an artefact knows.
 
-An artefact knows the displacements at the elastic ports of every body exactly (guides, pads, supports, tool, work), not
-those of its surface. Between them a body is drawn as it would expand freely in the linear temperature field nearest to
-its own, which is without stress:
+Mostly that is all (`twin.rom.surface_motion`). Where it is not, as in artefacts of older versions and with calibrated
+expansions, an artefact knows the displacements at the elastic ports of every body exactly (guides, pads, supports,
+tool, work). Between them a body then is drawn as it would expand freely in the linear temperature field nearest to its
+own, which is without stress:
 
     u(r) = alpha (T0 r + (g.r) r - g |r|^2 / 2),    T = T0 + g.r
 
 moved rigidly onto the ports; what still differs there is spread to their neighbourhood by a Gaussian process. alpha is
-the body's own: what moves its ports when all of it is 1 K warmer. Storing the displacements of the surface in the
-artefact was rejected: three times the memory of everything else for a picture.
+the body's own: what moves its ports when all of it is 1 K warmer.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from scipy.sparse.csgraph import connected_components
 from twin.rom.artefact import Artefact, SurfaceField
 from twin.rom.elastic_structure import ElasticStructure
 from twin.rom.springs import SpringSystem
+from twin.rom.surface_motion import is_known, surface_displacements
 from twin.rom.tcp import by_body, inputs, is_exact
 
 REACH = 0.25  # of a piece's size: how far a port's own displacement reaches
@@ -73,6 +74,11 @@ class Shape:
     def __call__(self, states: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, ...]:
         """Displacements (n, m, 3) [m] per field at n states (n, N) and positions (n, n_axes) [m] of the linear axes."""
         model = self.artefact.model
+        if is_known(model, self.artefact.fields):
+            each = [
+                surface_displacements(model, self.artefact.fields, s, p) for s, p in zip(states, positions, strict=True)
+            ]
+            return tuple(np.array(field) for field in zip(*each, strict=True))
         x = by_body(model, states)
         heat = np.hstack(
             [x[b] @ inputs(model, b)[: len(body.R)].T for b, body in enumerate(self.structure.bodies)]

@@ -30,7 +30,7 @@ class Drawn:
     flags: np.ndarray  # (n, n_flags) bool: the step was outside what was certified
     flag_names: tuple[str, ...]
     states: np.ndarray  # (n + 1, N) artefact coordinates
-    run: str  # folder of the loads, as summary.json names it; "" where that is not known
+    run: str = ""  # folder of the loads, as summary.json names it; "" where that is not known
 
     @property
     def outside(self) -> np.ndarray:

@@ -13,7 +13,7 @@ costs one dense system of the size of the springs. Static condensation: see `twi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -87,9 +87,30 @@ class ElasticStructure:
 
         heat: h (P,), displacements by heat of the supported bodies' ports. Raises Mechanism where a body moves freely.
         """
+        return self.motion(positions, heat)[2]
+
+    def motion(self, positions: Positions, heat: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces p (P,) [N, N m] on the ports, rigid motions (n_bodies, 6) [m, rad about the machine origin], w (P,).
+
+        What every point of a body does follows from the first two. heat and errors as of `port_displacements`.
+        """
         J = self.system.gap_rows(positions)
         f, a = self._solve(J, J @ heat, np.zeros(6 * len(self.bodies)))
-        return np.asarray(heat - self._flexibility @ (J.T @ f) + self._motions @ a)
+        p = -J.T @ f
+        rigid = np.array([self._about_origin(i) @ own for i, own in enumerate(a.reshape(-1, 6))])
+        return p, rigid, np.asarray(heat + self._flexibility @ p + self._motions @ a)
+
+    def scale_shifts(self, positions: Positions, w: np.ndarray, read: Sequence[np.ndarray]) -> np.ndarray:
+        """(n_bodies, 3) [m]: what linear scales move each body by, on top of where nuts and springs hold it.
+
+        w: `port_displacements`; read: what strips of scales read of each body, temperatures of nodes or elastic inputs.
+        Without `[scales]`, which act on the TCP alone.
+        """
+        shifts = np.zeros((len(self.bodies), 3))
+        for e in self.system.encoders:
+            growth = float(self.system.scale_row(e, positions) @ read[e.strip.body][e.strip.nodes])
+            shifts += (float(self.system.reader_row(e, positions) @ w) - growth) * self.system.carried_by(e)
+        return shifts
 
     def turned_rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
         """What rotary axes off zero add: (3, p) per cut body over its ports, as `rows`; none where all are at zero."""

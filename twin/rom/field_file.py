@@ -1,4 +1,4 @@
-"""The temperature field of a body's surface in an artefact, for pictures."""
+"""The temperatures and displacements of a body's surface in an artefact, for pictures."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from twin.rom.hdf5_file import floats, integers, put, scale
 
 @dataclass(frozen=True)
 class SurfaceField:
-    """The temperature field of a body on its surface mesh, for pictures: T - T_ref = basis @ x."""
+    """A body on its surface mesh, for pictures: T - T_ref = basis @ x, and how it moves (`twin.rom.surface_motion`)."""
 
     body: str
     nodes: np.ndarray  # (m, 3) m, machine coordinates at axis positions zero
     triangles: np.ndarray  # (t, 3) int
     basis: np.ndarray  # (m, n) K per unit of state
+    displacement: np.ndarray | None = None  # (m, 3, n) m per unit of state, of the body on isostatic supports
+    flexibility: np.ndarray | None = None  # (m, 3, p) m/N per force on its elastic ports, likewise
 
 
 def write_field(group: h5py.Group, field: SurfaceField) -> None:
@@ -28,6 +30,11 @@ def write_field(group: h5py.Group, field: SurfaceField) -> None:
     put(group, "nodes", np.asarray(field.nodes, dtype=float), "m", ("node", "coordinate"))
     put(group, "triangles", np.asarray(field.triangles, dtype=np.int32), "", ("triangle", "corner"))
     put(group, "basis", np.asarray(field.basis, dtype=np.float32), "1", ("node", "state"))
+    if field.displacement is not None and field.flexibility is not None:
+        scale(group, "elastic_port", np.arange(field.flexibility.shape[2]))
+        moved, pushed = (np.asarray(a, dtype=np.float32) for a in (field.displacement, field.flexibility))
+        put(group, "displacement", moved, "m/K", ("node", "component", "state"))
+        put(group, "flexibility", pushed, "m/N", ("node", "component", "elastic_port"))
 
 
 def read_field(group: h5py.Group, body: str, n: int) -> SurfaceField:
@@ -39,4 +46,9 @@ def read_field(group: h5py.Group, body: str, n: int) -> SurfaceField:
         raise KeyError(f"'{where}' has nodes, triangles and basis that do not fit each other")
     if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(nodes):
         raise KeyError(f"'{where}/triangles' name nodes that are not there")
-    return SurfaceField(body, nodes, triangles, basis)
+    if "displacement" not in group:  # optional, with the flexibility
+        return SurfaceField(body, nodes, triangles, basis)
+    moved, pushed = (floats(group, name, where, bits=32) for name in ("displacement", "flexibility"))
+    if moved.shape != (len(nodes), 3, n) or pushed.shape[:2] != (len(nodes), 3) or pushed.ndim != 3:
+        raise KeyError(f"'{where}' has a displacement and a flexibility that do not fit its nodes")
+    return SurfaceField(body, nodes, triangles, basis, moved, pushed)

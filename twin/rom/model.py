@@ -54,6 +54,7 @@ class AffineBody:
     B_out: np.ndarray | None = None  # (n, len(sources)) likewise of sources
     H: np.ndarray | None = None  # (n, len(theta)) m^3: A_k @ height of film terms; None: zero
     F: Matrix | None = None  # (m, n) 1: temperatures of the surface vertices, for pictures
+    U: np.ndarray | None = None  # (3m, n) m/K: their displacements by heat on isostatic supports, of reduced models
     # What parameters of single members (parts; nodes and bars of lumped machines) act on, summing to E and G:
     members: tuple[str, ...] = ()
     first: tuple[int, ...] = ()  # of the full model: the first state of each member; the reduced ones have instead

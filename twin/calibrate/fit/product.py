@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -117,8 +118,6 @@ def _rms(values: np.ndarray) -> float | None:
 
 def calibrated(artefact: Artefact, parameters: Sequence[Parameter], values: dict[str, float]) -> tuple[Any, Any]:
     """The model at these values, and the parameters with these values as their nominal ones."""
-    from dataclasses import replace
-
     model = with_values(artefact.model, parameters, values)
     now = tuple(replace(p, nominal=values.get(p.path, p.nominal)) for p in artefact.parameters)
     return model, now
@@ -144,7 +143,11 @@ def write_calibrated(
         "command": command,
         "calibration": json.dumps({k: report[k] for k in ("stopped", "iterations", "parameters")}),
     }
-    write_artefact(target, model, text, certificate, provenance, artefact.fields, parameters=now)
+    fields = artefact.fields
+    if any(p.kind == "expansion" and values.get(p.path, p.nominal) != p.nominal for p in parameters):
+        # how far each part moves the surface is not in the artefact: `twin build` of the new description tells
+        fields = tuple(replace(f, displacement=None, flexibility=None) for f in fields)
+    write_artefact(target, model, text, certificate, provenance, fields, parameters=now)
     return text
 
 
