@@ -3,8 +3,8 @@
     u = D x + F_s p + rigid motion a + shift of linear scales
 
 D x is the displacement by heat of the body on isostatic supports, F_s p that by the forces p on its elastic ports.
-These and the rigid motion follow from the elastic structure (`twin.rom.elastic_structure`): the full model's displacements
-of the temperatures that the reduced model has.
+These and the rigid motion follow from the elastic structure (`twin.rom.elastic_structure`): the full model's
+displacements of the temperatures that the reduced model has.
 """
 
 from __future__ import annotations
