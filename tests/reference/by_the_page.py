@@ -21,6 +21,8 @@ from twin.physics.laws import LAWS
 DIFFERENCES = np.sign(np.arange(-32, 33)) * (np.arange(-32, 33) / 32) ** 4 * 100.0  # K, of films
 TEMPERATURES = np.linspace(-50.0, 250.0, 121)  # degC, of losses
 GAMMA, SIGMA = 0.3345, 5.670374419e-8
+STAGES = (1.0, 1.066245258858536, -0.2172086370349149, 7.4015, -9.9478, 3.6868)  # b_i/gamma
+AHEAD = (0.0, 1.0, 1.0, 1.0, 0.8994752608617009, 1.0)
 
 
 def sensors_over(path: Path, folder: Path, dt: float = 60.0) -> np.ndarray:
@@ -30,7 +32,7 @@ def sensors_over(path: Path, folder: Path, dt: float = 60.0) -> np.ndarray:
         reference, n_sensors = float(f["reference_temperature"][()]), len(f["sensor"])
         bodies = [{k: v[...] for k, v in f[f"bodies/{name}"].items()} for name in f["body"].asstr()[...]]
     run, films = read_run(folder), load["films"]
-    M, (b, ahead) = assembled(load, bodies, n_sensors), tableau()
+    M = assembled(load, bodies, n_sensors)
     air, power, film, joint, gamma, port_heat = driven(load, run.loads, dt)
     around = [load["environments"][j["environment"]] for j in films]
     gradient, height, emissivity = np.array(
@@ -62,48 +64,35 @@ def sensors_over(path: Path, folder: Path, dt: float = 60.0) -> np.ndarray:
         forcing = M["M"] @ (total * (outer - reference)) + M["H"] @ (h * gradient) + M["P"] @ port_heat[n]
         for _ in range(substeps):
             new = earlier = y = x
-            for k, weight in enumerate(b):
-                winding = reference + M["B_out"].T @ (y + ahead[k] * (y - earlier))
+            for weight, ahead in zip(STAGES, AHEAD, strict=True):
+                winding = reference + M["B_out"].T @ (y + ahead * (y - earlier))
                 q = [read(table[n], (winding[s] + 50.0) / 2.5) for s, table in enumerate(power)]
                 known = forcing + M["B"] @ q + r * M["E"] @ y
                 made = inverse @ (known - rest @ y)
                 if twice:
                     made = inverse @ (known - rest @ made)
-                new, earlier, y = new + weight / GAMMA * (made - y), y, made
+                new, earlier, y = new + weight * (made - y), y, made
             x = new
         result.append(reference + M["C"] @ x)
     return np.array(result)
 
 
 def assembled(load: dict, bodies: list[dict], n_sensors: int) -> dict[str, np.ndarray]:
-    """One machine of all bodies: states one after the other, columns at their global index."""
-    edges = np.cumsum([0, *(len(b["one"]) for b in bodies)])
-    n_theta, N = len(load["films"]) + len(load["joints"]), edges[-1]
-    M = {key: np.zeros((N, N)) for key in ("E", "A0")} | {key: np.zeros(N) for key in ("one", "energy")}
-    M |= {"A": np.zeros((n_theta, N, N)), "C": np.zeros((n_sensors, N))}
-    counts = {"M": ("theta", n_theta), "H": ("theta", n_theta), "B": ("sources", len(load["sources"]))}
-    counts |= {"B_out": counts["B"], "P": ("ports", len(load["ports"])), "P_out": ("ports", len(load["ports"]))}
-    M |= {key: np.zeros((N, n)) for key, (_, n) in counts.items()}
-    for b, (i, j) in zip(bodies, pairwise(edges), strict=True):
-        b = {"B_out": b["B"], "P_out": b["P"], "H": 0.0 * b["M"]} | b
-        for key in ("E", "A0"):
-            M[key][i:j, i:j] = b[key]
-        M["one"][i:j], M["energy"][i:j] = b["one"], b["energy"]
-        M["A"][b["theta"], i:j, i:j], M["C"][b["sensors"], i:j] = b["A"], b["C"]
-        for key, (index, _) in counts.items():
-            M[key][i:j, b[index]] = b[key]
-    return M | {key: M[key][:, : len(load["films"])] for key in ("M", "H")}
-
-
-def tableau() -> tuple[np.ndarray, np.ndarray]:
-    """Weights b of the six stages, and by how much of the last change each reads its sources ahead."""
-    i, last = np.arange(1.0, 7.0), (17.3493, -13.6346, 3.6868)
-    conditions = np.stack([i**0, GAMMA * i, GAMMA**2 * i * (i + 1.0)])
-    beta = np.array([*np.linalg.solve(conditions[:, :3], 1.0 - conditions[:, 3:] @ last), *last])
-    b, c = GAMMA * beta[::-1].cumsum()[::-1], np.where(i == 1.0, 0.0, GAMMA * i)
-    most = np.argmax(np.abs(b))
-    c[most] += (0.5 - b @ c) / b[most]
-    return b, np.array([0.0, *(c[1:] / GAMMA - i[:-1])])
+    """One machine of all bodies: states one after the other, everything else at its index in the scales of the file."""
+    ends, n_films = np.cumsum([len(b["one"]) for b in bodies]), len(load["films"])
+    N, n_theta = ends[-1], n_films + len(load["joints"])
+    columns = {"M": ("theta", n_theta), "H": ("theta", n_theta), "B": ("sources", len(load["sources"]))}
+    columns |= {"B_out": columns["B"], "P": ("ports", len(load["ports"])), "P_out": ("ports", len(load["ports"]))}
+    m = {key: np.zeros((N, count)) for key, (_, count) in columns.items()}
+    m |= {"E": np.zeros((N, N)), "A0": np.zeros((N, N)), "A": np.zeros((n_theta, N, N)), "C": np.zeros((n_sensors, N))}
+    m |= {key: np.concatenate([b[key] for b in bodies]) for key in ("one", "energy")}
+    for b, end in zip(bodies, ends, strict=True):
+        at, b = slice(end - len(b["one"]), end), {"B_out": b["B"], "P_out": b["P"], "H": 0.0 * b["M"]} | b
+        m["E"][at, at], m["A0"][at, at], m["A"][b["theta"], at, at] = b["E"], b["A0"], b["A"]
+        m["C"][b["sensors"], at] = b["C"]
+        for key, (index, _) in columns.items():
+            m[key][at, b[index]] = b[key]
+    return m | {key: m[key][:, :n_films] for key in ("M", "H")}
 
 
 class Cut:
@@ -126,11 +115,8 @@ class Cut:
 def signals(load: dict, columns: dict[str, np.ndarray], n_rows: int) -> dict[str, np.ndarray]:
     values = {}
     for s in load["signals"]:
-        v = (
-            columns.get(s["column"], np.full(n_rows, s["default"]))
-            * s["factor"]
-            / (2**0.5 if s["kind"] == "peak" else 1)
-        )
+        v = columns.get(s["column"], np.full(n_rows, s["default"]))
+        v = v * s["factor"] / (2**0.5 if s["kind"] == "peak" else 1)
         last = np.maximum.accumulate(np.where(np.isfinite(v), np.arange(n_rows), -1))  # a gap holds what was before it
         values[s["name"]] = v[np.where(last < 0, np.argmax(np.isfinite(v)), last)]
     return values
@@ -206,9 +192,8 @@ def facing(stations: np.ndarray, assignment: str, start: float, end: float) -> t
         s = np.concatenate([middle - half / np.sqrt(3.0), middle + half / np.sqrt(3.0)])
         part = np.tile(half, 2) / abs(end - start)
     every = np.eye(len(stations))
-    return np.array([np.interp(s, stations, e) for e in every]) if straight else every[
-        :, np.searchsorted(cuts, s)
-    ], part
+    w = np.array([np.interp(s, stations, e) for e in every]) if straight else every[:, np.searchsorted(cuts, s)]
+    return w, part
 
 
 def read(table: np.ndarray, place: float) -> float:
