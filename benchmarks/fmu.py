@@ -24,7 +24,8 @@ from twin.run.results import Result
 ROOT = Path(__file__).parents[1]
 SCRIPTS = ROOT / "tests" / "reference" / "exports"  # what docs/exports.md gives users to copy
 SCENARIOS = {"five_axis": "experiment_a", "ram_borer": "test_5", "transfer_unit": "working_day",
-             "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up", "lathe": "warm_up"}  # fmt: skip
+             "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up", "lathe": "warm_up",
+             "linear_gantry": "constant_room", "hexapod": "mixed_paths"}  # fmt: skip
 LIMITS = "limits 1e-9 K, 1e-9 um, 0 problems"
 
 

@@ -17,18 +17,22 @@ from twin.export.c.law_code import arguments_of, law_code
 from twin.export.c.measure import compiled_example, difference, table
 from twin.export.c.source import source_of
 from twin.export.c.text import identifier, named
+from twin.logs.read import read_run
 from twin.physics.laws import LAWS
 from twin.rom.artefact import read_artefact
 from twin.rom.load_model import LawUse
 from twin.run.correction import PoseErrors, fit_correction
 from twin.run.correction_axes import axis_jacobian
+from twin.run.replay import replay
 
 ROOT = Path(__file__).parents[2]
 SLIDE = ROOT / "tests" / "machines" / "slide" / "runs" / "short"
+SPINDLE = ROOT / "tests" / "machines" / "spindle"
 SAME, SAME_PLACE = 1e-9, 1e-15  # K, m: nothing but rounding
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 SHIPPED = {"five_axis": "experiment_a", "ram_borer": "test_5", "transfer_unit": "working_day",
-           "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up"}  # fmt: skip
+           "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up", "lathe": "warm_up",
+           "linear_gantry": "constant_room", "hexapod": "mixed_paths"}  # fmt: skip
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 
@@ -47,7 +51,33 @@ def test_a_meshed_machine_is_stepped_as_twin_run_does(slide_artefact):
 
 
 def test_a_lumped_machine_is_stepped_as_twin_run_does(lumped):
-    same(read_artefact(lumped), ROOT / "tests" / "machines" / "spindle" / "runs" / "warm_up")
+    same(read_artefact(lumped), SPINDLE / "runs" / "warm_up")
+
+
+def test_a_screw_held_at_both_ends_is_one_in_c(tmp_path):
+    text = (SPINDLE / "machine.toml").read_text(encoding="utf-8")
+    assert 'fixed_end = "start"' in text
+    (tmp_path / "machine.toml").write_text(text.replace('fixed_end = "start"', 'fixed_end = "both"'), encoding="utf-8")
+    twin.build(tmp_path, options=twin.BuildOptions(held_out=1)).save(tmp_path / "a.h5")
+    same(read_artefact(tmp_path / "a.h5"), SPINDLE / "runs" / "warm_up")
+
+
+@pytest.mark.long
+def test_a_platform_on_struts_is_one_in_c(tmp_path):
+    """Twenty minutes of paths in all six directions, by both; the poses are those of the lengths."""
+    folder = ROOT / "models" / "hexapod"
+    twin.build(folder, options=twin.BuildOptions(held_out=1, hours=0.5, substeps=1)).save(tmp_path / "a.h5")
+    run = shutil.copytree(folder / "runs" / "mixed_paths", tmp_path / "run")
+    rows = (run / "loads.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    (run / "loads.csv").write_text("".join(rows[:122]), encoding="utf-8")
+    artefact = read_artefact(tmp_path / "a.h5")
+    same(artefact, run)
+    moved = replay(artefact, read_run(run))
+    assert np.ptp(moved.position, axis=0).min() > 0.001  # m, of every strut
+    assert np.ptp(moved.tcp_actual, axis=0).max() > 1e-6
+    twin.export(tmp_path / "a.h5", "c", tmp_path / "m.c")
+    command = ["gcc", *STRICT, "-c", tmp_path / "m.c", "-o", tmp_path / "m.o"]
+    assert subprocess.run(command, capture_output=True, text=True, check=False).stderr == ""
 
 
 OFFSETS = """#include "NAME.h"

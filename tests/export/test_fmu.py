@@ -30,7 +30,8 @@ SLIDE = ROOT / "tests" / "machines" / "slide" / "runs" / "short"
 SPINDLE = ROOT / "tests" / "machines" / "spindle"
 SAME, SAME_PLACE = 1e-9, 1e-15  # K, m
 SHIPPED = {"five_axis": "experiment_a", "ram_borer": "test_5", "transfer_unit": "working_day",
-           "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up"}  # fmt: skip
+           "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up", "lathe": "warm_up",
+           "linear_gantry": "constant_room", "hexapod": "mixed_paths"}  # fmt: skip
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 

@@ -104,14 +104,19 @@ class LumpedStructure:
         own = self._strut_rows(given, pose)
         return tuple(grown + L @ rows for rows, grown in zip(self.constant, own, strict=True))
 
+    def along_struts(self) -> np.ndarray:
+        """(6,) 1 or -1: whether a strut grows as the nut of its screw moves from start to end."""
+        assert self.platform is not None
+        between = self.platform.geometry.joint - self.platform.geometry.base
+        return np.sign([screw.direction @ own for screw, own in zip(self.screws, between, strict=True)])
+
     def _strut_rows(self, given: list[float], pose: Pose) -> tuple[np.ndarray, ...]:
         """What the struts seem to grow by, (6, n_b) [m/K] per body."""
         platform = self.platform
         assert platform is not None
         rows = [np.zeros((len(self.axes), own.shape[1])) for own in self.constant]
-        for k, (screw, growth) in enumerate(zip(self.screws, platform.growth, strict=True)):
+        for k, (screw, along, growth) in enumerate(zip(self.screws, self.along_struts(), platform.growth, strict=True)):
             states = screw.first + np.arange(len(screw.borders))
-            along = float(np.sign(screw.direction @ (platform.geometry.joint[k] - platform.geometry.base[k])))
             rows[screw.body][k, states] += along * screw.growth(given[screw.axis])
             for own in growth:
                 rows[own.body][k, own.states] += own.rates

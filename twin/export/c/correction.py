@@ -10,6 +10,7 @@ from twin.rom.artefact import Artefact
 from twin.run.correction import PoseErrors, default_degrees
 from twin.run.correction_axes import axis_jacobian, offset_matrix
 from twin.run.correction_polynomial import design_matrix, normalised_axes
+from twin.run.correction_struts import on_struts
 
 
 def put_correction(out: Arrays, artefact: Artefact) -> dict[str, int]:
@@ -18,6 +19,8 @@ def put_correction(out: Arrays, artefact: Artefact) -> dict[str, int]:
     None where no axis can correct anything: no poses along axes, or axes that move neither side of the TCP.
     """
     model = artefact.model
+    if on_struts(model):  # what struts correct are errors of their lengths, of which the poses alone do not tell
+        return {"TERMS": 0}
     try:
         per_error = offset_matrix(axis_jacobian(artefact, model.pose_axes))
     except ModelError:

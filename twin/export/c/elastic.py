@@ -13,6 +13,7 @@ from twin.rom.lumped_structure import LumpedStructure
 from twin.rom.model import MachineModel
 from twin.rom.scales import AddedScale, LinearEncoder, ScaleStrip
 from twin.rom.springs import SpringSystem
+from twin.rom.struts import StrutPlatform
 from twin.rom.tcp import inputs, is_exact
 
 NONE, MESHED, LUMPED = 0, 1, 2  # TWIN_STRUCTURE
@@ -74,24 +75,46 @@ def _put_scales(out: Arrays, scales: Sequence[AddedScale], first: np.ndarray) ->
 
 
 def _put_lumped(out: Arrays, structure: LumpedStructure, first: np.ndarray) -> dict[str, int]:
-    if structure.platform is not None:
-        remedy = "use `twin run`, `twin correction`, or --format generic"
-        raise TwinError("a platform on struts has no C code", "export", remedy)
-    if any(s.held_at_both for s in structure.screws):
-        raise TwinError("a screw held at both ends has no C code", "export", "use `twin run`, or --format generic")
     out.reals("constant_rows", np.hstack(structure.constant))
     screws = structure.screws
     out.integers("screw_input", [first[s.body] + s.first for s in screws])
     out.integers("screw_borders", [len(s.borders) for s in screws])
     out.integers("screw_border_first", np.cumsum([0, *(len(s.borders) for s in screws)])[:-1])
     out.reals("screw_border", [v for s in screws for v in s.borders])
-    out.reals("screw_direction", [s.direction for s in screws])
+    if structure.platform is None:  # else they follow from the pose
+        out.reals("screw_direction", [s.direction for s in screws])
     out.reals("screw_expansion", [s.expansion for s in screws])
     out.integers("screw_from_end", [s.from_end for s in screws])
+    out.integers("screw_held_at_both", [s.held_at_both for s in screws])
     out.integers("screw_axis", [s.axis for s in screws])
     out.reals("screw_nut", [s.nut for s in screws])
     out.reals("screw_per_position", [s.per_position for s in screws])
-    return {"SCREWS": len(screws)} | _put_scales(out, structure.scales, first)
+    sizes = {"SCREWS": len(screws)} | _put_scales(out, structure.scales, first)
+    return sizes | (_put_platform(out, structure, structure.platform, first) if structure.platform else {"STRUTS": 0})
+
+
+def _put_platform(
+    out: Arrays, structure: LumpedStructure, platform: StrutPlatform, first: np.ndarray
+) -> dict[str, int]:
+    """Places are as seen from the tool centre point at the zero pose."""
+    place = platform.geometry
+    out.reals("platform_joint", place.joint - place.point)
+    out.reals("platform_base", place.base - place.point)
+    out.reals("platform_ground", platform.ground - place.point)
+    out.reals("platform_sign", [platform.sign])
+    out.reals("strut_along", structure.along_struts())
+    entries = [(k, first[g.body] + i, r) for k, own in enumerate(platform.growth) for g in own
+               for i, r in zip(g.states, g.rates, strict=True)]  # fmt: skip
+    out.integers("growth_strut", [k for k, _, _ in entries])
+    out.integers("growth_input", [i for _, i, _ in entries])
+    out.reals("growth_rate", [r for _, _, r in entries])
+    sizes = {"STRUTS": 6, "GROWTHS": len(entries)}
+    for name, spread in (("moving", platform.moving), ("frame", platform.frame)):
+        states = [] if spread is None else [first[spread.body] + i for i in spread.states]
+        out.integers(f"{name}_input", states)
+        out.reals(f"{name}_spread", [] if spread is None else spread.expansion * spread.mean)
+        sizes[name.upper()] = len(states)
+    return sizes
 
 
 def _put_meshed(out: Arrays, structure: ElasticStructure, first: np.ndarray) -> dict[str, int]:

@@ -19,7 +19,7 @@ from twin.rom.tableau import SDIRK2_6
 from twin.run.system import Prepared, prepare
 from twin.units import _TABLE
 
-_CORE = ("algebra.c", "drive.c", "step.c", "tcp.c", "correction.c")
+_CORE = ("algebra.c", "drive.c", "step.c", "platform.c", "tcp.c", "correction.c")
 _HEAD = """#include <math.h>
 #include <stddef.h>
 #include <string.h>

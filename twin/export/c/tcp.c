@@ -228,27 +228,68 @@ static int rows_of(twin_machine *m, const real *at, real *Z)
 }
 #endif
 
-#if TWIN_STRUCTURE == 2 /* lumped: constant rows, screws that grow to their nuts, scales */
+#if TWIN_STRUCTURE == 2 /* lumped: constant rows, screws that grow to their nuts, struts, scales */
+
+/* What a screw adds to Z by its growth from start to end, `factor` times along a direction. */
+static void add_growth(int s, real start, real end, real factor, const real *direction, real *Z)
+{
+    const real *border = screw_border + screw_border_first[s];
+    for (int i = 0; i < screw_borders[s] - 1; i++) {
+        const real low = FMIN(FMAX(start, border[i]), border[i + 1]);
+        const real high = FMIN(FMAX(end, border[i]), border[i + 1]), length = high - low;
+        const real right = length * ((low + high) / 2 - border[i]) / (border[i + 1] - border[i]);
+        for (int k = 0; k < 3; k++) {
+            const real growth = factor * screw_expansion[s] * direction[k];
+            Z[k * TWIN_INPUTS + screw_input[s] + i] += growth * (length - right);
+            Z[k * TWIN_INPUTS + screw_input[s] + i + 1] += growth * right;
+        }
+    }
+}
+
 static int rows_of(twin_machine *m, const real *at, real *Z)
 {
     (void)m;
     (void)at;
     memcpy(Z, constant_rows, sizeof(real) * 3 * TWIN_INPUTS);
-    for (int s = 0; s < TWIN_SCREWS; s++) {
-        const real *border = screw_border + screw_border_first[s];
-        const int n = screw_borders[s];
-        const real nut = FMIN(FMAX(screw_nut[s] + screw_per_position[s] * at[screw_axis[s]], border[0]), border[n - 1]);
-        const real start = screw_from_end[s] ? nut : border[0], end = screw_from_end[s] ? border[n - 1] : nut;
-        for (int i = 0; i < n - 1; i++) {
-            const real low = FMIN(FMAX(start, border[i]), border[i + 1]);
-            const real high = FMIN(FMAX(end, border[i]), border[i + 1]), length = high - low;
-            const real right = length * ((low + high) / 2 - border[i]) / (border[i + 1] - border[i]);
-            for (int k = 0; k < 3; k++) {
-                const real growth = (screw_from_end[s] ? -1 : 1) * screw_expansion[s] * screw_direction[3 * s + k];
-                Z[k * TWIN_INPUTS + screw_input[s] + i] += growth * (length - right);
-                Z[k * TWIN_INPUTS + screw_input[s] + i + 1] += growth * right;
+#if TWIN_STRUTS
+    platform_pose pose;
+    double jacobian[18];
+    if (!pose_at(at, &pose) || !tool_per_strut(&pose, jacobian))
+        return 0;
+    for (int c = 0; c < 3; c++) {
+        real *row = Z + c * TWIN_INPUTS;
+        double moving = 0, frame = 0;
+        for (int k = 0; k < 6; k++)
+            for (int i = 0; i < 3; i++) {
+                const double along = jacobian[6 * c + k] * pose.n[3 * k + i];
+                moving -= along * pose.lever[3 * k + i];
+                frame += along * (platform_base[3 * k + i] - platform_ground[i]);
             }
-        }
+        for (int e = 0; e < TWIN_GROWTHS; e++)
+            row[growth_input[e]] += (real)(jacobian[6 * c + growth_strut[e]] * growth_rate[e]);
+        for (int e = 0; e < TWIN_MOVING; e++)
+            row[moving_input[e]] += (real)(moving * moving_spread[e]);
+        for (int e = 0; e < TWIN_FRAME; e++)
+            row[frame_input[e]] += (real)(frame * frame_spread[e]);
+    }
+#endif
+    for (int s = 0; s < TWIN_SCREWS; s++) {
+        const real *border = screw_border + screw_border_first[s], end = border[screw_borders[s] - 1];
+        const real nut = FMIN(FMAX(screw_nut[s] + screw_per_position[s] * at[screw_axis[s]], border[0]), end);
+#if TWIN_STRUTS
+        real direction[3];
+        for (int c = 0; c < 3; c++)
+            direction[c] = (real)(strut_along[s] * jacobian[6 * c + s]);
+#else
+        const real *direction = screw_direction + 3 * s;
+#endif
+        if (screw_held_at_both[s]) {
+            add_growth(s, border[0], nut, 1, direction, Z);
+            add_growth(s, border[0], end, -(nut - border[0]) / (end - border[0]), direction, Z);
+        } else if (screw_from_end[s])
+            add_growth(s, nut, end, -1, direction, Z);
+        else
+            add_growth(s, border[0], nut, 1, direction, Z);
     }
     for (int e = 0; e < TWIN_SCALES; e++)
         for (int i = 0; i < scale_states[e]; i++)
