@@ -40,6 +40,11 @@ def test_a_damaged_artefact(slide_artefact, tmp_path, capsys):
 def test_an_output_that_is_an_input_or_a_folder(slide_artefact, tmp_path, capsys):
     assert "input" in refused(capsys, slide_artefact, "--format", "fmu2", "-o", slide_artefact)
     assert "folder" in refused(capsys, slide_artefact, "--format", "fmu2", "-o", tmp_path)
+    for name in ("loads.csv", "temperatures.csv", "tcp.csv", "summary.json"):
+        (tmp_path / name).write_text("measured")
+        form = name.rpartition(".")[2]
+        assert "input" in refused(capsys, slide_artefact, "--format", form, "--result", "x", "-o", tmp_path / name)
+        assert (tmp_path / name).read_text() == "measured"
     assert "C file" in refused(capsys, slide_artefact, "--format", "c", "-o", tmp_path / "a.fmu")
 
 
@@ -63,3 +68,8 @@ def test_a_compiler_that_fails(slide_artefact, tmp_path, monkeypatch):
     with pytest.raises(TwinError, match="the compiler false failed"):
         twin.export(slide_artefact, "fmu2", tmp_path / "a.fmu")
     assert not list(tmp_path.iterdir())
+
+
+def test_an_axis_that_is_named_twice(slide_artefact, tmp_path, capsys):
+    at = ("--at", "x=1 mm, x=2 mm")
+    assert "'x' is named twice" in refused(capsys, slide_artefact, "--format", "mat", *at, "-o", tmp_path / "a.mat")

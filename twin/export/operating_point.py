@@ -47,6 +47,8 @@ def positions(text: str) -> dict[str, float]:
     found = {}
     for item in filter(None, (part.strip() for part in text.split(","))):
         name, equals, value = item.partition("=")
+        if name.strip() in found:
+            raise TwinError(f"axis '{name.strip()}' is named twice", "--at", "write --at 'x=100 mm, y=0 mm'")
         try:
             found[name.strip()] = to_si(value.strip(), "m") if equals else to_si("", "m")
         except ValueError as e:

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from twin.export.options import ExportOptions
     from twin.face.model import Model
 
+# Files of run folders and results: a log that was measured, a summary that says which files belong together.
+OF_RUNS = ("loads.csv", "temperatures.csv", "tcp.csv", "summary.json", "correction.json")
+
 
 def export(
     model: Model | str | Path, format: str, output: str | Path, options: ExportOptions | None = None
@@ -39,6 +42,6 @@ def export(
         check_folder(target)
     else:
         check_file(target)
-    if target.suffix in (".h5", ".toml", ".msh"):
+    if target.suffix in (".h5", ".toml", ".msh") or (target.name in OF_RUNS and target.exists()):
         raise TwinError("would replace an input", str(target), f"name a file with -o, for example out/x{chosen.suffix}")
     return chosen.write(read(model).artefact, target, wanted)
