@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.five_axis import FOLDER, full
+from twin.build.displacement_field import DisplacementField
 from twin.build.pipeline import BuildOptions
 from twin.build.product import build_artefact
 from twin.build.stepper import CoupledStepper
+from twin.build.structure import Structure
 from twin.build.volumetric import displacements
 from twin.export.additive import fit_additive
 from twin.export.axis_lines import fit_lines, line_offsets
@@ -24,14 +26,16 @@ from twin.export.generic import grid_offsets
 from twin.export.options import ExportOptions
 from twin.logs.read import read_run
 from twin.logs.signals import signal_values
+from twin.machine.load import load_machine
 from twin.progress import bar
-from twin.rom.artefact import read_artefact
+from twin.rom.artefact import Artefact, read_artefact
 from twin.rom.drive import evaluate
+from twin.rom.surface_motion import surface_displacements
 from twin.run.correction import PoseErrors, fit_correction
 from twin.run.correction_axes import axis_jacobian
 from twin.run.correction_file import read_pose_errors
 from twin.run.replay import replay
-from twin.run.results import write_results
+from twin.run.results import Result, write_results
 
 HOURS = 4.0  # of experiment A: the X axis has moved
 LIMIT = 10.0  # s, any format but series of fields
@@ -48,8 +52,8 @@ class TrueErrors(PoseErrors):
         return self.displacement(position)
 
 
-def truth() -> Callable[[np.ndarray], np.ndarray]:
-    """TCP error (m, 3) [m] of the full model at positions (m, n_axes) [m], after HOURS."""
+def truth() -> list[np.ndarray]:
+    """Temperatures above the reference [K] of the full model, body by body, after HOURS."""
     model, run = full().thermal, read_run(FOLDER / "runs" / "experiment_a")
     signals = signal_values(run, model.load_model.signals)
     drive = evaluate(model.load_model, run.loads.time, signals, 60.0, round(60 * HOURS))
@@ -57,7 +61,24 @@ def truth() -> Callable[[np.ndarray], np.ndarray]:
     x = stepper.uniform(float(run.initial_temperature or model.reference_temperature))
     for _, x, _ in stepper.run(drive, x, 1):  # noqa: B020  x goes on from where it began
         last = x
-    return lambda position: displacements(full().structure, position, [last])[0]
+    return list(last)
+
+
+def surface(artefact: Artefact, result: Result, true: list[np.ndarray]) -> None:
+    """Displacements of the surface by the reduced model, as `vtk` has them, beside those of the full model."""
+    row, structure = round(60 * HOURS), full().structure
+    assert isinstance(structure, Structure)
+    at = {axis: float(p) for axis, p in zip(result.axes, result.position[row], strict=True) if axis in structure.axes}
+    exact = DisplacementField(load_machine(FOLDER), full().bodies, structure)(at, true)
+    found = surface_displacements(artefact.model, artefact.fields, result.states[row], at)
+    names = [body.name for body in full().bodies]
+    own = [full().thermal.bodies[names.index(f.body)].F @ exact[names.index(f.body)] for f in artefact.fields]
+    off, size = np.linalg.norm(np.vstack(found) - np.vstack(own), axis=1), np.linalg.norm(np.vstack(own), axis=1)
+    share = np.sqrt(np.mean(off**2) / np.mean(size**2))
+    print(
+        f"   displacements of the surface: up to {1e6 * size.max():.0f} um, at most {1e6 * off.max():.2f} um from those "
+        f"of the full model, rms {100 * share:.2f} %"
+    )
 
 
 def processor_time() -> float:
@@ -91,7 +112,8 @@ def main() -> None:
         build_artefact(FOLDER, path, BuildOptions(held_out=1), bar)
         artefact = read_artefact(path)
         run, out = FOLDER / "runs" / "experiment_a", Path(folder) / "out"
-        write_results(out, replay(artefact, read_run(run)), {"run": str(run)})
+        result = replay(artefact, read_run(run))
+        write_results(out, result, {"run": str(run)})
         for name, format in FORMATS.items():
             options = ExportOptions(result=out if "result" in format.options else None)
             target = Path(folder) / name / f"x{format.suffix}"
@@ -103,7 +125,10 @@ def main() -> None:
             print(f"   {name}: {seconds:.2f} s{limit}, {cpu:.2f} s of processor time, {size / 1e6:.2f} MB")
         errors, _ = read_pose_errors(out, artefact.digest, 3600.0 * HOURS)
         errors = replace(errors, model=artefact.model)
-        tables(errors, axis_jacobian(artefact, errors.axes), truth())
+        last = truth()
+        surface(artefact, result, last)
+        structure = full().structure
+        tables(errors, axis_jacobian(artefact, errors.axes), lambda at: displacements(structure, at, [last])[0])
 
 
 if __name__ == "__main__":
