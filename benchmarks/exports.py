@@ -76,8 +76,8 @@ def surface(artefact: Artefact, result: Result, true: list[np.ndarray]) -> None:
     off, size = np.linalg.norm(np.vstack(found) - np.vstack(own), axis=1), np.linalg.norm(np.vstack(own), axis=1)
     share = np.sqrt(np.mean(off**2) / np.mean(size**2))
     print(
-        f"   displacements of the surface: up to {1e6 * size.max():.0f} um, at most {1e6 * off.max():.2f} um from those "
-        f"of the full model, rms {100 * share:.2f} %"
+        f"   displacements of the surface: up to {1e6 * size.max():.0f} um, at most {1e6 * off.max():.2f} um from "
+        f"those of the full model, rms {100 * share:.2f} %"
     )
 
 
