@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from twin.build.displacement_field import DisplacementField
 from twin.build.full_model import assemble
 from twin.build.structure import Structure
 from twin.build.surface_motion import SurfaceMotion
+from twin.calibrate.fit.product import write_calibrated
 from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact
 from twin.rom.field_file import SurfaceField
@@ -51,3 +54,14 @@ def test_an_artefact_holds_them_and_one_without_says_so(slide_artefact):
     assert not is_known(artefact.model, bare)
     with pytest.raises(ValueError, match="no displacements"):
         surface_displacements(artefact.model, bare, state, {"x": 0.1})
+
+
+def test_calibrated_expansions_leave_no_displacement_that_is_no_longer_right(slide_artefact, tmp_path):
+    artefact = replace(read_artefact(slide_artefact), description="")
+    report = {"runs": [], "stopped": "converged", "iterations": 1}
+    for kind, known in (("expansion", False), ("source", True)):
+        one = next(p for p in artefact.parameters if p.kind == kind)
+        row = {"path": one.path, "value": 1.1 * one.nominal}
+        write_calibrated(artefact, tmp_path / "c.h5", {**report, "parameters": [row]}, artefact.parameters, "none")
+        made = read_artefact(tmp_path / "c.h5")
+        assert is_known(made.model, made.fields) is known
