@@ -49,7 +49,7 @@ test-long: $(READY) ## the rest of what continuous integration runs (some 10 min
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "long and not slow" $(PYTEST_ARGS)
 
 .PHONY: test-hidden
-test-hidden: $(READY) ## effects hidden in the five-axis machine, and its stored diagnoses: after a change to what decides
+test-hidden: $(READY) ## effects hidden in the five-axis machine, its stored diagnoses, planned experiments: after a change to what decides
 	$(BIN)/python -m pytest -m "trials and not slow" $(PYTEST_ARGS)
 
 .PHONY: test-all

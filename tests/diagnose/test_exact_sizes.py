@@ -97,9 +97,9 @@ def test_a_play_is_found_at_its_width(share):
 
 
 def test_a_film_many_times_as_strong_takes_its_parameter_along():
-    """Eight times the film of the front: far beyond the bounds of the parameter, and told as one number."""
+    """Eight times the film of the structure: far beyond the bounds of the parameter, and told as one number."""
     study = small_case.study()
-    j = next(i for i, p in enumerate(study.probed.parameters) if p.path.startswith("films.") and p.kind == "film")
+    j = next(i for i, p in enumerate(study.probed.parameters) if p.path == "films.air.gain")
     x = np.zeros(len(study.probed.parameters))
     x[j] = np.log(8.0) / study.scale[j]
     found = search(small_case.made_detector(), clean(x) + noise(9))
@@ -213,7 +213,7 @@ def test_a_joint_that_conducts_nothing_any_more_keeps_its_evidence():
 def test_sizes_scored_together_are_scored_as_each_alone():
     detector, study = small_case.made_detector(), small_case.study()
     k, x = study.fitted[0], np.zeros(len(study.probed.parameters))
-    fitted = detector.fitter(clean() + 90.0 * late(study, {k: study.states(k, x)}, 90.0) + noise(12))
+    fitted = detector.fitter(clean() + 300.0 * late(study, {k: study.states(k, x)}, 300.0) + noise(12))
     white = detector.whiten(fitted.residual)
     found = sized_candidates(detector, fitted.projector, white)
     assert found

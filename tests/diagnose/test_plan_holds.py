@@ -120,7 +120,7 @@ def judged(
     return alone, both
 
 
-@pytest.mark.long
+@pytest.mark.trials
 def test_a_sensor_at_the_far_bearing_of_a_ball_screw_finds_what_it_promises():
     text = (BALL_SCREW / "nodes.toml").read_text("utf-8")
     loads = read_run(BALL_SCREW / "runs" / "mixed_load")
@@ -139,7 +139,7 @@ def test_a_sensor_at_the_far_bearing_of_a_ball_screw_finds_what_it_promises():
     assert both < 1.0
 
 
-@pytest.mark.long
+@pytest.mark.trials
 def test_an_axis_to_and_fro_on_a_meshed_machine_finds_what_it_promises(tmp_path):
     loads = read_run(small.loads(tmp_path / "loads", 0))
     case = Case(small.SLIDE, small.described(), loads, "foot_1.x_max", "x_speed", float(small.HOURS))

@@ -161,6 +161,6 @@ def verified(
     if not mesh:  # the mesh is what it was when it was asked for
         return replace(result, parts=(*result.parts, *known_parts(artefact.certificate, MESH)))
     chosen = chosen_for_full(rich.load_model, held_out(rich, options, VERIFY_SEED), SCENARIOS)
-    positions = np.array(result.positions).reshape(len(result.positions), -1)
+    positions = np.array(result.positions, dtype=float).reshape(len(result.positions), -1 if result.positions else 0)
     part = mesh_part(machine, full, chosen, result.substeps, positions, progress)
     return with_part(result, part, machine.limits)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.diagnose.evidence.formal import Described
-from twin.diagnose.evidence.nulls import Form, lowest, lump_of, typical
+from twin.diagnose.evidence.nulls import Form, lump_of, typical
 from twin.diagnose.faults.elements import EXPONENT, Elements, Key
 from twin.diagnose.faults.signal import CLOCK
 from twin.diagnose.model.bank import Nominal
@@ -31,7 +31,7 @@ def described_forms(
     """Of raw (m, n) responses in physical units."""
     load, probed = study.probed.base.load_model, study.probed
     films = [f.name for f in load.films]
-    usual, least = (np.mean([of(study, k) for k in study.fitted], axis=0) for of in (typical, lowest))
+    usual = np.mean([typical(study, k) for k in study.fitted], axis=0)
     columns: list[np.ndarray] = []
 
     def add(key: Key, size: float) -> None:
@@ -40,7 +40,7 @@ def described_forms(
 
     for place in probed.places:
         if place.film:
-            add(("film", place.name, "always"), form.local_film * float(least[films.index(place.film)]))
+            add(("film", place.name, "always"), form.local_film * float(usual[films.index(place.film)]))
     for f, film in enumerate(load.films):
         for signal in film.use.signals.values():
             heard = elements.histories.same.get(signal, signal)
