@@ -85,7 +85,7 @@ def test_a_second_cause_explains_more_than_the_first_ones_misfits(monkeypatch):
     first = 0
     for k in study.fitted:
         (b, s), _ = study.runs[k].shapes
-        y[first : first + b * s].reshape(b, s)[:, 1] += study.runs[k].measured.bin_time * 3.0 / 14400.0
+        y[first : first + b * s].reshape(b, s)[:, 1] += study.runs[k].measured.bin_time * 2.0 / 14400.0
         first += study.runs[k].size
     both = search(small_case.made_detector(), y).accepted
     assert {a.hypothesis.family for a in both} == {"heat_source", "sensor"}
