@@ -148,7 +148,7 @@ class LoadModel:
     ports: tuple[str, ...]
     rails: tuple[Rail, ...]
     pairs: tuple[Pair, ...]
-    rotary: tuple[RotaryWiring, ...] = ()  # in the order of `MachineModel.turning`
+    rotary: tuple[RotaryWiring, ...] = ()  # in the order of the angles behind positions (`twin.rom.tcp`)
 
     @property
     def surroundings(self) -> int:

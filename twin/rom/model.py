@@ -122,7 +122,7 @@ class MachineModel:
     @property
     def turning(self) -> tuple[str, ...]:
         """Rotary axes that turn the tool or the work: their angles [rad] may follow positions of the pose axes."""
-        return self.structure.turning if isinstance(self.structure, ElasticStructure) else ()
+        return tuple(axis.name for axis in self.load_model.rotary)
 
     @property
     def moves(self) -> bool:
