@@ -24,7 +24,7 @@ from twin.machine.parameters import parameters
 from twin.machine.turning import pieces_of, standing_axes, turning_axes
 from twin.rom.artefact import Artefact, read_artefact, write_artefact
 from twin.rom.parallel import rotated
-from twin.rom.tcp import by_body, row_weights, tcp_at, tcp_rows, tilt_at
+from twin.rom.tcp import at_positions, by_body, row_weights, tcp_at, tcp_rows, tilt_at
 from twin.run.correction import PoseErrors
 from twin.run.correction_axes import offset_matrix
 from twin.run.correction_rotary import fit_rotary, geometric_jacobian, rotary_axes
@@ -217,6 +217,19 @@ def stored(machine, full, tmp_path_factory) -> Artefact:
     text = (machine.folder / "machine.toml").read_text(encoding="utf-8")
     write_artefact(path, bare, description=text, parameters=parameters(machine))
     return read_artefact(path)
+
+
+def test_a_model_without_its_structure_has_the_rows_at_angles_that_it_was_given(full):
+    """As the window model of a calibration and the model of a diagnosis are."""
+    positions = np.array([[0.1, 0.8, -0.5], [-0.1, 0.0, 0.0]])
+    bare = replace(at_positions(full.thermal, positions), structure=None)
+    assert bare.turning == full.thermal.turning
+    weights, outside = row_weights(bare, positions)
+    assert not outside.any()
+    T = fields(full, 8)
+    wanted = [full.structure.displacement(p, T) for p in positions]
+    np.testing.assert_allclose(tcp_at(bare, T, positions), wanted, atol=1e-12)
+    assert (weights.max(axis=1) == 1.0).all()
 
 
 def test_the_artefact_keeps_what_turns(full, stored):

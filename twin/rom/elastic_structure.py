@@ -59,11 +59,6 @@ class ElasticStructure:
         """Linear axes, in the order of positions."""
         return self.system.axes
 
-    @property
-    def turning(self) -> tuple[str, ...]:
-        """Rotary axes, whose angles follow the positions."""
-        return self.system.turning
-
     def rows(self, positions: Positions) -> tuple[np.ndarray, ...]:
         """Z_b (3, n_ports_b) per body: the TCP displacement is sum_b Z_b h_b at this pose, plus `scale_rows`.
 
