@@ -311,7 +311,7 @@ def test_what_cannot_be_updated_is_refused(artefact, truth):
     with pytest.raises(LogError, match=r"no tcp\.csv"):
         update_run(artefact, dataclasses.replace(truth, tcp=None), OPTIONS)
     early = dataclasses.replace(truth.tcp, time=truth.tcp.time - 1e5)
-    with pytest.raises(LogError, match="count from the first row, which is outside"):
+    with pytest.raises(LogError, match="count from the first row, which is outside the loads"):
         update_run(artefact, dataclasses.replace(truth, tcp=early, tcp_reference="first"), OPTIONS)
     with pytest.raises(ModelError, match="as parameters"):
         update_run(dataclasses.replace(artefact, parameters=()), truth, OPTIONS)

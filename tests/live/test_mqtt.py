@@ -155,12 +155,17 @@ def test_what_was_taken_but_is_not_in_the_journal_comes_again(broker):
     client.loop_stop()
 
 
-def test_blocks_that_wait_for_a_missing_one_are_not_acknowledged(broker, tmp_path):
-    client = broker.sender()
+def running(broker, folder):
+    """A sender, and a process that takes blocks from a source."""
     source = MqttSource(f"127.0.0.1:{broker.port}/loads", broker.channels())
-    made = runtime(tmp_path / "state", source, Kept())
+    made = runtime(folder / "state", source, Kept())
     made.begin(True)
     made.once(1.0)
+    return broker.sender(), source, made
+
+
+def test_blocks_that_wait_for_a_missing_one_are_not_acknowledged(broker, tmp_path):
+    client, source, made = running(broker, tmp_path)
     send(client, "loads", 0, 2, 3, 0)
     until = time.monotonic() + 15.0
     while made.resolver.counts.repeated < 1 and time.monotonic() < until:
@@ -205,11 +210,7 @@ def test_a_correction_is_retained_and_gone_on_from(broker):
 
 
 def test_the_process_counts_lost_and_repeated_blocks(broker, tmp_path):
-    client = broker.sender()
-    source = MqttSource(f"127.0.0.1:{broker.port}/loads", broker.channels())
-    made = runtime(tmp_path / "state", source, Kept())
-    made.begin(True)
-    made.once(1.0)
+    client, _, made = running(broker, tmp_path)
     send(client, "loads", 0, 1, 1, 3, 2, 9, 10, 11, 12, 13)
     client.publish("loads", b"no block", qos=1).wait_for_publish(10)
     until = time.monotonic() + 15.0

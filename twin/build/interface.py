@@ -10,6 +10,7 @@ one point arrives at the other, so heat is conserved where the two areas differ,
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,12 +127,9 @@ def common_areas(body: BodyMesh, a: str, b: str, gap: float | None = None) -> tu
     """
     fa, fb = _facets(body, a), _facets(body, b)
     of_a, of_b = np.zeros(len(fa.centre)), np.zeros(len(fb.centre))
-    pairs = _facing(fa, fb, gap)
-    for start in range(0, len(pairs), PAIRS):
-        i, j = pairs[start : start + PAIRS].T
-        _, owner, area = _common(fa, fb, i, j, gap)
-        of_a += np.bincount(i[owner], area, len(of_a))
-        of_b += np.bincount(j[owner], area, len(of_b))
+    for i, j, _, area in _intersections(fa, fb, gap):
+        of_a += np.bincount(i, area, len(of_a))
+        of_b += np.bincount(j, area, len(of_b))
     return of_a, of_b
 
 
@@ -141,15 +139,21 @@ def common_pieces(
     """The area over which two surfaces face each other as k triangles: which facet of `a` and of `b` each is on (k,),
     in the order of the surfaces' facets, and its corners (k, 3, 6) in barycentric coordinates of both.
     """
-    fa, fb = _facets(body, a), _facets(body, b)
-    pairs = _facing(fa, fb, gap)
     found = [(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 3, 6)))]
-    for start in range(0, len(pairs), PAIRS):
-        i, j = pairs[start : start + PAIRS].T
-        triangles, owner, _ = _common(fa, fb, i, j, gap)
-        found.append((i[owner], j[owner], triangles))
+    found += [pieces[:3] for pieces in _intersections(_facets(body, a), _facets(body, b), gap)]
     of_a, of_b, triangles = (np.concatenate(column) for column in zip(*found, strict=True))
     return of_a, of_b, triangles
+
+
+def _intersections(
+    fa: _Facets, fb: _Facets, gap: float | None
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """Of some pairs of facets at a time: the facets of A and of B (t,), the triangles and areas of `_common`."""
+    pairs = _facing(fa, fb, gap)
+    for start in range(0, len(pairs), PAIRS):
+        i, j = pairs[start : start + PAIRS].T
+        triangles, owner, area = _common(fa, fb, i, j, gap)
+        yield i[owner], j[owner], triangles, area
 
 
 def _intersect(

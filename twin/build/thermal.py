@@ -33,6 +33,7 @@ from twin.rom.model import AffineBody, MachineModel
 DEFAULT_POSES = 5  # positions per linear axis
 
 FilmSurfaces = Mapping[str, tuple[tuple[str, str], ...]]
+FilmMatrices = dict[str, dict[str, sp.csr_array]]  # film -> body -> int N N^T dA [m^2] (n, n)
 
 
 @BilinearForm
@@ -55,9 +56,10 @@ def assemble_thermal(machine: Machine, bodies: tuple[BodyMesh, ...]) -> MachineM
         raise DescriptionError.collect(wrong)
     films = film_surfaces(machine, {part.name: tuple(part.surfaces) for body in bodies for part in body.parts})
     ports = contact_ports(machine, bodies)
-    load = load_model(machine, ports, _film_areas(machine, bodies, films))
+    matrices = _film_matrices(machine, bodies, films)
+    load = load_model(machine, ports, _film_areas(machine, matrices))
     rows = _sensor_rows(machine, bodies)
-    meshed = [_body(machine, body, films, ports, load, rows[body.name]) for body in bodies]
+    meshed = [_body(machine, body, matrices, ports, load, rows[body.name]) for body in bodies]
     return machine_model(
         machine, load, tuple(with_free_nodes(machine, i == 0, body, load) for i, body in enumerate(meshed))
     )
@@ -118,7 +120,7 @@ def pose_grid(machine: Machine) -> tuple[np.ndarray, ...]:
 def _body(
     machine: Machine,
     body: BodyMesh,
-    films: FilmSurfaces,
+    matrices: FilmMatrices,
     ports: ContactPorts,
     load: LoadModel,
     rows: Mapping[str, np.ndarray],
@@ -128,7 +130,7 @@ def _body(
     A0 = sp.csr_array(sp.block_diag([a for _, a in parts], format="csr"))
     one = np.ones(body.n)
     height = body.nodes[:, "xyz".index(machine.machine.vertical)]
-    terms = [*_film_terms(machine, body, films, load, height), *_joint_terms(machine, body, load)]
+    terms = [*_film_terms(body, matrices, load, height), *_joint_terms(machine, body, load)]
     B = _source_loads(machine, body, load)
     P, port_numbers = port_averages(body, ports)
     sensors = _structural(machine)
@@ -156,15 +158,11 @@ def _body(
     return with_tanks(machine, body, bare)
 
 
-def _film_terms(
-    machine: Machine, body: BodyMesh, films: FilmSurfaces, load: LoadModel, height: np.ndarray
-) -> Iterator[Term]:
+def _film_terms(body: BodyMesh, matrices: FilmMatrices, load: LoadModel, height: np.ndarray) -> Iterator[Term]:
     """height (n,) m of the nodes."""
-    own = {part.name for part in body.parts}
     for k, film in enumerate(load.films):
-        surfaces = [(p, s) for p, s in films[film.name] if p in own]
-        if surfaces:
-            matrix = film_matrix(machine, body, surfaces, film.name, film.additional)
+        matrix = matrices[film.name].get(body.name)
+        if matrix is not None:
             yield Term(k, matrix, matrix @ np.ones(body.n), matrix @ height)
 
 
@@ -193,15 +191,24 @@ def _structural(machine: Machine) -> tuple[str, ...]:
     return tuple(name for name, s in machine.sensors.items() if s.environment is None)
 
 
-def _film_areas(machine: Machine, bodies: tuple[BodyMesh, ...], films: FilmSurfaces) -> dict[str, float]:
+def _film_matrices(machine: Machine, bodies: tuple[BodyMesh, ...], films: FilmSurfaces) -> FilmMatrices:
+    """Of every film, by the name of each body that it acts on."""
+    found: FilmMatrices = {}
+    for name, surfaces in films.items():
+        parts, found[name] = {part for part, _ in surfaces}, {}
+        for body in bodies:
+            if parts & {part.name for part in body.parts}:
+                found[name][body.name] = film_matrix(machine, body, surfaces, name, machine.films[name].additional)
+    return found
+
+
+def _film_areas(machine: Machine, matrices: FilmMatrices) -> dict[str, float]:
     """m^2 of what every film acts on."""
     nodes = free_nodes(machine)
     areas = {}
-    for name, surfaces in films.items():
-        entry = machine.films[name]
-        areas[name] = sum(float(nodes[s].area or 0.0) for s in entry.surfaces if s in nodes)
-        for body in bodies:
-            areas[name] += float(film_matrix(machine, body, surfaces, name, entry.additional).sum())
+    for name, own in matrices.items():
+        of_nodes = (float(nodes[s].area or 0.0) for s in machine.films[name].surfaces if s in nodes)
+        areas[name] = sum(of_nodes) + sum(float(matrix.sum()) for matrix in own.values())
     return areas
 
 

@@ -19,7 +19,7 @@ class SurfaceField:
     triangles: np.ndarray  # (t, 3) int
     basis: np.ndarray  # (m, n) K per unit of state
     displacement: np.ndarray | None = None  # (m, 3, n) m per unit of state, of the body on isostatic supports
-    flexibility: np.ndarray | None = None  # (m, 3, p) m/N per force on its elastic ports, likewise
+    flexibility: np.ndarray | None = None  # (m, 3, p) m/N per force on its elastic ports
 
 
 def write_field(group: h5py.Group, field: SurfaceField) -> None:

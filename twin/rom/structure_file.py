@@ -57,7 +57,14 @@ def _put_flexibilities(group: h5py.Group, bodies: Sequence[PortFlexibility]) -> 
     for body in bodies:
         own = group.create_group(body.name)
         scale(own, "elastic_port", np.arange(len(body.F)), "", "as the first elastic inputs of the body")
-        put(own, "F", body.F, "m/N", ("elastic_port", "elastic_port"), "displacement per force; rad, N m likewise")
+        put(
+            own,
+            "F",
+            body.F,
+            "m/N",
+            ("elastic_port", "elastic_port"),
+            "displacement per force; in rad, N m for rotations",
+        )
         put(own, "R", body.R, "1", ("elastic_port", "rigid_motion"), "displacement per translation, rotation")
 
 

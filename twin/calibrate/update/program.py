@@ -277,9 +277,9 @@ def _rows(run: Run, base: Result) -> tuple[Measurement | None, list[Measurement]
     from_first = run.tcp_reference == "first"
     if from_first and not good[0]:
         raise LogError(
-            "deviations count from the first row, which is outside the time of the loads or has no position",
+            "deviations count from the first row, which is outside the loads' time, has no position, or a turned axis",
             str(run.folder / "tcp.csv"),
-            "let the loads begin before the first row, or remove rows before the loads",
+            "let the loads begin before the first row, or count from a row with rotary axes at zero",
         )
     good &= (tcp.time > base.time[0]) & np.isfinite(tcp.displacement).any(axis=1)
     sigma = tcp.sigma

@@ -204,8 +204,8 @@ def shared_by_film(study: Study, local: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Relative changes of the coefficients of places (n_places,): the mean over the area of each film (n_films,), and
     what is left of each place.
 
-    The mean acts in proportion to the coefficient, as it changes. A constant one of the mean of a film that motion
-    makes many times as large would take more than there is at rest.
+    The mean acts in proportion to the coefficient as motion changes it, the rest as a constant share of its least. A
+    constant share of its mean over the run would take away more than there is at rest where motion makes a film strong.
     """
     probed = study.probed
     (body,) = probed.base.bodies
@@ -226,12 +226,12 @@ def typical(study: Study, k: int) -> np.ndarray:
 
 
 def lowest(study: Study, k: int) -> np.ndarray:
-    """(n_films,) W/(m^2 K): the least convection of each film in a run, likewise."""
+    """(n_films,) W/(m^2 K): the least convection of each film in a run, at a rise of a few kelvin."""
     return _convection(study, k).min(axis=0)
 
 
 def _convection(study: Study, k: int) -> np.ndarray:
-    """(n, n_films) W/(m^2 K)"""
+    """(n, n_films) W/(m^2 K) in every step, at a rise of a few kelvin where it follows the surface."""
     drive = study.runs[k].run.drive
     result = np.array(drive.theta[:, : len(study.probed.base.load_model.films)])
     middle = drive.films.value.shape[2] // 2 + 15

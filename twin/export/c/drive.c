@@ -226,7 +226,7 @@ static void accumulate(twin_machine *m, double time, const real *v, const real *
         m->raised[flag_rail + k] |= FMIN(s, e) < x[0] - pair_margin[k] ||
                                     FMAX(s, e) > x[pair_count[k] - 1] + pair_margin[k];
     }
-    for (int a = 0; a < TWIN_TURNS; a++) /* rows of the TCP are those of rotary axes at zero */
+    for (int a = 0; a < TWIN_TURNS; a++) /* TCP rows are those at zero; rad, twin.rom.turning.STRAIGHT */
         m->raised[flag_turn + a] |= FABS(v[turn_signal[a]]) > R(1e-6);
     for (int i = 0; i < TWIN_SIGNALS; i++)
         raise_bounds(m, flag_signal + 2 * i, v[i], signal_low[i], signal_high[i], signal_margin[i]);
