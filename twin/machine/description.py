@@ -234,6 +234,7 @@ class Film(Entry):
     law: str
     # "part.surface", or "part.*" for every surface of the part not used elsewhere; of a lumped machine nodes and bars
     surfaces: tuple[str, ...] = Field(min_length=1)
+    each: Literal["part", "surface"] | None = None  # a film of its own for each: the loader writes them out
     area: Area | None = Field(None, gt=0)  # lumped machines: of a node that exchanges heat through several films
     environment: str
     gain: float = Field(1.0, gt=0)  # calibration factor of the convection

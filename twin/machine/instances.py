@@ -17,6 +17,7 @@ from pydantic import ValidationError
 
 from twin.errors import DescriptionError, Problem
 from twin.machine.description import Instance
+from twin.machine.each import each_apart
 from twin.machine.toml_text import Section, Table, toml_text
 from twin.nearest import did_you_mean
 from twin.units import to_si
@@ -37,13 +38,23 @@ _DIGITS = 12  # of coordinates after the point: a picometre
 
 
 def expanded(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[Keys, Keys]]:
-    """The description with every instance written out, and where its entries come from.
+    """The description with every instance, and every film with `each`, written out, and where entries come from.
 
-    Returns tables as `tomllib` gives them, without `templates` and `instances`, and for each (section, name) that an
-    instance made the keys (templates, template, section, name) of what it was made from.
+    Returns tables as `tomllib` gives them, without `templates` and `instances`, and for each (section, name) that was
+    made the keys of what it was made from: (templates, template, section, name) of instances.
     Raises DescriptionError with all that is wrong with templates and instances; what is wrong within their entries is
     found later, like anywhere.
     """
+    made, origins = _with_instances(data)
+    if "films" not in made:
+        return made, origins
+    films, apart = each_apart(made["films"])
+    of_films = {("films", own): origins.get(("films", name), ("films", name)) for own, name in apart.items()}
+    return {**made, "films": films}, origins | of_films
+
+
+def _with_instances(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[Keys, Keys]]:
+    """The description with every instance written out."""
     rest = {key: value for key, value in data.items() if key not in ("templates", "instances")}
     if "templates" not in data and "instances" not in data:
         return rest, {}
@@ -73,13 +84,13 @@ def expanded(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[Keys, Keys]]
 
 
 def written_out(text: str) -> str:
-    """The text of a sound description with every instance written out; as it is where there is none."""
+    """The text of a sound description with every instance and `each` written out; as it is where there is none."""
     data = tomllib.loads(text)
-    if "instances" not in data and "templates" not in data:
+    written, origins = expanded(data)
+    if not origins and "templates" not in data and "instances" not in data:
         return text
-    written, _ = expanded(data)
     sections = tuple(Section(key, _tables(key, value)) for key, value in written.items())
-    return toml_text("All instances written out.", sections)
+    return toml_text("All instances and films of each place written out.", sections)
 
 
 def _tables(key: str, value: Any) -> tuple[Table, ...]:
