@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import twin
+from tests.support.lumped import climbing
 from twin.errors import TwinError
 from twin.export.c.law_code import arguments_of, law_code
 from twin.export.c.measure import compiled_example, difference, table
@@ -60,6 +61,17 @@ def test_a_screw_held_at_both_ends_is_one_in_c(tmp_path):
     (tmp_path / "machine.toml").write_text(text.replace('fixed_end = "start"', 'fixed_end = "both"'), encoding="utf-8")
     twin.build(tmp_path, options=twin.BuildOptions(held_out=1)).save(tmp_path / "a.h5")
     same(read_artefact(tmp_path / "a.h5"), SPINDLE / "runs" / "warm_up")
+
+
+def test_air_that_is_warmer_above_an_axis_that_moves_up_is_so_in_c(tmp_path):
+    climbing(tmp_path)
+    twin.build(tmp_path, options=twin.BuildOptions(held_out=1)).save(tmp_path / "a.h5")
+    artefact = read_artefact(tmp_path / "a.h5")
+    same(artefact, SPINDLE / "runs" / "warm_up")
+    still = (dataclasses.replace(b, raised=None) for b in artefact.model.bodies)
+    still = dataclasses.replace(artefact, model=dataclasses.replace(artefact.model, bodies=tuple(still)))
+    warm = [replay(a, read_run(SPINDLE / "runs" / "warm_up")).temperature for a in (artefact, still)]
+    assert np.abs(warm[0] - warm[1]).max() > 0.01  # K, that it moves
 
 
 @pytest.mark.long

@@ -33,21 +33,22 @@ def sensors_over(path: Path, folder: Path, dt: float = 60.0) -> np.ndarray:
         bodies = [{k: v[...] for k, v in f[f"bodies/{name}"].items()} for name in f["body"].asstr()[...]]
     run, films = read_run(folder), load["films"]
     M = assembled(load, bodies, n_sensors)
-    air, power, film, joint, gamma, port_heat = driven(load, run.loads, dt)
+    air, power, film, joint, gamma, port_heat, places = driven(load, run.loads, dt)
     around = [load["environments"][j["environment"]] for j in films]
     gradient, height, emissivity = np.array(
         [(e["gradient"], e["height"], j["emissivity"]) for e, j in zip(around, films, strict=True)]
     ).T
     left = np.linalg.solve(M["E"].T, M["energy"])
     area = left @ M["M"] + (left @ M["M"] <= 0.0)
-    mean_height, rows = left @ M["H"] / area, left @ M["A"][: len(films)]
+    rows = left @ M["A"][: len(films)]
     x = (run.initial_temperature - reference) * M["one"]
     result, held, substeps = [reference + M["C"] @ x], np.array([-1.0]), int(certificate.get("substeps", 1))
     r = substeps / (GAMMA * dt)
     for n in range(len(air)):
         surface, radiant = reference + rows @ x / area, air[n, [j["radiant"] for j in films]]
         at_zero = air[n, [j["environment"] for j in films]] - gradient * height
-        difference = surface - at_zero - gradient * mean_height
+        H = M["H"] + np.tensordot(places[n], M["raised"], 1)
+        difference = surface - at_zero - gradient * (left @ H / area)
         large = np.maximum(np.abs(difference), 1e-6)
         place = 32.0 * (1.0 + difference / large * (large / 100.0) ** 0.25)
         h = np.array([read(table[n], place[k]) for k, table in enumerate(film)])
@@ -61,7 +62,7 @@ def sensors_over(path: Path, folder: Path, dt: float = 60.0) -> np.ndarray:
             S = r * M["E"] + M["A0"] + np.tensordot(held, M["A"], 1) + M["P"] @ gamma[n] @ M["P_out"].T
             inverse = np.linalg.inv(S)
         rest, twice = np.tensordot(theta - held, M["A"], 1), np.any(np.abs(theta - held) > 0.1 * held)
-        forcing = M["M"] @ (total * (outer - reference)) + M["H"] @ (h * gradient) + M["P"] @ port_heat[n]
+        forcing = M["M"] @ (total * (outer - reference)) + H @ (h * gradient) + M["P"] @ port_heat[n]
         for _ in range(substeps):
             new = earlier = y = x
             for weight, ahead in zip(STAGES, AHEAD, strict=True):
@@ -86,13 +87,14 @@ def assembled(load: dict, bodies: list[dict], n_sensors: int) -> dict[str, np.nd
     m = {key: np.zeros((N, count)) for key, (_, count) in columns.items()}
     m |= {"E": np.zeros((N, N)), "A0": np.zeros((N, N)), "A": np.zeros((n_theta, N, N)), "C": np.zeros((n_sensors, N))}
     m |= {key: np.concatenate([b[key] for b in bodies]) for key in ("one", "energy")}
+    m["raised"] = np.zeros((len(load["axes"]), N, n_theta))
     for b, end in zip(bodies, ends, strict=True):
         at, b = slice(end - len(b["one"]), end), {"B_out": b["B"], "P_out": b["P"], "H": 0.0 * b["M"]} | b
         m["E"][at, at], m["A0"][at, at], m["A"][b["theta"], at, at] = b["E"], b["A0"], b["A"]
-        m["C"][b["sensors"], at] = b["C"]
+        m["C"][b["sensors"], at], m["raised"][:, at, b["theta"]] = b["C"], b.get("raised", 0.0)
         for key, (index, _) in columns.items():
             m[key][at, b[index]] = b[key]
-    return m | {key: m[key][:, :n_films] for key in ("M", "H")}
+    return m | {key: m[key][..., :n_films] for key in ("M", "H", "raised")}
 
 
 class Cut:
@@ -133,7 +135,7 @@ def law(entry: dict, values: dict[str, np.ndarray], air: np.ndarray) -> np.ndarr
 
 
 def driven(load: dict, loads: Table, dt: float) -> tuple:
-    """What the log drives, step by step: air, losses, films, joints, contacts (n, ports, ports) and their heat."""
+    """What the log drives, step by step: air, losses, films, joints, contacts (n, ports, ports), their heat, places."""
     time, n_rows = loads.time - loads.time[0], len(loads.time)
     cut, values = Cut(time, dt), signals(load, loads.columns, n_rows)
     air = np.stack([(values[e["signal"]] if e["signal"] else np.full(n_rows, e["temperature"])) + e["offset"]
@@ -160,7 +162,14 @@ def driven(load: dict, loads: Table, dt: float) -> tuple:
         rail_share = np.array([load["sources"][k]["rail_share"] for k in own])
         add_pair(load["rails"][pair["rail"]], pair, cut, way, conductance(pair), rail_share, (*q, gamma, heat))
     on_surfaces = [p * (not s["contact"]) for p, s in zip(power, load["sources"], strict=True)]
-    return means, on_surfaces, film, joint, gamma, heat
+    return means, on_surfaces, film, joint, gamma, heat, mean_places(load, values, cut, time)
+
+
+def mean_places(load: dict, values: dict[str, np.ndarray], cut: Cut, time: np.ndarray) -> np.ndarray:
+    """Where the axes stand in the mean over each step (n, n_axes) [m]."""
+    ways = [np.interp(cut.borders, time, values[a["position"]]) for a in load["axes"]]
+    places = [np.add.reduceat((w[1:] + w[:-1]) / 2 * cut.share, cut.first) for w in ways]
+    return np.reshape(places, (-1, cut.n)).T
 
 
 def add_pair(

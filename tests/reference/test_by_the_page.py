@@ -12,6 +12,7 @@ import pytest
 
 import twin
 from tests.reference.by_the_page import sensors_over
+from tests.support.lumped import climbing
 from twin.logs.read import read_run
 from twin.rom.artefact import read_artefact
 from twin.run.replay import replay
@@ -57,6 +58,12 @@ def test_a_lumped_machine(tmp_path, apart):
     folder = ROOT / "tests" / "machines" / "spindle"
     twin.build(folder, options=twin.BuildOptions(held_out=4)).save(tmp_path / "a.h5")
     assert apart(tmp_path / "a.h5", folder / "runs" / "warm_up") < SAME
+
+
+def test_a_machine_that_climbs_in_air_that_is_warmer_above(tmp_path, apart):
+    climbing(tmp_path)
+    twin.build(tmp_path, options=twin.BuildOptions(held_out=1)).save(tmp_path / "a.h5")
+    assert apart(tmp_path / "a.h5", ROOT / "tests" / "machines" / "spindle" / "runs" / "warm_up") < SAME
 
 
 @pytest.fixture(scope="module", params=["ball_screw_axis/mixed_load", "five_axis/experiment_a"])

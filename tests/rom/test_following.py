@@ -31,7 +31,6 @@ from twin.run.system import prepare
 
 PLATE = LawUse("free_vertical_plate", {"height": 0.4}, {})
 MIXED = LawUse("mixed_plate", {"length": 0.3, "height": 0.4}, {"speed": "speed"})
-HEIGHT = np.zeros(2)
 WINDING = LawUse("motor_winding", {"resistance": 1.2, "coefficient": 0.00393}, {"current": "current"})
 
 
@@ -269,13 +268,15 @@ def test_coefficients_outside_the_certificate_and_the_law_are_flagged():
     drive = loads(model)
     prepared = prepare(model)
     steps = integrate(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(19.0))
-    flags = following_flags(model.load_model, drive, steps.theta, steps.surface, HEIGHT, steps.winding)
+    flags = following_flags(
+        model.load_model, drive, prepared.system.film_plan, steps.theta, steps.surface, steps.winding
+    )
     assert flags["films.bed below 12 W/(m^2*K)"].any()
     assert not flags["films.bed above 40 W/(m^2*K)"].any()
     text = LAWS["free_vertical_plate"].validity.text
     assert not flags[f"films.bed: law outside {text}"].any()
     hot = replace(drive, films=replace(drive.films, outside=np.ones_like(drive.films.outside)))
-    assert following_flags(model.load_model, hot, steps.theta, steps.surface, HEIGHT, steps.winding)[
+    assert following_flags(model.load_model, hot, prepared.system.film_plan, steps.theta, steps.surface, steps.winding)[
         f"films.bed: law outside {text}"
     ].any()
 
@@ -326,7 +327,9 @@ def test_a_surface_beyond_the_table_is_flagged(start, flagged):
     drive = evaluate(model.load_model, time, {"air": 0 * time + 20.0, "current": 0 * time, "speed": 0 * time}, 60.0)
     prepared = prepare(model)
     steps = integrate(prepared, inputs_of(model.load_model, drive, 4), prepared.uniform(start))
-    flags = following_flags(model.load_model, drive, steps.theta, steps.surface, HEIGHT[:1], steps.winding)
+    flags = following_flags(
+        model.load_model, drive, prepared.system.film_plan, steps.theta, steps.surface, steps.winding
+    )
     (law,) = (flag for name, flag in flags.items() if "law outside" in name)
     assert law[0] == law.any() == flagged
 

@@ -66,3 +66,19 @@ def edited(folder: Path, *edits: tuple[str, str]) -> Path:
     path = folder / "machine.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def climbing(folder: Path) -> Path:
+    """The spindle set upright, x pointing up, in air that is 6 K warmer per metre: films that follow, over what moves
+    and what stands."""
+    return edited(
+        folder,
+        ('reference_temperature = "20 degC"', 'reference_temperature = "20 degC"\nvertical = "x"'),
+        ('signal = "shop_air"\n\n[environment.coolant]',
+         'signal = "shop_air"\ngradient = "6 K/m"\nheight = 0.2\n\n[environment.coolant]'),
+        ('mass = "12 kg"', 'mass = "12 kg"\nposition = [0.4, 0.0, 0.5]'),
+        ('mass = "40 kg"', 'mass = "40 kg"\nposition = [0.1, 0.0, 0.4]'),
+        ('capacity = "180 kJ/K"', 'capacity = "180 kJ/K"\nposition = [-0.3, 0.0, 0.2]'),
+        ('[films.air]\nlaw = "constant_film"', '[films.air]\nlaw = "free_vertical_plate"'),
+        ('parameters = { natural = "6 W/(m^2*K)" }', 'parameters = { height = "300 mm" }'),
+    )  # fmt: skip

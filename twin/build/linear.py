@@ -63,6 +63,7 @@ def linear_body(mesh: BodyMesh, body: AffineBody) -> AffineBody:
         B=V.T @ body.B,
         P=V.T @ body.P,
         H=None if body.H is None else V.T @ body.H,
+        raised=None if body.raised is None else np.array([V.T @ columns for columns in body.raised]),
         C=body.C @ V,
         G=_right(body.G, V),
         W=None if body.W is None else _right(body.W, V),

@@ -166,6 +166,9 @@ def with_places(full: FullModel, places: Sequence[Place]) -> MachineModel:
                 theta=(*body.theta[:cut], *(n_films + k for k in own), *(k + n for k in body.theta[cut:])),
                 M=np.hstack([body.M[:, :cut], extra, body.M[:, cut:]]),
                 H=None if body.H is None else np.hstack([body.H[:, :cut], none, body.H[:, cut:]]),
+                raised=None
+                if body.raised is None
+                else np.array([np.hstack([r[:, :cut], none, r[:, cut:]]) for r in body.raised]),
                 B=np.column_stack([body.B, *B]) if B else body.B,
                 sources=(*body.sources, *(n_sources + k for k in own)),
             )
@@ -250,6 +253,7 @@ def _body_with(body: AffineBody, theta: Mapping[int, int], source: Mapping[int, 
         theta=tuple(theta[body.theta[i]] for i in terms),
         M=body.M[:, terms],
         H=None if body.H is None else body.H[:, terms],
+        raised=None if body.raised is None else body.raised[:, :, terms],
         B=body.B[:, own],
         B_out=None if body.B_out is None else body.B_out[:, own],
         sources=tuple(source[body.sources[i]] for i in own),

@@ -51,6 +51,7 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
         P_out=None if W is None else V.T @ body.port_rows.T,
         B_out=None if W is None else V.T @ body.source_rows.T,
         H=None if body.H is None else left.T @ body.H,
+        raised=None if body.raised is None else left.T @ body.raised,
         C=body.C @ V,
         G=body.G @ V,
         W=None if body.W is None else body.W @ V,

@@ -76,16 +76,19 @@ class CoupledStepper:
         self._film_rows = tuple(body.film_rows for body in model.bodies)
         self._dense = tuple(None if scipy.sparse.issparse(b.E) else DenseTerms(b, n_films) for b in model.bodies)
         self._small = all(self._dense) and ends[-1] <= SMALL
-        # area and first moment of height of the films
-        self._area, self._moment = np.zeros(n_theta), np.zeros(n_theta)
+        # area and first moment of height of the films, and what a metre of each axis adds to that
+        axes = len(model.load_model.axes) if any(body.raised is not None for body in model.bodies) else 0
+        self._area, self._moment = np.zeros(n_theta), np.zeros((1 + axes, n_theta))
         for body in model.bodies:
             own = list(body.theta)
             self._area[own] += body.left_one @ body.M
             if body.H is not None:
-                self._moment[own] += body.left_one @ body.H
+                self._moment[0, own] += body.left_one @ body.H
+            if body.raised is not None:
+                self._moment[1:, own] += body.left_one @ body.raised
         self._area[n_films:] = 0.0
         self._safe_area = np.where(self._area[:n_films] > 0, self._area[:n_films], 1.0)
-        self._plan = FilmPlan.of(model.load_model, self._moment[:n_films] / self._safe_area)
+        self._plan = FilmPlan.of(model.load_model, self._moment[:, :n_films], self._safe_area)
         self._contacts = ContactPlaces.of(model.load_model)
         self._feeds: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]] = {}
 
@@ -130,6 +133,7 @@ class CoupledStepper:
             power=Tabulated(drive.power[step], drive.losses.index, drive.losses.value[step]),
             port_heat=drive.contact_heat[step].sum(axis=0),
             environment=drive.environment[step],
+            position=drive.mean_position[step],
             radiation=float(drive.radiation),
         )
 
@@ -158,8 +162,9 @@ class CoupledStepper:
         return self._feeds[index]
 
     def _of_terms(self, films: np.ndarray) -> np.ndarray:
-        """(n_theta,): numbers (n_films,) of films, and zero for joints."""
-        return np.append(films, np.zeros(len(self._area) - len(films)))
+        """(..., n_theta): numbers (..., n_films) of films, and zero for joints."""
+        joints = len(self._area) - films.shape[-1]
+        return np.concatenate([films, np.zeros((*films.shape[:-1], joints))], axis=-1)
 
     def forcing(self, loads: StepLoads) -> list[np.ndarray]:
         """Per body M theta (T_out - T_ref) + H lift + B q + P q_port [W]."""
@@ -169,7 +174,9 @@ class CoupledStepper:
             own = list(body.theta)
             f = body.M @ (loads.theta[own] * rise[own])
             if body.H is not None:
-                f = f + body.H @ lift[own]
+                f = f + body.H @ lift[0, own]
+            if body.raised is not None:
+                f = f + np.einsum("ank,ak->n", body.raised, lift[1:, own])
             result.append(f + body.B @ loads.power[list(body.sources)] + body.P @ loads.port_heat[list(body.ports)])
         return result
 
@@ -331,7 +338,7 @@ class CoupledStepper:
     ) -> Heat:
         """Heat of a step from its loads, its change of state, and the means that the rest and the factor saw."""
         rise, lift = self._of_terms(loads.rise), self._of_terms(loads.lift)
-        flow = loads.theta * self._area * rise + self._moment * lift
+        flow = loads.theta * self._area * rise + (self._moment * lift).sum(axis=0)
         stored = 0.0
         for body, rows, f, dx, x_seen, x_own in zip(
             self.model.bodies, self._film_rows, factors, change, seen, own, strict=True

@@ -16,6 +16,7 @@ from twin.build.interface import interface
 from twin.build.mesh import BodyMesh, PartMesh
 from twin.build.ports import ContactPorts, contact_ports, port_averages
 from twin.build.probe import probe
+from twin.build.raised import with_raised
 from twin.build.surface import patch
 from twin.build.tanks import with_tanks
 from twin.build.terms import Term, columns, joint_term
@@ -72,7 +73,7 @@ def machine_model(machine: Machine, load: LoadModel, bodies: tuple[AffineBody, .
     axes = np.meshgrid(*grid, indexing="ij")
     return MachineModel(
         name=machine.machine.name,
-        bodies=bodies,
+        bodies=with_raised(machine, bodies),
         load_model=load,
         reference_temperature=machine.machine.reference_temperature,
         sensors=_structural(machine),

@@ -87,4 +87,5 @@ def body_arrays(body: AffineBody) -> dict[str, np.ndarray]:
         "ports": np.array(body.ports, dtype=np.int64),
         "sensors": np.array(body.sensors, dtype=np.int64),
     }
-    return arrays | ({} if body.H is None else {"H": body.H})
+    optional = {"H": body.H, "raised": body.raised}  # (n, theta) m^3, (axis, n, theta) m^2
+    return arrays | {name: array for name, array in optional.items() if array is not None}

@@ -59,7 +59,7 @@ def state_space(model: MachineModel, point: OperatingPoint) -> StateSpace:
     P_out = _columns(model, [b.port_rows.T for b in model.bodies], [b.ports for b in model.bodies], len(load.ports))
     conduction = block_diag(*(b.A0 + _weighted(b, theta) for b in model.bodies))
     sources = _columns(model, [b.B for b in model.bodies], [b.sources for b in model.bodies], len(load.sources))
-    environments, gradients, inputs = _environments(model, point.films)
+    environments, gradients, inputs = _environments(model, point)
     own = [axis.name for axis in load.axes]
     at = point.position[[own.index(name) for name in model.pose_axes]]
     tcp = np.hstack([rows[0] for rows in tcp_rows(model, at[None])]) if model.moves else np.zeros((0, model.n))
@@ -118,17 +118,19 @@ def _facing(load: LoadModel, pair: Pair, position: np.ndarray) -> np.ndarray:
     return weights
 
 
-def _environments(model: MachineModel, films: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[Channel, ...]]:
+def _environments(model: MachineModel, point: OperatingPoint) -> tuple[np.ndarray, np.ndarray, tuple[Channel, ...]]:
     """What environments bring: columns (n, n_environments) per K above the reference, (n, g) per K/m; their channels.
 
     theta_k M_k T_out,k + lift_k H_k with T_out = T_air + share (T_radiant - T_air), T_air the one at height zero.
     """
-    load = model.load_model
+    load, films = model.load_model, point.films
     M = _columns(model, [b.M for b in model.bodies], [b.theta for b in model.bodies], len(load.theta_names))
     H = np.zeros_like(M)
     for body, first in zip(model.bodies, _first(model), strict=True):
         if body.H is not None:
             H[first : first + body.n, list(body.theta)] = body.H
+        if body.raised is not None:
+            H[first : first + body.n, list(body.theta)] += np.tensordot(point.position, body.raised, 1)
     reference = model.reference_temperature
     warmer, above = np.zeros((2, model.n, len(load.environments)))
     for k, film in enumerate(load.films):

@@ -56,7 +56,7 @@ class JaxEngine:
         self.loads: list[tuple[Inputs, np.ndarray]] | None = None  # of steps, for a filter that takes them; None: none
         self._positions = set(self.facts.axis_channels)
         system = self._prepared.system
-        self._height = np.asarray(system.film_moment) / np.maximum(np.asarray(system.film_area), 1e-30)
+        self._films = jax.tree.map(np.asarray, system).film_plan
         self._C, self._G = np.asarray(system.C), np.asarray(system.G)
         self.start(self.facts.reference_temperature)
         self._made = 0  # steps of this process
@@ -147,7 +147,7 @@ class JaxEngine:
             raise EngineFailure(e.problems[0].what, "engine", e.problems[0].remedy) from e
         self._air = measured_air(self._load, drive)[0, [i for _, i in self._model.ambient_sensors]].tolist()
         theta, surface, winding = (np.asarray(a) for a in (heat.theta, heat.surface, heat.winding))
-        followed = following_flags(self._load, drive, theta, surface, self._height, winding)
+        followed = following_flags(self._load, drive, self._films, theta, surface, winding)
         axes = [a.name for a in self._load.axes]
         here = drive.position[:, [axes.index(a) for a in self._model.pose_axes]]
         self._flags = [name for k, name in enumerate(drive.flag_names) if drive.flags[0, k]]

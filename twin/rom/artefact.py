@@ -218,7 +218,7 @@ def _read(f: h5py.File, digest: str) -> tuple[Artefact, tuple[str, ...]]:
     bodies = member(f, "bodies")
     model = MachineModel(
         name=_attribute(f, "name", str),
-        bodies=tuple(read_body(member(bodies, name, "bodies"), name, len(poses)) for name in names),
+        bodies=tuple(read_body(member(bodies, name, "bodies"), name, len(poses), len(axes)) for name in names),
         load_model=load,
         reference_temperature=float(floats(f, "reference_temperature")),
         sensors=texts(f, "sensor"),

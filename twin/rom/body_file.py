@@ -17,6 +17,7 @@ _MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
     "A": ("m^2", ("theta", "equation", "state")),
     "M": ("m^2", ("equation", "theta")),
     "H": ("m^3", ("equation", "theta")),
+    "raised": ("m^2", ("pose_axis", "equation", "theta")),
     "B": ("1", ("equation", "sources")),
     "B_out": ("1", ("state", "sources")),
     "P": ("1", ("equation", "ports")),
@@ -30,7 +31,7 @@ _MATRICES: dict[str, tuple[str, tuple[str, ...]]] = {
     "W": ("m/K", ("elastic_input", "state")),
     "W_members": ("m/K", ("member", "elastic_input", "state")),
 }
-_OPTIONAL = ("H", "B_out", "P_out", "E_members", "G_members", "W", "W_members")
+_OPTIONAL = ("H", "raised", "B_out", "P_out", "E_members", "G_members", "W", "W_members")
 _INDICES = {"theta": "theta", "sources": "source", "ports": "port", "sensors": "sensor"}  # into root coordinates
 
 
@@ -52,8 +53,8 @@ def write_body(group: h5py.Group, body: AffineBody) -> None:
             put(group, name, np.asarray(values[name], dtype=float), unit, dims)
 
 
-def read_body(group: h5py.Group, name: str, n_poses: int) -> AffineBody:
-    """The body in a group of the file.
+def read_body(group: h5py.Group, name: str, n_poses: int, n_axes: int) -> AffineBody:
+    """The body in a group of the file of a machine with so many poses and linear axes.
 
     Raises KeyError where a dataset is missing, or is not of the type and shape that docs/artefact.md gives it, or holds
     values that are not finite.
@@ -62,7 +63,7 @@ def read_body(group: h5py.Group, name: str, n_poses: int) -> AffineBody:
     indices: dict[str, Any] = {part: tuple(int(i) for i in integers(group, part, where)) for part in _INDICES}
     members = texts(group, "member", where) if "member" in group else ()
     n, inputs = len(floats(group, "one", where)), len(floats(group, "W", where)) if "W" in group else 0
-    sizes = {"equation": n, "state": n, "pose": n_poses, "component": 3, "member": len(members)}
+    sizes = {"equation": n, "state": n, "pose": n_poses, "component": 3, "pose_axis": n_axes, "member": len(members)}
     sizes |= {"elastic_input": inputs} | {kind: len(index) for kind, index in indices.items()}
     values: dict[str, Any] = {}
     for part, (_, dims) in _MATRICES.items():

@@ -41,6 +41,7 @@ class Drive:
     square: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w_i^2
     neighbour: np.ndarray  # (n, n_pairs, n_segments) dwell mean of w_i w_{i+1}; last column zero
     position: np.ndarray  # (n, n_axes) m at the end of each step
+    mean_position: np.ndarray  # (n, n_axes) m over each step
     flags: np.ndarray  # (n, n_flags) bool: flag_names[k] holds at some time in this step
     flag_names: tuple[str, ...]  # e.g. "signals.x_current above 20 A", "gap in loads"
     switched: np.ndarray | None = None  # (n, n_environments) K of `environment` that switches bring; None: no switch
@@ -134,6 +135,7 @@ def evaluate(
         square=square,
         neighbour=neighbour,
         position=_columns([np.interp(edges[1:], t, values[a.position]) for a in load_model.axes], n_steps),
+        mean_position=_columns([intervals.mean_of_path(path[a.name]) for a in load_model.axes], n_steps),
         angle=_columns([np.interp(edges[1:], t, values[a.position]) for a in load_model.rotary], n_steps),
         flags=np.stack(list(flags.values()), axis=1),
         flag_names=tuple(flags),

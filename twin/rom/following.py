@@ -80,14 +80,20 @@ class FilmPlan:
     emissivity: Array  # (f,)
     gradient: Array  # (f,) K/m of the air
     height: Array  # (f,) m where the air's temperature is measured
-    mean_height: Array  # (f,) m of the films' surfaces
+    mean_height: Array  # (f,) m of the films' surfaces, axes at zero
+    climb: Array  # (a, f) by how much that grows per metre of each axis; a = 0 where no axis raises a film's surface
 
-    def air(self, environment: Array) -> Array:
-        """degC (..., f) of the air at the mean height of the films' surfaces, which their laws see; (..., e) given."""
-        return environment[..., self.environment] + self.gradient * (self.mean_height - self.height)
+    def air(self, environment: Array, position: Array) -> Array:
+        """degC (..., f) of the air at the mean height of the films' surfaces, which their laws see.
+
+        environment (..., e) [degC], position (..., axes) [m].
+        """
+        height = self.mean_height + position @ self.climb if len(self.climb) else self.mean_height
+        return environment[..., self.environment] + self.gradient * (height - self.height)
 
     @classmethod
-    def of(cls, load: LoadModel, mean_height: Array) -> FilmPlan:
+    def of(cls, load: LoadModel, moment: Array, area: Array) -> FilmPlan:
+        """moment (1 + a, f) m^3: of height, axes at zero, then [m^2] by the metre of each axis; area (f,) m^2."""
         air = [load.environments[f.environment] for f in load.films]
         return cls(
             environment=np.array([f.environment for f in load.films], dtype=np.int64),
@@ -95,7 +101,8 @@ class FilmPlan:
             emissivity=np.array([f.emissivity for f in load.films]),
             gradient=np.array([e.gradient for e in air]),
             height=np.array([e.height for e in air]),
-            mean_height=mean_height,
+            mean_height=moment[0] / area,
+            climb=moment[1:] / area,
         )
 
 
@@ -106,17 +113,23 @@ class FilmState:
     convection: Array  # (f,) W/(m^2 K)
     total: Array  # (..., f) W/(m^2 K), convection and radiation: what multiplies the affine term
     outer: Array  # (..., f) degC: the temperature outside that both together see, at height zero
-    lift: Array  # (f,) W/(m^3 K) times K: convection times gradient, multiplies H
+    lift: Array  # (1 + a, f) W/m^3: convection times gradient, multiplies H; times positions, multiplies `raised`
     radiated: Array  # (..., f) W/m^2 into the surfaces by radiation
 
 
 def film_state(
-    xp: Any, plan: FilmPlan, convection: Array, surface: Array, environment: Array, radiation: Array | float
+    xp: Any,
+    plan: FilmPlan,
+    convection: Array,
+    surface: Array,
+    environment: Array,
+    position: Array,
+    radiation: Array | float,
 ) -> FilmState:
     """Coefficients of films with convection (f,) [W/(m^2 K)] at mean surface temperatures (f,) [degC].
 
-    environment (..., n_environments) [degC]; radiation: 1, or 0 to switch it off. With h_c (T - T_air) +
-    h_r (T - T_rad) = (h_c + h_r)(T - T_outer), a surface needs one affine term for both.
+    environment (..., n_environments) [degC]; position (axes,) [m]; radiation: 1, or 0 to switch it off. With
+    h_c (T - T_air) + h_r (T - T_rad) = (h_c + h_r)(T - T_outer), a surface needs one affine term for both.
     """
     air, radiant = environment[..., plan.environment], environment[..., plan.radiant]
     radiated = radiation * radiation_coefficient(surface, radiant, plan.emissivity)
@@ -124,4 +137,7 @@ def film_state(
     total = convection + radiated
     share = radiated / xp.where(total > 0.0, total, 1.0)
     outer = at_zero + share * (radiant - at_zero)
-    return FilmState(convection, total, outer, convection * plan.gradient, radiated * (radiant - surface))
+    lift = (convection * plan.gradient)[None]
+    if len(plan.climb):
+        lift = xp.concatenate([lift, position[:, None] * lift])
+    return FilmState(convection, total, outer, lift, radiated * (radiant - surface))

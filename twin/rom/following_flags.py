@@ -13,16 +13,15 @@ AT_REST = 0.05  # K: closer to its surroundings a surface exchanges no heat that
 
 
 def following_flags(
-    load: LoadModel, drive: Drive, theta: np.ndarray, surface: np.ndarray, height: np.ndarray, winding: np.ndarray
+    load: LoadModel, drive: Drive, plan: FilmPlan, theta: np.ndarray, surface: np.ndarray, winding: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Name -> (n_steps,) bool: coefficients outside the certified range, and laws outside their validity.
 
     theta (n_steps, n_theta) W/(m^2 K), surface (n_steps, n_films) and winding (n_steps, len(drive.losses.index)) degC
-    as stepped; height (n_films,) m: mean of the films' surfaces.
+    as stepped.
     """
     flags: dict[str, np.ndarray] = {}
-    plan = FilmPlan.of(load, height)
-    air = plan.air(drive.environment)
+    air = plan.air(drive.environment, drive.mean_position)
     radiant = drive.environment[:, plan.radiant]
     exchanges = (np.abs(surface - air) > AT_REST) | ((plan.emissivity > 0) & (np.abs(surface - radiant) > AT_REST))
     for k, film in enumerate(load.films):

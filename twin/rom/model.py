@@ -4,13 +4,15 @@ A *body* is the set of parts joined by fixed contacts: it moves as one. Bodies m
 For every body (field temperatures relative to T_ref, x in K or in modal coordinates):
 
     E x' = -(A0 + sum_k theta_k A_k) x + sum_k theta_k (M_k (T_amb,k - T_ref) + H_k gamma_k) + B q + P q_port
+    H_k = H_k(0) + sum_a raised_a,k position_a
     T_port = P^T x          (area average of a port; P also distributes port heat: sum over nodes 1)
     T_sensor = C x
     w(pose) = G[pose] x     (this body's share of the TCP displacement, m)
     w(position) = Z(position) W x     (the same at any axis position: `twin.rom.tcp`)
     T_source = B^T x        (area average of a source's surface)
 
-gamma_k [K/m] is the rise of the environment's temperature with height, T_amb,k its value at height zero.
+gamma_k [K/m] is the rise of the environment's temperature with height, T_amb,k its value at height zero. An axis that
+moves a body up moves it into other air: raised_a,k is M_k times the vertical part of the axis' direction.
 
 Moving contacts couple port temperatures: q_port = -Gamma(t) T_port with a symmetric positive semidefinite Gamma
 (`twin.rom.contact`). E, A0, A_k are symmetric positive semidefinite for the full model and every Galerkin projection
@@ -52,7 +54,8 @@ class AffineBody:
     energy: np.ndarray  # (n,) J/K: energy @ x is the heat stored relative to T_ref (= E one)
     P_out: np.ndarray | None = None  # (n, n_ports) where reading a port differs from feeding it (oblique projection)
     B_out: np.ndarray | None = None  # (n, len(sources)) likewise of sources
-    H: np.ndarray | None = None  # (n, len(theta)) m^3: A_k @ height of film terms; None: zero
+    H: np.ndarray | None = None  # (n, len(theta)) m^3: A_k @ height of film terms, axes at zero; None: zero
+    raised: np.ndarray | None = None  # (n_axes, n, len(theta)) m^2: what a metre of each axis adds to H; None: zero
     F: Matrix | None = None  # (m, n) 1: temperatures of the surface vertices, for pictures
     U: np.ndarray | None = None  # (3m, n) m/K: their displacements by heat on isostatic supports, of reduced models
     # What parameters of single members (parts; nodes and bars of lumped machines) act on, summing to E and G:

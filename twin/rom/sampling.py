@@ -37,6 +37,12 @@ class Intervals:
         base = held[self.first]
         return base + np.add.reduceat((held - base[self.step]) * share, self.first, axis=0)
 
+    def mean_of_path(self, path: np.ndarray) -> np.ndarray:
+        """Means over steps (n_steps,) of a path that is linear between its values at the borders (k + 1,)."""
+        middle = 0.5 * (path[:-1] + path[1:])
+        base = middle[self.first]
+        return np.asarray(base + np.add.reduceat((middle - base[self.step]) * self.share, self.first))
+
     def part(self, begin: int, end: int) -> Intervals:
         """The intervals of steps begin .. end, with steps and samples counted from the first of them."""
         here = slice(self.first[begin], self.first[end] if end < self.n_steps else len(self.start))

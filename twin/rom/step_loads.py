@@ -44,6 +44,7 @@ class StepDrive:
     power: Tabulated  # (n_sources,) W, over TEMPERATURES
     port_heat: Array  # (n_ports,) W
     environment: Array  # (n_environments,) degC
+    position: Array  # (axes,) m, mean over the step
     radiation: Array | float  # 1 or 0
 
 
@@ -53,7 +54,7 @@ class StepLoads:
 
     theta: Array  # (n_theta,) W/(m^2 K), films with radiation, then joints
     rise: Array  # (n_films,) K: outer temperature above the reference
-    lift: Array  # (n_films,) multiplies H
+    lift: Array  # (1 + a, n_films) multiplies H, then `raised` of every axis
     power: Array  # (n_sources,) W
     port_heat: Array  # (n_ports,) W
     surface: Array  # (n_films,) degC, at the step's start
@@ -65,7 +66,7 @@ def step_loads(
     xp: Any, plan: FilmPlan, drive: StepDrive, surface: Array, winding: Array, reference: Array | float
 ) -> StepLoads:
     """The loads of a step at mean temperatures [degC] of films' surfaces (n_films,) and of following sources (k,)."""
-    films = film_loads(xp, plan, drive.convection, surface, drive.environment, drive.radiation)
+    films = film_loads(xp, plan, drive.convection, surface, drive.environment, drive.position, drive.radiation)
     return StepLoads(
         theta=xp.concatenate([films.total, drive.joints]),
         rise=films.outer - reference,
@@ -84,17 +85,19 @@ def film_loads(
     convection: Tabulated,
     surface: Array,
     environment: Array,
+    position: Array,
     radiation: Array | float,
     factor: Array | float = 1.0,
 ) -> FilmState:
     """Films at surface temperatures (f,) [degC] in environments (e,), or in m one after the other (m, e) [degC].
 
-    Laws that follow the surface read the mean environment; factor (f,) scales the convection that they give.
+    position (axes,) [m]: where the axes stand in the mean. Laws that follow the surface read the mean environment;
+    factor (f,) scales the convection that they give.
     """
     own = convection.places
-    air = plan.air(environment if environment.ndim == 1 else environment.mean(axis=0))
+    air = plan.air(environment if environment.ndim == 1 else environment.mean(axis=0), position)
     h = convection.read(xp, difference_place(xp, surface[own] - air[own])) if len(own) else convection.value
-    return film_state(xp, plan, h * factor, surface, environment, radiation)
+    return film_state(xp, plan, h * factor, surface, environment, position, radiation)
 
 
 def source_powers(xp: Any, power: Tabulated, winding: Array) -> Array:

@@ -118,8 +118,8 @@ def replay_drive(
         longest = float(certified)
         flags[f"step longer than the certified {longest:g} s"] = np.diff(drive.time) > 1.001 * longest
     system = prepared.system
-    height = np.asarray(system.film_moment) / np.maximum(np.asarray(system.film_area), 1e-30)
-    flags |= following_flags(model.load_model, drive, steps.theta, steps.surface, height, steps.winding)
+    plan = jax.tree.map(np.asarray, system).film_plan
+    flags |= following_flags(model.load_model, drive, plan, steps.theta, steps.surface, steps.winding)
     throughput = np.diff(drive.time) * (np.abs(steps.power).sum(axis=1) + steps.gross)
     residual = steps.stored - np.diff(drive.time) * (steps.power.sum(axis=1) + steps.film.sum(axis=1))
     balance_error = np.abs(residual) / np.maximum(throughput, 1e-6 * prepared.heat_capacity)

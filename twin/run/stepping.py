@@ -52,6 +52,7 @@ class Inputs:
     film_table: Array  # (n_following_films, m) W/(m^2 K) over DIFFERENCES
     radiation: Array  # () 1 or 0
     environment: Array  # (n_environments,) degC
+    position: Array  # (axes,) m, mean over the step
     power: Array  # (n_sources,) W of sources that read the log alone
     power_table: Array  # (n_following_losses, m) W over TEMPERATURES
     port_heat: Array  # (n_ports,) W
@@ -92,6 +93,7 @@ def inputs_of(
         film_table=drive.films.value,
         radiation=np.full(n_steps, float(drive.radiation)),
         environment=drive.environment,
+        position=drive.mean_position,
         power=drive.power,
         power_table=drive.losses.value,
         port_heat=drive.port_heat,
@@ -121,6 +123,7 @@ def loads_of(layout: Layout, system: System, z: jax.Array, inputs: Inputs) -> St
         power=Tabulated(jnp.asarray(inputs.power), layout.following_losses, inputs.power_table),
         port_heat=inputs.port_heat,
         environment=inputs.environment,
+        position=inputs.position,
         radiation=inputs.radiation,
     )
     return step_loads(jnp, system.film_plan, drive, system.surfaces(z), T_ref + system.source_rows @ z, T_ref)
@@ -128,7 +131,7 @@ def loads_of(layout: Layout, system: System, z: jax.Array, inputs: Inputs) -> St
 
 def forcing_of(layout: Layout, system: System, loads: StepLoads) -> jax.Array:
     """M theta (T_out - T_ref) + H lift + B q + P q_port (N,)."""
-    films = system.M @ (loads.theta[: layout.n_films] * loads.rise) + system.H @ loads.lift
+    films = system.M @ (loads.theta[: layout.n_films] * loads.rise) + system.H @ loads.lift.ravel()
     ports = [P @ loads.port_heat[np.array(p, dtype=int)] for P, p in zip(system.P, layout.ports, strict=True)]
     return jnp.asarray(films + system.B @ loads.power + jnp.concatenate(ports))
 
@@ -192,7 +195,7 @@ def step(layout: Layout, system: System, state: State, inputs: Inputs) -> tuple[
         lambda: substeps(tuple(terms_of(layout, system, b, more) for b in range(len(layout.sizes)))),
         lambda: substeps(()),
     )
-    film = loads.theta[:n] * system.film_area * loads.rise + system.film_moment * loads.lift
+    film = loads.theta[:n] * system.film_area * loads.rise + (system.film_moment * loads.lift).sum(axis=0)
     film = film - (held[:n] * (system.film_rows @ new) + more[:n] * (system.film_rows @ old)) / inputs.substeps
     radiated = system.safe_area * loads.radiated
     gross = jnp.abs(film - radiated).sum() + jnp.abs(radiated).sum()

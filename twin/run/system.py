@@ -69,7 +69,7 @@ class System:
     P: tuple[Array, ...]  # per body (n, n_ports): port heat in
     port_rows: tuple[Array, ...]  # per body (n_ports, n): port temperatures out
     M: Array  # (N, n_films): heat of 1 K of outer temperature
-    H: Array  # (N, n_films): heat of 1 K/m of gradient
+    H: Array  # (N, (1 + a) n_films): heat of 1 K/m of gradient, axes at zero; then by the metre of each axis
     B: Array  # (N, n_sources)
     source_rows: Array  # (n_following_losses, N): mean temperature of their surfaces
     film_environment: Array  # (n_films,) int
@@ -78,7 +78,7 @@ class System:
     film_gradient: Array  # (n_films,) K/m
     film_height: Array  # (n_films,) m
     film_area: Array  # (n_films,) m^2
-    film_moment: Array  # (n_films,) m^3
+    film_moment: Array  # (1 + a, n_films) m^3, axes at zero; then m^2, by the metre of each axis
     film_rows: Array  # (n_films, N) m^2: film_rows @ z = area times mean surface temperature rise
     energy: Array  # (N,) stored heat [J] = energy @ z
     C: Array  # (n_sensors, N)
@@ -95,7 +95,8 @@ class System:
             emissivity=self.film_emissivity,
             gradient=self.film_gradient,
             height=self.film_height,
-            mean_height=self.film_moment / self.safe_area,
+            mean_height=self.film_moment[0] / self.safe_area,
+            climb=self.film_moment[1:] / self.safe_area,
         )
 
     @property
@@ -138,6 +139,7 @@ def _normalised(body: AffineBody) -> tuple[AffineBody, np.ndarray]:
             P_out=None if body.symmetric else X.T @ body.port_rows.T,
             B_out=None if body.symmetric else X.T @ body.source_rows.T,
             H=None if body.H is None else left @ body.H,
+            raised=None if body.raised is None else left @ body.raised,
         ),
         X,
     )
@@ -198,8 +200,8 @@ def prepare(model: MachineModel) -> Prepared:
         source_rows[list(body.sources), rows] = body.source_rows
         C[list(body.sensors), rows] = body.C
         G[:, rows] = body.G.reshape(-1, body.n)
-    M, H, film_rows, film_area, film_moment = _film_matrices(bodies, layout)
-    films = FilmPlan.of(load, np.zeros(n_films))
+    M, H, film_rows, film_area, film_moment = _film_matrices(bodies, layout, len(load.axes))
+    films = FilmPlan.of(load, np.zeros((1, n_films)), np.ones(n_films))
     nominal = np.array([0.0] * n_films + [j.conductance for j in load.joints])
     system = System(
         A0=tuple(b.A0 + np.tensordot(nominal[list(b.theta)], np.array(b.A).reshape(-1, b.n, b.n), 1) for b in bodies),
@@ -247,11 +249,12 @@ def _layout(model: MachineModel, bodies: Sequence[AffineBody], order: Sequence[n
     )
 
 
-def _film_matrices(bodies: Sequence[AffineBody], layout: Layout) -> tuple[np.ndarray, ...]:
-    """M, H (N, n_films), film_rows (n_films, N), film_area and film_moment (n_films,) of all bodies."""
+def _film_matrices(bodies: Sequence[AffineBody], layout: Layout, n_axes: int) -> tuple[np.ndarray, ...]:
+    """M, H, film_rows, film_area and film_moment of all bodies, as in `System`."""
     N, n, offsets = layout.offsets[-1], layout.n_films, layout.offsets
-    M, H, film_rows = np.zeros((N, n)), np.zeros((N, n)), np.zeros((n, N))
-    film_area, film_moment = np.zeros(n), np.zeros(n)
+    axes = n_axes if any(body.raised is not None for body in bodies) else 0
+    M, H, film_rows = np.zeros((N, n)), np.zeros((N, 1 + axes, n)), np.zeros((n, N))
+    film_area, film_moment = np.zeros(n), np.zeros((1 + axes, n))
     for b, body in enumerate(bodies):
         rows = slice(offsets[b], offsets[b + 1])
         for column, k in enumerate(body.theta):
@@ -259,8 +262,11 @@ def _film_matrices(bodies: Sequence[AffineBody], layout: Layout) -> tuple[np.nda
                 continue
             M[rows, k] = body.M[:, column]
             if body.H is not None:
-                H[rows, k] = body.H[:, column]
-                film_moment[k] += body.energy @ body.H[:, column]
+                H[rows, 0, k] = body.H[:, column]
+                film_moment[0, k] += body.energy @ body.H[:, column]
+            if body.raised is not None:
+                H[rows, 1:, k] = body.raised[:, :, column].T
+                film_moment[1:, k] += body.raised[:, :, column] @ body.energy
             film_rows[k, rows] = body.energy @ body.A[column]
             film_area[k] += body.energy @ body.M[:, column]
-    return M, H, film_rows, film_area, film_moment
+    return M, H.reshape(N, -1), film_rows, film_area, film_moment

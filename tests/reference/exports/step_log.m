@@ -85,17 +85,18 @@ reference = m.machine.reference_temperature_degC; films = d.films; sources = d.s
 at = 0; N = numel(m.states); n_films = numel(films);
 E = zeros(N); A0 = E; A = zeros(N, N, n_films + numel(d.joints)); C = zeros(numel(m.machine.sensors), N);
 M = zeros(N, size(A, 3)); H = M; B = zeros(N, numel(sources)); B_out = B; P = zeros(N, ports); P_out = P;
-one = zeros(N, 1); energy = one;
+one = zeros(N, 1); energy = one; raised = zeros(numel(d.axes), N, size(A, 3));
 for k = 1:numel(m.affine)
   b = m.affine{k}; s = at + (1:numel(b.one)); at += numel(b.one);
   E(s, s) = b.E; A0(s, s) = b.A0; A(s, s, b.theta) = b.A; C(b.sensors, s) = b.C; M(s, b.theta) = b.M;
   B(s, b.sources) = b.B; B_out(s, b.sources) = b.B_out; P(s, b.ports) = b.P; P_out(s, b.ports) = b.P_out;
   one(s) = b.one; energy(s) = b.energy;
   if isfield(b, 'H'), H(s, b.theta) = b.H; end
+  if isfield(b, 'raised'), raised(:, s, b.theta) = b.raised; end
 end
-M = M(:, 1:n_films); H = H(:, 1:n_films);
+M = M(:, 1:n_films); H = H(:, 1:n_films); raised = reshape(raised(:, :, 1:n_films), numel(d.axes), []);
 sum_of = @(theta) reshape(reshape(A, N * N, []) * theta, N, N);
-left = E' \ energy; area = (left' * M)'; area += area <= 0; mean_height = (left' * H)' ./ area;
+left = E' \ energy; area = (left' * M)'; area += area <= 0;
 rows_of = zeros(n_films, N);
 for k = 1:n_films, rows_of(k, :) = left' * A(:, :, k); end
 
@@ -151,6 +152,11 @@ for pair = d.pairs(:)'
     if ! isempty(own), heat(at(end), i) += (1 - share) * by_step(i, :)'; end
   end
 end
+place_of = zeros(n, 0); % of the axes, in the mean over a step
+for axis = d.axes(:)'
+  way = interp1(t, values.(axis.position), min(borders, t(end)));
+  place_of(:, end+1) = cut.sum * (cut.share .* (way(1:end-1) + way(2:end)) / 2);
+end
 on_surface = strcmp({sources.contact}, '')';
 
 % six stages with one factor
@@ -168,7 +174,8 @@ printf('%.16e,', (reference + C * x)(1:end-1)); printf('%.16e\n', (reference + C
 for step = 1:n
   surface = reference + rows_of * x ./ area; radiant = air_of(step, radiant_of)';
   at_zero = air_of(step, around)' - gradient .* height;
-  apart = surface - at_zero - gradient .* mean_height; large = max(abs(apart), 1e-6);
+  H_now = H; if columns(place_of), H_now += reshape(place_of(step, :) * raised, N, n_films); end
+  apart = surface - at_zero - gradient .* (H_now' * left ./ area); large = max(abs(apart), 1e-6);
   place = 32 * (1 + apart ./ large .* (large / 100) .^ 0.25);
   for k = 1:n_films, h(k, 1) = read(film{k}(step, :), place(k)); end
   Ts = surface + 273.15; Tr = radiant + 273.15;
@@ -179,7 +186,7 @@ for step = 1:n
     held = theta; inverse = inv(r * E + A0 + sum_of(held) + P * gamma{step} * P_out');
   end
   rest = sum_of(theta - held); twice = any(abs(theta - held) > 0.1 * held);
-  forcing = M * (total .* (outer - reference)) + H * (h .* gradient) + P * heat(:, step);
+  forcing = M * (total .* (outer - reference)) + H_now * (h .* gradient) + P * heat(:, step);
   for substep = 1:substeps
     new = earlier = y = x;
     for stage = 1:6

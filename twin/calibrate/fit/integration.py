@@ -126,7 +126,9 @@ def _step(
 
     # contact sources bring their heat through ports
     contact = jnp.tensordot(scaled.source[np.array(places.sources, dtype=int)], loads.contact_heat, 1)
-    forcing = system.M @ (drive.theta[:n] * drive.rise) + system.H @ drive.lift + system.B @ drive.power + contact
+    forcing = (
+        system.M @ (drive.theta[:n] * drive.rise) + system.H @ drive.lift.ravel() + system.B @ drive.power + contact
+    )
     feedback = feedback_of(layout, system, inputs, jnp.asarray(drive.power))
     return integrate(inputs.tableau, inputs.substeps, solve, capacity, z, jnp.asarray(forcing), feedback)[0]
 

@@ -40,6 +40,7 @@ def merged(model: MachineModel, V: np.ndarray) -> MachineModel:
     B, P = np.zeros((r, len(load.sources))), np.zeros((r, len(load.ports)))
     C, G = np.zeros((len(model.sensors), r)), np.zeros((len(model.poses), 3, r))
     one, graded = np.zeros(r), any(b.H is not None for b in model.bodies)
+    climbs, raised = any(b.raised is not None for b in model.bodies), np.zeros((len(load.axes), r, n_theta))
     members: list[str] = []
     E_members, G_members = [], []
     for body, Vb in zip(model.bodies, np.split(V, np.cumsum([b.n for b in model.bodies])[:-1]), strict=True):
@@ -50,6 +51,8 @@ def merged(model: MachineModel, V: np.ndarray) -> MachineModel:
             M[:, k] += Vb.T @ body.M[:, column]
             if body.H is not None:
                 H[:, k] += Vb.T @ body.H[:, column]
+            if body.raised is not None:
+                raised[:, :, k] += body.raised[:, :, column] @ Vb
         B[:, list(body.sources)] += Vb.T @ body.B
         P[:, list(body.ports)] += Vb.T @ body.P
         C[list(body.sensors)] += body.C @ Vb
@@ -76,6 +79,7 @@ def merged(model: MachineModel, V: np.ndarray) -> MachineModel:
         one=one,
         energy=E @ one,
         H=H if graded else None,
+        raised=raised if climbs else None,
         members=tuple(members) if E_members else (),
         E_members=np.array(E_members) if E_members else None,
         G_members=np.array(G_members) if G_members else None,

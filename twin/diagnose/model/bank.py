@@ -53,7 +53,7 @@ def nominal_run(study: Study, k: int) -> Nominal:
     n_films = layout.n_films
     plan, T_ref = system.film_plan, float(system.reference_temperature)
     P, A0, A = system.P[0], system.A0[0], system.A[0]
-    theta, environment = np.asarray(loads.theta), np.asarray(loads.environment)
+    theta, environment, position = (np.asarray(v) for v in (loads.theta, loads.environment, loads.position))
     rate = float(np.asarray(loads.rate)[0])
     total, convection, outer = (np.zeros((n * m, n_films)) for _ in range(3))
     inverse = np.zeros((n * m, *A0.shape), dtype=np.float32)
@@ -61,7 +61,7 @@ def nominal_run(study: Study, k: int) -> Nominal:
     for i in range(n):
         fine = slice(i * m, (i + 1) * m)
         told = Tabulated(theta[i, :n_films], layout.following_films, np.asarray(loads.film_table)[i])
-        films = film_loads(np, plan, told, system.surfaces(states[i * m]), environment[i], 1.0)
+        films = film_loads(np, plan, told, system.surfaces(states[i * m]), environment[i], position[i], 1.0)
         total[fine], convection[fine], outer[fine] = films.total, films.convection, films.outer - T_ref
         coefficients = np.concatenate([films.total.mean(axis=0), theta[i, n_films:]])
         S = rate / SDIRK2.diagonal * np.eye(len(A0)) + A0 + np.tensordot(coefficients - system.nominal, A, 1)

@@ -50,6 +50,7 @@ class NestedLoads:
     film_table: Array  # (n, k, 65) W/(m^2 K) over DIFFERENCES
     contacts: ContactEntries  # (n, m, ...), each contact on its own
     environment: Array  # (n, m, n_environments) degC
+    position: Array  # (n, axes) m, means
     power: Array  # (n, m, n_sources) W
     power_table: Array  # (n, m, l, 121) W over TEMPERATURES
     contact_heat: Array  # (n, m, s, r) W, projected
@@ -73,6 +74,7 @@ def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> NestedLoads:
         film_table=mean(drive.films.value),
         contacts=ContactEntries(inner(apart.diagonal), inner(apart.neighbour), inner(apart.weight)),
         environment=inner(drive.environment),
+        position=mean(drive.mean_position),
         power=inner(drive.power),
         power_table=inner(drive.losses.value),
         contact_heat=inner(drive.contact_heat @ body.P.T),
@@ -158,7 +160,8 @@ def _step(
     film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
     # films follow the state and the mean air at the step's start
     convection = Tabulated(jnp.asarray(loads.theta)[:n], layout.following_films, loads.film_table)
-    films = film_loads(jnp, system.film_plan, convection, system.surfaces(z), environment, 1.0, film_factor)
+    surfaces, position = system.surfaces(z), jnp.asarray(loads.position)
+    films = film_loads(jnp, system.film_plan, convection, surfaces, environment, position, 1.0, film_factor)
     total, rise = films.total.mean(axis=0), films.outer - T_ref
     joint_factor = f.joint * jnp.maximum(1.0 + a @ jnp.asarray(slots.joint), 0.02)
     joints = jnp.asarray(loads.theta)[n:] * joint_factor
@@ -189,7 +192,7 @@ def _step(
         told = Tabulated(jnp.asarray(loads.power)[i] * f.source, layout.following_losses, tables[i])
         ports = jnp.tensordot(f.source[np.array(places.sources, dtype=int)], jnp.asarray(loads.contact_heat)[i], 1)
         power = source_powers(jnp, told, winding)
-        forcing = system.M @ (total * rise[i]) + system.H @ films.lift + fixed.B @ power + ports
+        forcing = system.M @ (total * rise[i]) + system.H @ films.lift.ravel() + fixed.B @ power + ports
         forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ fixed.M + a @ jnp.asarray(slots.forcing)[i]
         apart = jax.tree.map(lambda v: jnp.asarray(v)[i], loads.contacts)
         gamma = dense(jnp, places, scaled(jnp, places, apart, lax.stop_gradient(contact)))

@@ -1,7 +1,7 @@
 /* --- What the log drives the machine with: means over a step, tables of laws that follow a temperature. ----------- */
 
 enum { POWER = 0, FILM = TWIN_SOURCES, AIR = FILM + TWIN_FILMS, SHIFT = AIR + TWIN_ENVIRONMENTS,
-       JOINT = SHIFT + TWIN_ENVIRONMENTS, PAIR = JOINT + TWIN_JOINTS };
+       JOINT = SHIFT + TWIN_ENVIRONMENTS, PAIR = JOINT + TWIN_JOINTS, PLACE = PAIR + TWIN_PAIRS };
 
 static real difference_of(int i)
 {
@@ -186,6 +186,8 @@ static void accumulate(twin_machine *m, double time, const real *v, const real *
         now[JOINT + j] = joint_switch[j] < 0 ? 0 : clipped(v[joint_switch[j]]);
     for (int k = 0; k < TWIN_PAIRS; k++)
         now[PAIR + k] = pair_switch[k] < 0 ? 0 : clipped(v[pair_switch[k]]);
+    for (int a = 0; a < TWIN_AXES; a++)
+        now[PLACE + a] = (from[a] + to[a]) / 2;
 
     const int begins = m->intervals++ == 0;
     if (begins) {

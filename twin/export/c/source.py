@@ -126,7 +126,8 @@ def _sizes(prepared: Prepared, model: MachineModel, elastic: dict[str, int]) -> 
         "JOINTS": len(load.joints), "THETA": len(load.films) + len(load.joints), "PORTS": len(load.ports),
         "PAIRS": len(load.pairs), "READS": most_reads(load), "STRUCTURAL": len(model.sensors),
         "DRIVEN": max(len(load.sources) + len(load.films) + 2 * len(load.environments) + len(load.joints)
-                      + len(load.pairs), 1),
+                      + len(load.pairs) + len(load.axes), 1),
+        "CLIMBING": np.shape(prepared.system.film_moment)[0] - 1,
     }  # fmt: skip
 
 

@@ -104,6 +104,15 @@ static real followed_loss(const twin_machine *m, int k, real place)
                         gain * loss_law(k, m->pending, temperature_of(i + 1)), place, i);
 }
 
+/* The air [degC] at the mean height of a film's surfaces, where the axes stand in the mean. */
+static real air_at(const loads *d, int f)
+{
+    real height = film_mean_height[f];
+    for (int a = 0; a < TWIN_CLIMBING; a++)
+        height += film_climb[a * TWIN_FILMS + f] * d->mean[PLACE + a];
+    return d->mean[AIR + film_environment[f]] + film_gradient[f] * (height - film_height[f]);
+}
+
 /* Films, their radiation, and what they make of the environments; flags of films and of laws that follow. */
 static void films_of(twin_machine *m, loads *d)
 {
@@ -116,7 +125,7 @@ static void films_of(twin_machine *m, loads *d)
     }
     for (int k = 0; k < TWIN_FOLLOWING_FILMS; k++) {
         const int f = following_film[k];
-        const real air = d->mean[AIR + film_environment[f]] + film_gradient[f] * (film_mean_height[f] - film_height[f]);
+        const real air = air_at(d, f);
         int outside = 0;
         d->theta[f] = followed_film(m, d, k, difference_place(d->surface[f] - air), &outside);
         const real apart = FABS(d->surface[f] - air);
@@ -126,7 +135,7 @@ static void films_of(twin_machine *m, loads *d)
     for (int f = 0; f < TWIN_FILMS; f++) {
         const real at = d->mean[AIR + film_environment[f]], around = d->mean[AIR + film_radiant[f]];
         const real s = d->surface[f] + R(273.15), t = around + R(273.15);
-        const real air = at + film_gradient[f] * (film_mean_height[f] - film_height[f]);
+        const real air = air_at(d, f);
         const real radiation = film_emissivity[f] * R(5.670374419e-8) * (s * s + t * t) * (s + t);
         const real at_zero = at - film_gradient[f] * film_height[f], convection = d->theta[f];
         const real total = convection + radiation;
@@ -303,7 +312,9 @@ static void forcing_of(const twin_machine *m, const loads *d, real *y)
             if (film_row[f][b] >= 0)
                 add_scaled(size[b], d->theta[f] * d->rise[f], M_columns + film_row[f][b], y + first[b]);
             if (film_row[f][b] >= 0 && d->lift[f] != 0)
-                add_scaled(size[b], d->lift[f], H_columns + film_row[f][b], y + first[b]);
+                for (int a = 0; a <= TWIN_CLIMBING; a++)
+                    add_scaled(size[b], d->lift[f] * (a ? d->mean[PLACE + a - 1] : 1),
+                               H_columns + a * film_entries + film_row[f][b], y + first[b]);
         }
     for (int s = 0; s < TWIN_SOURCES; s++)
         if (!follows[s] && d->mean[POWER + s] != 0)
@@ -329,7 +340,10 @@ static real balance_of(const twin_machine *m, const loads *d, const real *start,
                 now += product(size[b], film_rows + film_row[f][b], own + first[b]);
                 before += product(size[b], film_rows + film_row[f][b], seen + first[b]);
             }
-        const real heat = d->theta[f] * film_total_area[f] * d->rise[f] + film_moment[f] * d->lift[f] -
+        real moment = film_moment[f];
+        for (int a = 0; a < TWIN_CLIMBING; a++)
+            moment += film_moment[(1 + a) * TWIN_FILMS + f] * d->mean[PLACE + a];
+        const real heat = d->theta[f] * film_total_area[f] * d->rise[f] + moment * d->lift[f] -
                           (m->held[f] * now + (d->theta[f] - m->held[f]) * before) / TWIN_SUBSTEPS;
         const real radiated = film_area[f] * d->radiated[f];
         net += heat;

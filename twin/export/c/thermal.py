@@ -51,7 +51,8 @@ def _put_ports(out: Arrays, prepared: Prepared) -> None:
 
 def _put_films(out: Arrays, prepared: Prepared) -> None:
     layout, system = prepared.layout, prepared.system
-    M, H, rows = np.asarray(system.M), np.asarray(system.H), np.asarray(system.film_rows)
+    M, rows = np.asarray(system.M), np.asarray(system.film_rows)
+    H = np.asarray(system.H).reshape(len(M), -1, layout.n_films)
     where, parts, at = [], [], 0
     for f in range(layout.n_films):
         line = []
@@ -60,17 +61,19 @@ def _put_films(out: Arrays, prepared: Prepared) -> None:
             touches = f in layout.terms[b]
             line.append(at if touches else -1)
             if touches:
-                parts.append((rows[f, own], M[own, f], H[own, f]))
+                parts.append((rows[f, own], M[own, f], *H[own, :, f].T))
                 at += n
         where.append(line)
     out.table("film_row", where, len(layout.sizes))
-    for k, name in enumerate(("film_rows", "M_columns", "H_columns")):
-        out.weights(name, np.concatenate([p[k] for p in parts] or [np.zeros(1)]))
-    area = np.asarray(system.film_area)
+    out.add(f"enum {{ film_entries = {at} }};\n")
+    for name, which in (("film_rows", range(1)), ("M_columns", range(1, 2)), ("H_columns", range(2, 2 + H.shape[1]))):
+        out.weights(name, np.concatenate([p[k] for k in which for p in parts] or [np.zeros(1)]))
+    area, plan = np.asarray(system.film_area), system.film_plan
     out.reals("film_total_area", area)
     out.reals("film_area", np.where(area > 0.0, area, 1.0))
-    out.reals("film_moment", system.film_moment)
-    out.reals("film_mean_height", np.asarray(system.film_moment) / np.where(area > 0.0, area, 1.0))
+    out.reals("film_moment", np.ravel(system.film_moment))
+    out.reals("film_mean_height", plan.mean_height)
+    out.reals("film_climb", np.ravel(plan.climb))
 
 
 def _put_sources(out: Arrays, prepared: Prepared) -> None:
