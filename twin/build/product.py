@@ -28,6 +28,7 @@ from twin.build.pipeline import (
 )
 from twin.build.same_model import same_model
 from twin.build.surface_motion import surface_flexibility
+from twin.build.turned_nodes import turned_nodes
 from twin.errors import ArtefactError
 from twin.machine.description import Machine
 from twin.machine.instances import written_out
@@ -54,9 +55,12 @@ def build_artefact(
     compact = compact_model(machine, rich, options, progress)
     result = certificate(machine, rich, compact, None, options, BUILD_SEED, progress=progress)
     flexible = surface_flexibility(machine, full) if machine.has_tcp and full.surfaces else ()
+    turned = [turned_nodes(machine, body) for body in full.bodies]
     fields = [
-        SurfaceField(body.name, surface.points, surface.triangles, np.asarray(body.F), *_moved(body, flexible, b))
-        for b, (body, surface) in enumerate(zip(compact.bodies if full.surfaces else (), full.surfaces, strict=True))
+        SurfaceField(body.name, surface.points, surface.triangles, np.asarray(body.F), *_moved(body, flexible, b), own)
+        for b, (body, surface, own) in enumerate(
+            zip(compact.bodies if full.surfaces else (), full.surfaces, turned, strict=True)
+        )
     ]
     bare = replace(compact, bodies=tuple(replace(b, F=None, U=None) for b in compact.bodies))
     description = Path(machine_path) / "machine.toml" if Path(machine_path).is_dir() else Path(machine_path)
@@ -77,10 +81,12 @@ def build_artefact(
     return result
 
 
-def _moved(body: AffineBody, flexible: Sequence[np.ndarray], number: int) -> tuple[np.ndarray, ...]:
-    """How the surface of a body moves, as a `SurfaceField` has it; nothing of machines without elastic structure."""
+def _moved(
+    body: AffineBody, flexible: Sequence[np.ndarray], number: int
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """How the surface of a body moves, as a `SurfaceField` has it; None of machines without elastic structure."""
     if body.U is None or not flexible:
-        return ()
+        return None, None
     return body.U.reshape(-1, 3, body.n), flexible[number].reshape(len(body.U) // 3, 3, -1)
 
 

@@ -21,6 +21,7 @@ from twin.rom.artefact import Artefact
 from twin.rom.hdf5_file import strings
 from twin.rom.surface_motion import is_known, surface_displacements
 from twin.rom.tcp import by_body
+from twin.rom.turned_surface import surface_turns, turned_surface
 
 UNDEFORMED = {  # why there is no displacement
     True: "no displacement: the artefact is of an older version or has calibrated expansions; --field has it",
@@ -56,6 +57,7 @@ class _Stored:
     states: np.ndarray  # (n + 1, N)
     axes: tuple[str, ...]
     position: np.ndarray  # (n + 1, n_axes) m
+    angle: np.ndarray  # (n + 1, n_turning) rad
     chosen: np.ndarray  # rows that become frames
     run: object  # whose loads it is of, as its summary says
 
@@ -81,13 +83,15 @@ def _stored(artefact: Artefact, options: ExportOptions) -> _Stored:
     with named_result(artefact, options) as (f, told):
         time = f["time"][...]
         chosen = np.unique(np.linspace(0, len(time) - 1, min(options.frames, len(time))).round().astype(int))
-        return _Stored(time, f["states"][...], strings(f["axis"]), f["position"][...], chosen, told.get("run"))
+        angle = f["angle"][...] if "angle" in f else np.zeros((len(time), 0))
+        return _Stored(time, f["states"][...], strings(f["axis"]), f["position"][...], angle, chosen, told.get("run"))
 
 
 def _surface(artefact: Artefact, stored: _Stored) -> Frames:
     from twin.machine.description import Machine
 
     machine = Machine.model_validate(tomllib.loads(artefact.description))
+    turns = surface_turns(artefact.model, artefact.fields)
     order, known = [body.name for body in artefact.model.bodies], is_known(artefact.model, artefact.fields)
     sizes = np.cumsum([0, *(len(f.nodes) for f in artefact.fields)])
     triangles = np.vstack([f.triangles + first for f, first in zip(artefact.fields, sizes, strict=False)])
@@ -96,12 +100,18 @@ def _surface(artefact: Artefact, stored: _Stored) -> Frames:
         for row in stored.chosen:
             x = by_body(artefact.model, stored.states[row])
             warm = [f.basis.astype(float) @ x[order.index(f.body)] for f in artefact.fields]
-            points = _placed(machine, [(f.body, f.nodes) for f in artefact.fields], stored, row)
             data = {"temperature": artefact.model.reference_temperature + np.concatenate(warm)}
+            moved: Sequence[np.ndarray | None] = [None] * len(artefact.fields)
             if known:
                 at = stored.position_of(artefact.model.pose_axes, row)
                 moved = surface_displacements(artefact.model, artefact.fields, stored.states[row], at)
-                data["displacement"] = np.vstack(moved)
+            standing = [
+                turned_surface(turns, f, stored.angle[row], u) for f, u in zip(artefact.fields, moved, strict=True)
+            ]
+            bodies = [(f.body, nodes) for f, (nodes, _) in zip(artefact.fields, standing, strict=True)]
+            points = _placed(machine, bodies, stored, row)
+            if known:
+                data["displacement"] = np.vstack([u for _, u in standing if u is not None])
             yield Frame(float(stored.time[row] - stored.time[0]), points, data)
 
     note = "" if known else UNDEFORMED[artefact.model.moves]

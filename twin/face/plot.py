@@ -100,4 +100,5 @@ class Plot:
             flags=n.flags,
             flag_names=n.flag_names,
             states=n.states,
+            angle=n.angle,
         )

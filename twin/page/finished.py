@@ -88,6 +88,7 @@ def _surface(artefact: Artefact, shape: Shape | None, result: Drawn, rows: np.nd
         "temperature": [t.told() for t in temperatures],
         "temperature_error": max(t.error for t in temperatures),
         "position": packed(np.zeros((len(rows), 0))),
+        "angle": packed(result.angle[rows]),
         "displacement": None,
     }
     if shape is not None:

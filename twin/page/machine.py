@@ -16,6 +16,7 @@ from twin.page.shape import Shape
 from twin.page.words import CAUTION
 from twin.rom.artefact import Artefact
 from twin.rom.certificate_table import table
+from twin.rom.turned_surface import surface_turns
 from twin.run.correction_axes import axis_jacobian
 
 
@@ -95,8 +96,22 @@ def _surface(artefact: Artefact, shape: Shape | None) -> dict[str, Any]:
         "edges": packed(edges, "u4"),
         "axes": list(shape.structure.axes) if shape else [],
         "shifts": shape.structure.system.shifts[rows].tolist() if shape else [],
+        "turns": _turns(artefact),
         "deforms": shape is not None,
     }
+
+
+def _turns(artefact: Artefact) -> list[dict[str, Any]]:
+    """Rotary axes, each after the one that it stands on, with the nodes of the surface that it turns."""
+    turned = [field.turned for field in artefact.fields]
+    return [
+        {
+            "direction": turn.direction.tolist(),
+            "point": turn.point.tolist(),
+            "nodes": packed(np.flatnonzero(np.concatenate([own[k] for own in turned if own is not None])), "u4"),
+        }
+        for k, turn in enumerate(surface_turns(artefact.model, artefact.fields))
+    ]
 
 
 def _certificate(artefact: Artefact) -> dict[str, Any]:

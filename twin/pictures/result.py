@@ -30,6 +30,7 @@ class Drawn:
     flags: np.ndarray  # (n, n_flags) bool: the step was outside what was certified
     flag_names: tuple[str, ...]
     states: np.ndarray  # (n + 1, N) artefact coordinates
+    angle: np.ndarray  # (n + 1, n_turning) rad of rotary axes
     run: str = ""  # folder of the loads, as summary.json names it; "" where that is not known
 
     @property
@@ -73,6 +74,7 @@ def read_result(folder: Path, artefact: Artefact) -> Drawn:
                 flags=f["flags"][...].astype(bool),
                 flag_names=strings(f["flag"]),
                 states=f["states"][...],
+                angle=f["angle"][...] if "angle" in f else np.zeros((len(f["time"]), 0)),
                 run=str(told.get("run", "")),
             )
     except (OSError, KeyError) as e:

@@ -258,7 +258,8 @@ def _fields(group: h5py.Group, model: MachineModel) -> tuple[SurfaceField, ...]:
     foreign = [name for name in group if name not in sizes]
     if foreign:
         raise KeyError(f"'fields/{foreign[0]}' is of no body")
-    return tuple(read_field(group[name], name, sizes[name]) for name in group)
+    turning = len(model.load_model.rotary)
+    return tuple(read_field(group[name], name, sizes[name], turning) for name in group)
 
 
 def _parameters(f: h5py.File, load: LoadModel, bodies: Sequence[AffineBody]) -> tuple[Parameter, ...]:

@@ -20,6 +20,7 @@ class SurfaceField:
     basis: np.ndarray  # (m, n) K per unit of state
     displacement: np.ndarray | None = None  # (m, 3, n) m per unit of state, of the body on isostatic supports
     flexibility: np.ndarray | None = None  # (m, 3, p) m/N per force on its elastic ports
+    turned: np.ndarray | None = None  # (k, m) bool: which nodes each of the k rotary axes turns; None: not known
 
 
 def write_field(group: h5py.Group, field: SurfaceField) -> None:
@@ -35,10 +36,16 @@ def write_field(group: h5py.Group, field: SurfaceField) -> None:
         moved, pushed = (np.asarray(a, dtype=np.float32) for a in (field.displacement, field.flexibility))
         put(group, "displacement", moved, "m/K", ("node", "component", "state"))
         put(group, "flexibility", pushed, "m/N", ("node", "component", "elastic_port"))
+    if field.turned is not None:
+        scale(group, "rotary_axis", np.arange(len(field.turned)))
+        put(group, "turned", field.turned.astype(np.int32), "", ("rotary_axis", "node"))
 
 
-def read_field(group: h5py.Group, body: str, n: int) -> SurfaceField:
-    """The field of a body of n states. Raises KeyError where it does not fit the body, or its triangles its nodes."""
+def read_field(group: h5py.Group, body: str, n: int, turning: int) -> SurfaceField:
+    """The field of a body of n states of a machine with so many axes that turn.
+
+    Raises KeyError where it does not fit the body, or its triangles its nodes.
+    """
     where = f"fields/{body}"
     nodes, basis = floats(group, "nodes", where), floats(group, "basis", where, bits=32)
     triangles = integers(group, "triangles", where, bits=32)
@@ -46,9 +53,12 @@ def read_field(group: h5py.Group, body: str, n: int) -> SurfaceField:
         raise KeyError(f"'{where}' has nodes, triangles and basis that do not fit each other")
     if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(nodes):
         raise KeyError(f"'{where}/triangles' name nodes that are not there")
+    turned = integers(group, "turned", where, bits=32).astype(bool) if "turned" in group else None
+    if turned is not None and turned.shape != (turning, len(nodes)):
+        raise KeyError(f"'{where}/turned' does not fit the rotary axes and nodes")
     if "displacement" not in group:  # optional, with the flexibility
-        return SurfaceField(body, nodes, triangles, basis)
+        return SurfaceField(body, nodes, triangles, basis, turned=turned)
     moved, pushed = (floats(group, name, where, bits=32) for name in ("displacement", "flexibility"))
     if moved.shape != (len(nodes), 3, n) or pushed.shape[:2] != (len(nodes), 3) or pushed.ndim != 3:
         raise KeyError(f"'{where}' has a displacement and a flexibility that do not fit its nodes")
-    return SurfaceField(body, nodes, triangles, basis, moved, pushed)
+    return SurfaceField(body, nodes, triangles, basis, moved, pushed, turned)

@@ -37,7 +37,7 @@ class Finished {
     if (surface) {
       this.heat = surface.temperature.map((t) => new Modes(t));
       this.moved = surface.displacement && surface.displacement.map((u) => new Modes(u));
-      this.position = unpack(surface.position);
+      this.position = unpack(surface.position); this.angle = unpack(surface.angle);
     }
     this.frame = { row: -1 };
   }
@@ -59,8 +59,8 @@ class Finished {
         if (this.moved) this.moved[b].at(row, displacement, 3 * at);
         at += modes.size;
       });
-      const axes = this.position.shape[1];
-      this.frame = { row, temperature, displacement, position: this.position.subarray(row * axes, (row + 1) * axes) };
+      const of = (table) => table.subarray(row * table.shape[1], (row + 1) * table.shape[1]);
+      this.frame = { row, temperature, displacement, position: of(this.position), angle: of(this.angle) };
     }
     return this.frame;
   }

@@ -6,6 +6,7 @@ class Surface {
     const told = machine.surface;
     this.told = told; this.store = store;
     this.points = unpack(told.points); this.triangles = unpack(told.triangles);
+    this.turns = told.turns.map((turn) => ({ ...turn, nodes: unpack(turn.nodes) }));
     const n = this.points.length / 3;
     this.body = new Uint16Array(n);
     for (let b = 0; b < told.bodies.length; b++) this.body.fill(b, told.first[b], told.first[b + 1]);
@@ -87,8 +88,17 @@ class Surface {
       (shifts[b] || []).reduce((sum, axis, a) => sum + axis[k] * (frame.position[a] || 0), 0)));
     const place = this.place.array;
     for (let i = 0; i < this.body.length; i++) {
-      const s = shift[this.body[i]];
-      for (let k = 0; k < 3; k++) place[3 * i + k] = this.points[3 * i + k] + s[k] + factor * (frame.displacement[3 * i + k] || 0);
+      for (let k = 0; k < 3; k++) place[3 * i + k] = this.points[3 * i + k] + factor * (frame.displacement[3 * i + k] || 0);
+    }
+    this.turned(frame.angle || []);
+    for (let i = 0; i < this.body.length; i++) for (let k = 0; k < 3; k++) place[3 * i + k] += shift[this.body[i]][k];
+  }
+  turned(angles) { // about rotary axes, the outermost first, displacements with their parts
+    const place = this.place.array, at = new THREE.Vector3(), axis = new THREE.Vector3(), point = new THREE.Vector3();
+    for (let a = this.turns.length - 1; a >= 0; a--) {
+      if (!angles[a]) continue;
+      axis.fromArray(this.turns[a].direction); point.fromArray(this.turns[a].point);
+      for (const i of this.turns[a].nodes) at.fromArray(place, 3 * i).sub(point).applyAxisAngle(axis, angles[a]).add(point).toArray(place, 3 * i);
     }
   }
   reset() { this.stage.look(new THREE.Box3().setFromArray(this.place.array)); }
