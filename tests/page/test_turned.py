@@ -17,6 +17,7 @@ from twin.export.options import ExportOptions
 from twin.logs.read import read_run
 from twin.page.finished import finished_told
 from twin.page.front import write_page
+from twin.pictures.placed import placed_surface
 from twin.pictures.result import read_result
 from twin.rom.artefact import read_artefact
 from twin.rom.turned_surface import surface_turns, turned_surface
@@ -73,6 +74,16 @@ def test_a_series_has_it_turned(turned):
         turned_surface(turns, f, result.angle[0])[0] + [shift * (f.body == "slide"), 0.0, 0.0] for f in artefact.fields
     ]
     np.testing.assert_allclose(first.points, np.vstack(expected), atol=1e-12)
+
+
+def test_so_does_a_picture(turned):
+    machine, artefact, out = turned
+    angle = read_result(out, artefact).angle[-1]
+    expected = np.vstack(
+        [turned_surface(surface_turns(artefact.model, artefact.fields), f, angle)[0] for f in artefact.fields]
+    )
+    np.testing.assert_array_equal(placed_surface(machine, artefact, {}, angle.tolist()).points, expected)
+    assert np.abs(placed_surface(machine, artefact, {}).points - expected).max() > 0.05
 
 
 def test_the_page_draws_it_turned(turned, shown, tmp_path):

@@ -55,7 +55,7 @@ def test_a_result_of_another_artefact_is_refused(slide_artefact, folder, tmp_pat
 def test_the_surface_moves_with_the_axis_and_keeps_its_parts_apart(slide_artefact):
     artefact = read_artefact(slide_artefact)
     machine = described(artefact)
-    at_zero, moved = (placed_surface(machine, artefact.fields, {"x": x}) for x in (0.0, 0.15))
+    at_zero, moved = (placed_surface(machine, artefact, {"x": x}) for x in (0.0, 0.15))
     shift = moved.points - at_zero.points
     owner = np.repeat([f.body for f in artefact.fields], [len(f.nodes) for f in artefact.fields])
     np.testing.assert_allclose(shift[owner == "slide"], [[0.15, 0.0, 0.0]] * int((owner == "slide").sum()))

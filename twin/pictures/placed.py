@@ -14,8 +14,9 @@ from twin.machine.description import Machine
 from twin.machine.kinematics import direction, displacement, rail_moves
 from twin.machine.platform import geometry_of
 from twin.pictures.surface import SurfaceMesh
-from twin.rom.artefact import Artefact, SurfaceField
+from twin.rom.artefact import Artefact
 from twin.rom.parallel import forward
+from twin.rom.turned_surface import surface_turns, turned_surface
 
 
 def described(artefact: Artefact) -> Machine:
@@ -29,9 +30,18 @@ def no_tcp(artefact: Artefact) -> str:
     return f"the description has no {keys}"
 
 
-def placed_surface(machine: Machine, fields: Sequence[SurfaceField], positions: Mapping[str, float]) -> SurfaceMesh:
-    """All bodies' surfaces with every linear axis at its position [m]; points in the order of `fields`."""
-    points = [f.nodes + displacement(machine, f.body, dict(positions)) for f in fields]
+def placed_surface(
+    machine: Machine,
+    artefact: Artefact,
+    positions: Mapping[str, float],
+    angles: Sequence[float] = (),
+) -> SurfaceMesh:
+    """All bodies' surfaces with every linear axis at its position [m], and those that turn at their angles [rad], at
+    zero where none are given; points in the order of the artefact's `fields`."""
+    fields, turns = artefact.fields, surface_turns(artefact.model, artefact.fields)
+    points = [
+        turned_surface(turns, f, np.asarray(angles))[0] + displacement(machine, f.body, dict(positions)) for f in fields
+    ]
     first = np.cumsum([0, *(len(p) for p in points)])
     triangles = np.vstack([f.triangles + n for f, n in zip(fields, first, strict=False)])
     return SurfaceMesh(np.vstack(points), triangles, parts_of(triangles, int(first[-1])))

@@ -66,7 +66,7 @@ def surface_of(
         return np.concatenate([T_ref + f.basis @ x[first[f.body] :][: f.basis.shape[1]] for f in artefact.fields])
 
     return surface_figure(
-        [placed_surface(machine, artefact.fields, result.position_at(e)) for e in edges],
+        [placed_surface(machine, artefact, result.position_at(e), result.angle[e].tolist()) for e in edges],
         [temperature(e) for e in edges],
         [_after(result.hours[e]) for e in edges],
         camera or Camera.from_front("xyz".index(machine.machine.vertical)),
