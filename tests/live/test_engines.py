@@ -3,25 +3,40 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from array import array
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import twin
+from twin.errors import TwinError
 from twin.face.live import LiveOptions, live
 from twin.live.offsets import at, offsets
 from twin.live.opened import open_engine
+from twin.rom.artefact import read_artefact
+from twin.run.correction import fit_correction
+from twin.run.correction_file import read_pose_errors
+from twin.run.correction_struts import in_struts
 
+HEXAPOD = Path(__file__).parents[2] / "models" / "hexapod"
 RUN = Path(__file__).parents[1] / "machines" / "spindle" / "runs" / "warm_up"
 
 
 @pytest.fixture(scope="module")
 def result(spindle):
     return twin.read(spindle).run(RUN).numbers
+
+
+@pytest.fixture(scope="module")
+def hexapod(tmp_path_factory):
+    path = tmp_path_factory.mktemp("hexapod") / "a.h5"
+    twin.build(HEXAPOD, options=twin.BuildOptions(held_out=1, hours=0.5, substeps=1)).save(path)
+    return path
 
 
 # The JAX engine makes a new factor in every step, `twin run` and C keep one as long as films stay near it
@@ -63,6 +78,35 @@ def test_a_state_goes_on_bit_by_bit(engine, spindle, compiled):
     assert one.feed(*more) == other.feed(*more) > 2
     assert one.saved() == other.saved()
     assert one.displacements() == other.displacements()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ["c", "jax"])
+def test_the_struts_of_a_platform_are_corrected(engine, hexapod, tmp_path):
+    """Twenty minutes of paths in all six directions: offsets are those of `twin correction`."""
+    run = shutil.copytree(HEXAPOD / "runs" / "mixed_paths", tmp_path / "run")
+    rows = (run / "loads.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    (run / "loads.csv").write_text("".join(rows[:122]), encoding="utf-8")
+    twin.read(hexapod).run(run).save(tmp_path / "result")
+    errors, _ = read_pose_errors(tmp_path / "result", read_artefact(hexapod).digest)
+    model = read_artefact(hexapod).model
+    struts = in_struts(replace(errors, model=model))
+    expected = fit_correction(struts, np.eye(6))
+    out, state = tmp_path / "c.json", tmp_path / "state"
+    for form in ("grid", "polynomial"):
+        options = LiveOptions(engine=engine, form=form, speed=0.0, slew="1 mm/s", period="60 s", initial="21 degC",
+                              fresh=True)  # fmt: skip
+        live(hexapod, f"replay:{run}", [f"file:{out}"], state, options)
+        found = json.loads(out.read_text())
+        assert list(found["offsets"]) == [f"strut_{k}_length" for k in range(1, 7)]
+        facts = open_engine(hexapod, engine, state / "engine").facts
+        values = tuple(map(tuple, found["offsets"].values()))
+        assert np.abs(values).max() > 1e-6
+        for pose in (struts.poses[0], struts.poses[40], np.zeros(6)):
+            there = [at(facts, own, form, pose) for own in values]
+            np.testing.assert_allclose(there, expected.offset(pose), rtol=0, atol=3e-9)
+    with pytest.raises(TwinError, match="which of six struts"):
+        live(hexapod, f"replay:{run}", [], state, replace(options, events=tmp_path))
 
 
 def test_polynomial_and_grid_agree_at_the_poses(spindle, compiled, result):

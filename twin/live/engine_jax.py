@@ -20,13 +20,14 @@ import numpy as np
 
 from twin.errors import FailedCheck, TwinError
 from twin.live.engine import EngineFailure
-from twin.live.prepare import facts_of
+from twin.live.prepare import facts_of, strut_rows
 from twin.logs.signals import as_meant
 from twin.rom.artefact import read_artefact
 from twin.rom.drive import Drive, evaluate, measured_air
 from twin.rom.following_flags import following_flags
 from twin.rom.poses import outside_grid
 from twin.rom.turning import STRAIGHT, off_zero
+from twin.run.correction_struts import on_struts
 from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalanced
 from twin.run.stepping import Inputs, StepHeat, advance, inputs_of
 from twin.run.system import prepare
@@ -47,12 +48,9 @@ class JaxEngine:
 
     def __init__(self, path: Path):
         """Raises ArtefactError for files that are no artefact."""
-        artefact = read_artefact(path)
-        self.facts = facts_of(artefact)
-        self._prepared = prepare(artefact.model)
-        self._model = replace(artefact.model, bodies=(), structure=None)  # what is stepped is in `_prepared`
-        self.substeps = int(artefact.certificate.get("substeps", 1))
-        self._load = artefact.model.load_model
+        self._read(path)
+        _give_back()  # of the artefact, six times of what is stepped
+        self._load = self._model.load_model
         self.loads: list[tuple[Inputs, np.ndarray]] | None = None  # of steps, for a filter that takes them; None: none
         self._positions = set(self.facts.axis_channels)
         system = self._prepared.system
@@ -60,7 +58,14 @@ class JaxEngine:
         self._C, self._G = np.asarray(system.C), np.asarray(system.G)
         self.start(self.facts.reference_temperature)
         self._made = 0  # steps of this process
-        _give_back()
+
+    def _read(self, path: Path) -> None:
+        artefact = read_artefact(path)
+        self.facts = facts_of(artefact)
+        self._prepared = prepare(artefact.model)
+        self._E = strut_rows(artefact.model, self._prepared) if on_struts(artefact.model) else None
+        self._model = replace(artefact.model, bodies=(), structure=None)  # what is stepped is in `_prepared`
+        self.substeps = int(artefact.certificate.get("substeps", 1))
 
     def start(self, temperature: float) -> None:
         self.initial = temperature  # degC
@@ -167,6 +172,12 @@ class JaxEngine:
 
     def displacements(self) -> list[float]:
         found: list[float] = (self._G @ self._z).tolist()
+        return found
+
+    def errors(self) -> list[float]:
+        if self._E is None:
+            return self.displacements()
+        found: list[float] = (self._E @ self._z).tolist()
         return found
 
     def states(self) -> list[float]:

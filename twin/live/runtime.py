@@ -173,7 +173,7 @@ class Runtime:
 
     def _aim(self) -> None:
         engine, form = self.intake.engine, self.publisher.form
-        self.publisher.aim(offsets(engine.facts, self.intake.displacements(), form))
+        self.publisher.aim(offsets(engine.facts, self.intake.errors(), form))
 
     def _learn(self, learning: Learning) -> None:
         """Measured TCP errors that have come."""
