@@ -32,6 +32,40 @@ def result(spindle):
     return twin.read(spindle).run(RUN).numbers
 
 
+def test_groups_of_fast_rows_do_not_matter(spindle, compiled):
+    """Two and a half minutes at 50 Hz, evaluated in parts while they come; no value where a part would end."""
+    channels = open_engine(spindle, "c", compiled).facts.channels
+    rng = np.random.default_rng(5)
+    times = 0.02 * np.arange(7500)
+    values = np.array([[c.low, c.high - c.low] for c in channels])
+    rows = values[:, 0] + values[:, 1] * np.repeat(rng.uniform(size=(150, len(channels))), 50, axis=0)
+    rows[1000] = np.nan
+
+    def fed(engine, first, end, size):
+        for k in range(first, end, size):
+            part = slice(k, min(k + size, end))
+            engine.feed(array("d", times[part]), array("d", rows[part].ravel()))
+
+    engines = [open_engine(spindle, "jax", compiled) for _ in range(4)]
+    for engine, size in zip(engines[:3], (7500, 1000, 777), strict=True):
+        engine.start(21.0)
+        fed(engine, 0, 7500, size)
+    engines[3].start(21.0)
+    fed(engines[3], 0, 4200, 600)
+    saved = engines[3].saved()
+    engines[3].restore(saved)  # in the middle of a step
+    assert engines[3].saved() == saved
+    fed(engines[3], 4200, 7500, 600)
+    assert engines[0].steps == 2
+    assert engines[0].states() == engines[1].states() == engines[2].states() == engines[3].states()
+    assert engines[0].saved() == engines[1].saved() == engines[2].saved() == engines[3].saved()
+    c = open_engine(spindle, "c", compiled)
+    c.start(21.0)
+    fed(c, 0, 7500, 1000)
+    assert max(c.sensors()) > 21.05
+    np.testing.assert_allclose(engines[0].sensors(), c.sensors(), rtol=0, atol=1e-4)
+
+
 @pytest.fixture(scope="module")
 def hexapod(tmp_path_factory):
     path = tmp_path_factory.mktemp("hexapod") / "a.h5"
