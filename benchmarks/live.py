@@ -32,6 +32,7 @@ from twin.rom.drive import evaluate
 RUN = FOLDER / "runs" / "experiment_a"
 RECORDS, CORE = 1000, 0.01  # records of a block and s between them: 100 Hz in blocks of 10 s, as for MiniHex
 LATENCY_BLOCKS = 240  # 40 min: one of six completes a step of a minute
+SCRIPT = "from twin.cli.main import main; main()"  # of the command that an installation has
 WARM = 13  # first blocks that are not counted: caches are cold, JAX compiles
 STARTS = 5
 KILLS, SPEED, GROUP, HOURS = 20, 1000.0, 10, 8.0
@@ -50,7 +51,7 @@ def artefact() -> Path:
 
 def command(source: str, out: list[str], state: Path, *more: str) -> list[str]:
     given = [part for text in out for part in ("--out", text)]
-    return [sys.executable, "-m", "twin.cli.main", "live", str(artefact()), "--source", source, *given,
+    return [sys.executable, "-c", SCRIPT, "live", str(artefact()), "--source", source, *given,
             "--state", str(state), "--initial", "22 degC", *more]  # fmt: skip
 
 

@@ -86,7 +86,7 @@ def wired(artefact: str | Path, source: str, out: Sequence[str], state: str | Pa
     engine = open_engine(Path(artefact), options.engine, folder / "engine")
     facts = engine.facts
     channels = read_channels(None if options.channels is None else Path(options.channels), facts)
-    incoming = open_source(source, options.speed, channels)
+    incoming = open_source(source, options.speed, channels, facts)
     sinks = [open_sink(text, facts, options.form, channels) for text in out]
     publisher = Publisher(sinks, neutral(facts, options.form), options.form, limits, patience)
     clock = RealClock(incoming.speed) if incoming.speed else RecordClock()

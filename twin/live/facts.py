@@ -26,6 +26,7 @@ class Channel:
     default: float | None  # SI; None: a log must have it
     low: float  # certified range
     high: float
+    axis: str = ""  # whose position it is
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,7 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
     jacobian = axis_jacobian(artefact, model.pose_axes)
     needed = needed_signals(load)
     names = [s.name for s in load.signals]
+    axis_of = {a.position: a.name for a in load.axes} | {a.position: a.name for a in load.rotary}
     air = load.environments[load.surroundings]
     words = "no certificate"
     if "max_temperature_error_in_case" in c:
@@ -57,7 +58,10 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
         prefix=identifier(model.name),
         step=float(c.get("step", 60.0)),
         reference_temperature=float(model.reference_temperature),
-        channels=tuple(Channel(s.column, s.unit, s.name in needed, s.default, s.low, s.high) for s in load.signals),
+        channels=tuple(
+            Channel(s.column, s.unit, s.name in needed, s.default, s.low, s.high, axis_of.get(s.name, ""))
+            for s in load.signals
+        ),
         axis_channels=tuple(names.index(a.position) for a in load.axes),
         strokes=tuple((a.low, a.high) for a in load.axes),
         air=names.index(air.signal) if air.signal else -1,
