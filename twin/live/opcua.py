@@ -7,6 +7,7 @@ HEARTBEAT makes all values missing. The gap of a lost connection is lost: a serv
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from array import array
@@ -43,6 +44,7 @@ class Connection:
             import asyncua.sync
         except ImportError as e:
             raise TwinError("the package asyncua is missing", url, "python -m pip install 'twin[live]'") from e
+        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # a line per attempt, for as long as a server is away
         self.url, self.channels, self._api = url, channels, asyncua.sync
         self._client: Any = None
         self.error = f"{url} cannot be reached"
