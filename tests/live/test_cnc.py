@@ -169,6 +169,7 @@ def test_what_is_not_there_or_not_clear_is_one_error(machine, begun, told):
     with pytest.raises(TwinError, match=told) as e:
         OpcUaSource(machine.url, Channels(), OWN)
     assert "channels file" in str(e.value)
+    assert e.value.status == 1  # not 2, after which nobody would start it again
 
 
 @LONG

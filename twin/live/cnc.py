@@ -35,10 +35,16 @@ _UNECE = {
 Drives = list[tuple[str, dict[str, Any]]]  # what the server calls a drive, and nodes of its parts by name
 
 
+class NoNodes(TwinError):
+    """Of a server that may still be starting: the unit of systemd tries again, as it does not after a status of 2."""
+
+    status = 1
+
+
 def nodes_by_default(client: Any, facts: Facts, channels: Channels) -> dict[str, tuple[str, str]]:
     """Column -> node, unit of every channel without a node of its own that the server has.
 
-    Raises TwinError where the server has none for a channel that is needed, or several, or one without a unit;
+    Raises NoNodes where the server has none for a channel that is needed, or several, or one without a unit;
     ConnectionError and the like where it goes away meanwhile.
     """
     axes, spindles = _drives(client)
@@ -60,7 +66,7 @@ def nodes_by_default(client: Any, facts: Facts, channels: Channels) -> dict[str,
     if wrong:
         there = f"the server has axes {_listed(axes)}, spindles {_listed(spindles)}"
         remedy = "name node and unit in the channels file, or what the server calls a drive: docs/live.md"
-        raise TwinError(f"no nodes by the names of OPC 40502 ({there}): {'; '.join(wrong)}", "--channels", remedy)
+        raise NoNodes(f"no nodes by the names of OPC 40502 ({there}): {'; '.join(wrong)}", "--channels", remedy)
     return found
 
 
