@@ -53,16 +53,15 @@ def nodes_by_default(client: Any, facts: Facts, channels: Channels) -> dict[str,
         if channel.column in channels.nodes:
             continue
         told = _node(client, channel, axes, spindles, channels.opcua.get("drives", {}))
-        if isinstance(told, str):
-            if channel.needed and channel.default is None:
-                wrong.append(f"{channel.column}: {told}")
-            continue
-        unit = channels.units.get(channel.column) or _unit(client, told)
-        own = _si(unit)
-        if own == channel.unit:
-            found[channel.column] = (told[0].nodeid.to_string(), unit)
-        else:
-            wrong.append(f"{channel.column}: " + (f"is in {unit}" if own else "the server states no unit of it"))
+        if not isinstance(told, str):
+            unit = channels.units.get(channel.column) or _unit(client, told)
+            own = _si(unit)
+            if own == channel.unit:
+                found[channel.column] = (told[0].nodeid.to_string(), unit)
+                continue
+            told = f"is in {unit}" if own else "the server states no unit of it"
+        if channel.needed and channel.default is None:
+            wrong.append(f"{channel.column}: {told}")
     if wrong:
         there = f"the server has axes {_listed(axes)}, spindles {_listed(spindles)}"
         remedy = "name node and unit in the channels file, or what the server calls a drive: docs/live.md"

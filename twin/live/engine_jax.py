@@ -99,11 +99,10 @@ class JaxEngine:
         self._fed.append((time, row))
         self._times = np.append(self._times, time)
         self._rows = np.concatenate([self._rows, row])
-        before = (self._steps + 1) * self.facts.step - 1e-9 * self.facts.step
+        before = (self._steps + 1 - 1e-9) * self.facts.step
         while len(self._times) > PART:
-            known = np.isfinite(self._rows[:PART]).any(
-                axis=0
-            )  # what is missing at an end of parts would not be flagged
+            known = np.isfinite(self._rows[:PART]).any(axis=0)
+            # no part ends where a value is missing: the next would begin with it held, and nobody flag it
             ends = np.isfinite(self._rows[PART:, known]).all(axis=1) & (self._times[PART:] < before)
             if not ends.any():
                 return
@@ -233,6 +232,6 @@ class JaxEngine:
             raise TwinError("the state is of another engine", "state", "start afresh with --fresh") from e
         self.start(told["initial"])
         self._z, self._steps = numbers[:n], told["steps"]
-        if m:
-            self._append(numbers[n : n + m], numbers[n + m :].reshape(m, s))
+        self._times, self._rows = numbers[n : n + m], numbers[n + m :].reshape(m, s)
+        self._fed = [(self._times, self._rows)]  # parts are evaluated with the next rows: a start does not wait for it
         self._air, self._flags, self._balance = told["air"], told["flags"], told["balance"]
