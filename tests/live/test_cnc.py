@@ -175,8 +175,10 @@ def test_what_is_not_there_or_not_clear_is_one_error(machine, begun, told):
 @LONG
 def test_a_channel_without_a_name_is_one_error(machine):
     machine.do(machine.begin())
-    current = replace(OWN, channels=(*WANTED, Channel("x_current", "A", True, None, 0.0, 20.0)))
-    with pytest.raises(TwinError, match="x_current: the standard has no such name"):
+    more = (Channel("x_current", "A", True, None, 0.0, 20.0), Channel("x_speed", "m/s", True, None, 0.0, 1.0))
+    current = replace(OWN, channels=(*WANTED, *more))
+    told = "x_current: the standard has no such name; x_speed: the standard has no speed of an axis"
+    with pytest.raises(TwinError, match=told):
         OpcUaSource(machine.url, Channels(), current)
 
 

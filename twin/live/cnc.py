@@ -125,7 +125,8 @@ def _node(
         drives, own = spindles, spindles[0][0]
     parts = _one(own, drives, names, what)
     if isinstance(parts, str):
-        return parts
+        an_axis = what == "spindle" and not isinstance(_one(own, axes, names, "axis"), str)
+        return "the standard has no speed of an axis" if an_axis else parts
     return (parts[wanted],) if wanted in parts else f"no {wanted}"
 
 
