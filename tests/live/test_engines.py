@@ -33,7 +33,7 @@ def result(spindle):
 
 
 def test_groups_of_fast_rows_do_not_matter(spindle, compiled):
-    """Two and a half minutes at 50 Hz, evaluated in parts while they come; no value where a part would end."""
+    """Two and a half minutes at 50 Hz, evaluated in pieces while they come; no value where a piece would end."""
     channels = open_engine(spindle, "c", compiled).facts.channels
     rng = np.random.default_rng(5)
     times = 0.02 * np.arange(7500)

@@ -3,7 +3,7 @@
 Each step makes its factor anew, where `twin run` keeps one while film coefficients stay within a fifth of it: so the
 state is z alone. The difference is of second order in that fifth (measured: 5e-5 K over an hour of the spindle).
 
-Rows are evaluated PART at a time while a step goes on: a step at 100 Hz has thousands, and its last block would wait
+Rows are evaluated PIECE at a time while a step goes on: a step at 100 Hz has thousands, and its last block would wait
 for all of them.
 """
 
@@ -35,7 +35,7 @@ from twin.run.plausible import refuse_glowing, refuse_not_finite, refuse_unbalan
 from twin.run.stepping import Inputs, StepHeat, advance, inputs_of
 from twin.run.system import prepare
 
-PART = 1000  # rows: a block of 10 s at 100 Hz
+PIECE = 1000  # rows: a block of 10 s at 100 Hz
 _SETTLED = 2  # times that a state is kept, by when all is compiled
 
 
@@ -69,8 +69,8 @@ class JaxEngine:
         self._z = self._prepared.uniform(temperature)
         self._steps = 0
         self._times = np.zeros(0)
-        self._rows = np.zeros((0, len(self.facts.channels)))  # since the last step or part of one
-        self._parts: list[Drive] = []  # of the step that goes on
+        self._rows = np.zeros((0, len(self.facts.channels)))  # since the last step or piece of one
+        self._pieces: list[Drive] = []  # of the step that goes on
         self._fed = [(self._times, self._rows)]  # since the last step
         self._air = [temperature] * len(self._model.ambient_sensors)
         self._flags: list[str] = []
@@ -95,21 +95,21 @@ class JaxEngine:
         return self._steps - before
 
     def _append(self, time: np.ndarray, row: np.ndarray) -> None:
-        """Rows of the step that goes on; where its parts end depends on the rows alone, not on how they come."""
+        """Rows of the step that goes on; where its pieces end depends on the rows alone, not on how they come."""
         self._fed.append((time, row))
         self._times = np.append(self._times, time)
         self._rows = np.concatenate([self._rows, row])
         before = (self._steps + 1 - 1e-9) * self.facts.step
-        while len(self._times) > PART:
-            known = np.isfinite(self._rows[:PART]).any(axis=0)
-            # no part ends where a value is missing: the next would begin with it held, and nobody flag it
-            ends = np.isfinite(self._rows[PART:, known]).all(axis=1) & (self._times[PART:] < before)
+        while len(self._times) > PIECE:
+            known = np.isfinite(self._rows[:PIECE]).any(axis=0)
+            # no piece ends where a value is missing: the next would begin with it held, and nobody flag it
+            ends = np.isfinite(self._rows[PIECE:, known]).all(axis=1) & (self._times[PIECE:] < before)
             if not ends.any():
                 return
-            self._evaluate(float(self._times[PART + int(np.argmax(ends))]))
+            self._evaluate(float(self._times[PIECE + int(np.argmax(ends))]))
 
     def _evaluate(self, end: float) -> None:
-        """The part of a step up to `end` [s], whose rows are then done with."""
+        """The piece of a step up to `end` [s], whose rows are then done with."""
         last = int(np.searchsorted(self._times, end - 1e-9 * self.facts.step)) + 1
         time, values = self._times[:last], self._rows[:last]
         signals = {
@@ -118,15 +118,15 @@ class JaxEngine:
             if np.isfinite(values[:, k]).any()
         }
         edges = np.array([0.0, end - time[0]])
-        self._parts.append(evaluate_between(self._load, time, signals, edges, self.facts.step))
+        self._pieces.append(evaluate_between(self._load, time, signals, edges, self.facts.step))
         self._keep(end)
 
     def _step(self) -> None:
         dt = self.facts.step
         begin, edge = self._steps * dt, (self._steps + 1) * dt
         self._evaluate(edge)
-        drive = joined(self._parts)
-        self._parts, self._fed = [], [(self._times, self._rows)]
+        drive = joined(self._pieces)
+        self._pieces, self._fed = [], [(self._times, self._rows)]
         inputs = inputs_of(self._load, drive, self.substeps)
         if self.loads is not None:
             self.loads.append((inputs, drive.contact_heat))
@@ -139,7 +139,7 @@ class JaxEngine:
             give_back()
 
     def _keep(self, edge: float) -> None:
-        """What stands at the end of a step or part begins the next one: values hold, axes are on their way."""
+        """What stands at the end of a step or piece begins the next one: values hold, axes are on their way."""
         small = 1e-9 * self.facts.step
         first = int(np.searchsorted(self._times, edge - small))
         there = first < len(self._times) and self._times[first] <= edge + small  # a row at the edge itself
@@ -214,7 +214,7 @@ class JaxEngine:
         self._kept += 1
         if self._kept <= _SETTLED:
             give_back()
-        times, rows = (np.concatenate(parts) for parts in zip(*self._fed, strict=True))
+        times, rows = (np.concatenate(own) for own in zip(*self._fed, strict=True))
         told = {"steps": self._steps, "rows": len(times), "air": self._air, "flags": self._flags,
                 "balance": self._balance, "initial": self.initial}  # fmt: skip
         numbers = np.concatenate([self._z, times, rows.ravel()])  # as text 6,000 rows take 0.1 s
@@ -233,5 +233,5 @@ class JaxEngine:
         self.start(told["initial"])
         self._z, self._steps = numbers[:n], told["steps"]
         self._times, self._rows = numbers[n : n + m], numbers[n + m :].reshape(m, s)
-        self._fed = [(self._times, self._rows)]  # parts are evaluated with the next rows: a start does not wait for it
+        self._fed = [(self._times, self._rows)]  # pieces are evaluated with the next rows: a start does not wait for it
         self._air, self._flags, self._balance = told["air"], told["flags"], told["balance"]

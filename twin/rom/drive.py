@@ -98,7 +98,7 @@ def evaluate(
 def evaluate_between(
     load_model: LoadModel, time: np.ndarray, signals: Mapping[str, np.ndarray], edges: np.ndarray, dt: float
 ) -> Drive:
-    """The same between edges (n_steps + 1,) [s since the first sample], of parts of steps of `dt` [s]."""
+    """The same between edges (n_steps + 1,) [s since the first sample], of pieces of steps of `dt` [s]."""
     check_laws(load_model)
     time, values, missing, absent = _clean(load_model, time, signals)
     n_steps = len(edges) - 1
