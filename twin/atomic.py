@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -91,5 +90,7 @@ def atomic_folder(target: Path) -> Iterator[Path]:
     finally:
         if old.exists() and not target.exists():  # interrupted between the two renames
             os.replace(old, target)
+        import shutil  # a twentieth of the start of a process that only writes files
+
         shutil.rmtree(temporary, ignore_errors=True)
         shutil.rmtree(old, ignore_errors=True)

@@ -69,7 +69,7 @@ def test_a_machine_that_is_warmer_is_followed_as_by_twin_update(spindle, compile
                 LiveOptions(speed=0.0, events=tmp_path / "truth" / "tcp.csv",
                             initial=read_run(tmp_path / "truth").initial_temperature))  # fmt: skip
     assert learnt(made)["measurements"] == len(expected.row_time)
-    moved = np.array(made.intake.displacements()).reshape(-1, 3)
+    moved = np.array(made.intake.errors()).reshape(-1, 3)
     corrected = expected.base[-1] + expected.correction[-1]
     assert np.abs(expected.correction[-1]).max() > 1e-6
     assert np.abs(moved - corrected).max() < 0.05 * np.abs(expected.correction[-1]).max()
@@ -105,7 +105,7 @@ def test_temperatures_and_r_tests_are_followed_as_by_the_filter_state_of_twin_up
     told = learnt(made)
     assert told["measurements"] == len(expected.row_time)
     assert told["learnt"]["readings"] > 100
-    moved = np.array(made.intake.displacements()).reshape(-1, 3)
+    moved = np.array(made.intake.errors()).reshape(-1, 3)
     corrected = expected.base[-1] + expected.correction[-1]
     assert np.abs(expected.correction[-1]).max() > 1e-6
     assert np.abs(moved - corrected).max() < 0.05 * np.abs(expected.correction[-1]).max()
@@ -126,7 +126,7 @@ def test_temperatures_and_r_tests_are_followed_as_by_the_filter_state_of_twin_up
     again.run(lambda: False)
     assert again.taken_again > 0
     assert again.intake.engine.steps == made.intake.engine.steps
-    assert again.intake.displacements() == made.intake.displacements()
+    assert again.intake.errors() == made.intake.errors()
     assert learnt(again)["learnt"] == told["learnt"]
 
 
@@ -145,7 +145,7 @@ def test_a_process_that_was_killed_learns_the_same(tmp_path):
         os.close(first._lock)  # as the kernel does
         again = whole(runtime(state, Listed(ALL), events))
         assert again.taken_again > 0
-        assert again.intake.displacements() == once.intake.displacements()
+        assert again.intake.errors() == once.intake.errors()
         assert learnt(again)["learnt"] == learnt(once)["learnt"]
         assert learnt(again)["measurements"] == 4
 
@@ -167,7 +167,7 @@ def test_bad_rows_and_files_are_counted_and_change_nothing(tmp_path):
     assert "no columns" in told["error"] or "header" in told["error"]
     alone = tmp_path / "alone.csv"
     alone.write_text(HEAD + sound)
-    assert made.intake.displacements() == whole(runtime(tmp_path / "b", Listed(ALL), alone)).intake.displacements()
+    assert made.intake.errors() == whole(runtime(tmp_path / "b", Listed(ALL), alone)).intake.errors()
 
 
 def test_one_that_comes_too_late_is_left_out_and_one_that_lies_is_gated(tmp_path):
@@ -183,7 +183,7 @@ def test_one_that_comes_too_late_is_left_out_and_one_that_lies_is_gated(tmp_path
     told = learnt(made)
     assert (told["too_old"], told["measurements"]) == (1, 2)
     assert [t["accepted"] for t in told["last"]] == [False]
-    assert max(map(abs, made.intake.displacements())) < 20e-6
+    assert max(map(abs, made.intake.errors())) < 20e-6
     made.close()
 
 
@@ -199,7 +199,7 @@ def test_what_was_measured_with_offsets_active_is_freed_of_them(tmp_path):
                 f.write(row(66, 0.0, corrected=1.0))
     gain, slow, offset = learnt(made)["learnt"]["dx"]
     assert made.publisher.outlets[0].now[0][1] == pytest.approx(
-        offsets(FACTS, made.intake.displacements(), "grid")[0][1], abs=1e-7
+        offsets(FACTS, made.intake.errors(), "grid")[0][1], abs=1e-7
     )
     assert max(map(abs, made.publisher.outlets[0].now[0])) > 1e-6
     assert (gain, slow, 1e6 * offset) == pytest.approx((1.0, 0.0, 0.0), abs=0.05)

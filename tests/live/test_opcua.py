@@ -144,7 +144,7 @@ def polled(source, blocks, seconds=20.0):
 def test_signals_are_read_in_si_and_bad_ones_are_missing(control):
     channels = channels_of(control)
     assert channels.limits["x_current"] == {"high": 50.0}
-    source = OpcUaSource(control.url, channels)
+    source = OpcUaSource(control.url, channels, FACTS)
     try:
         first, second = polled(source, 2)[:2]
         assert first.names == NAMES
@@ -161,7 +161,7 @@ def test_signals_are_read_in_si_and_bad_ones_are_missing(control):
 
 
 def test_a_wrong_password_is_refused_and_nothing_arrives(control):
-    source = OpcUaSource(control.url, channels_of(control, "wrong"))
+    source = OpcUaSource(control.url, channels_of(control, "wrong"), FACTS)
     try:
         assert polled(source, 1, 3.0) == []
         source._connection._tried = -1e9
@@ -190,10 +190,10 @@ def test_a_client_certificate_that_has_expired_is_refused_at_once(control):
     certificate(expired, "client", -1)
     own = channels.opcua | {"certificate": "expired/client.der", "key": "expired/client.pem"}
     with pytest.raises(TwinError, match=r"certificate: valid from .* which is not now"):
-        OpcUaSource(control.url, replace(channels, opcua=own))
+        OpcUaSource(control.url, replace(channels, opcua=own), FACTS)
     (expired / "client.der").write_bytes(b"none")
     with pytest.raises(TwinError, match="no certificate"):
-        OpcUaSource(control.url, replace(channels, opcua=own))
+        OpcUaSource(control.url, replace(channels, opcua=own), FACTS)
 
 
 def test_another_server_than_the_pinned_one_is_refused(control):
@@ -201,7 +201,7 @@ def test_another_server_than_the_pinned_one_is_refused(control):
     certificate(control.folder, "other", 365)
     for name, blocks in (("server", 1), ("other", 0)):
         source = OpcUaSource(
-            control.url, replace(channels, opcua=channels.opcua | {"server_certificate": f"{name}.der"})
+            control.url, replace(channels, opcua=channels.opcua | {"server_certificate": f"{name}.der"}), FACTS
         )
         try:
             assert len(polled(source, 1, 10.0 if blocks else 3.0)) == blocks
@@ -211,7 +211,7 @@ def test_another_server_than_the_pinned_one_is_refused(control):
 
 def test_a_server_whose_certificate_has_expired_is_refused(tmp_path):
     control = Control(tmp_path, days=-1)
-    source = OpcUaSource(control.url, channels_of(control))
+    source = OpcUaSource(control.url, channels_of(control), FACTS)
     try:
         assert polled(source, 1, 3.0) == []
         source._connection._tried = -1e9
@@ -236,7 +236,7 @@ def test_offsets_are_written_and_read_back(control):
 @pytest.mark.long
 def test_a_server_that_goes_away_is_a_gap_and_no_jump(tmp_path):
     control = Control(tmp_path)
-    source = OpcUaSource(control.url, channels_of(control))
+    source = OpcUaSource(control.url, channels_of(control), FACTS)
     made = runtime(tmp_path / "state", source, sink := Kept())
     made.begin(True)
     until = time.monotonic() + 20.0

@@ -99,7 +99,7 @@ def test_tables_are_read_to_a_thousandth():
     rng = np.random.default_rng(0)
     air = 21.0
     difference = np.concatenate([rng.uniform(-80.0, 80.0, 200), 10.0 ** rng.uniform(-2, 1, 100)])
-    table = law_table(PLATE, {}, 1, {"surface": air + DIFFERENCES[None, :], "ambient": np.array([[air]])})
+    table = law_table(PLATE, {}, 1, {"surface": air + DIFFERENCES[None, :], "ambient": np.array([[air]])})[0]
     tables = np.tile(table[:, None, :], (len(difference), 1, 1))
     read = read_table(np, tables, difference_place(np, difference)[:, None])[:, 0]
     exact = np.array([free(air + d, air) for d in difference])

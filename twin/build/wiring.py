@@ -93,7 +93,7 @@ def film_range(
     free = states_of(use)
     if free:
         states = {"surface": surface, "ambient": ambient[:, None]}
-        convection = law_table(use, values, len(corners), {name: states[name] for name in free})
+        convection = law_table(use, values, len(corners), {name: states[name] for name in free})[0]
     else:
         convection = law_values([use], values, len(corners))
     radiant = _middle(environments[film.radiant], signals)

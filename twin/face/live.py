@@ -86,7 +86,7 @@ def wired(artefact: str | Path, source: str, out: Sequence[str], state: str | Pa
     engine = open_engine(Path(artefact), options.engine, folder / "engine")
     facts = engine.facts
     channels = read_channels(None if options.channels is None else Path(options.channels), facts)
-    incoming = open_source(source, options.speed, channels)
+    incoming = open_source(source, options.speed, channels, facts)
     sinks = [open_sink(text, facts, options.form, channels) for text in out]
     publisher = Publisher(sinks, neutral(facts, options.form), options.form, limits, patience)
     clock = RealClock(incoming.speed) if incoming.speed else RecordClock()
@@ -99,6 +99,9 @@ def _learning(artefact: Path, engine: Engine, folder: Path, options: LiveOptions
     """What learns from measured values; None: nothing. Raises TwinError where the filter chosen cannot."""
     if options.events is None and options.learn is None:
         return None
+    if len(engine.facts.offset_per_error[0]) != 3:
+        what = "three components of a TCP error do not tell which of six struts is too long"
+        raise TwinError(what, "--events" if options.events else "--learn", "leave it out: the model corrects alone")
     from twin.live.learner import Filter, Learner
     from twin.live.learning import Learning
 

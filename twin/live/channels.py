@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from twin.units import parse_unit, to_si
 
 _KEYS = {"opcua", "mqtt", "channels", "outputs"}
 _CHANNEL = {"node", "unit", "low", "high", "rate"}
-_OPCUA = {"interval", "certificate", "key", "server_certificate", "user", "password_file", "heartbeat"}
+_OPCUA = {"interval", "certificate", "key", "server_certificate", "user", "password_file", "heartbeat", "drives"}
 _MQTT = {"user", "password_file", "ca", "certificate", "key", "client"}
 _FILES = ("certificate", "key", "server_certificate", "ca", "password_file")
 _OUTPUTS = {"offsets", "count", "good_until", "mode"}
@@ -28,6 +27,7 @@ class Channels:
     opcua: dict[str, Any] = field(default_factory=dict)
     mqtt: dict[str, Any] = field(default_factory=dict)
     nodes: dict[str, tuple[str, str]] = field(default_factory=dict)  # column -> node, unit
+    units: dict[str, str] = field(default_factory=dict)  # column -> unit, where the file says so
     limits: dict[str, dict[str, float]] = field(default_factory=dict)  # column -> low, high, rate in SI
     outputs: dict[str, str] = field(default_factory=dict)
 
@@ -43,6 +43,8 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
     """The file, its limits in SI. Raises TwinError for unknown keys, columns and units."""
     if path is None:
         return Channels()
+    import tomllib  # a twentieth of a start, where there is no file
+
     remedy = "docs/live.md has an example"
     try:
         told = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -57,7 +59,7 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
     _whole(told.get("opcua", {}), path, "opcua")
     _whole(told.get("mqtt", {}), path, "mqtt")
     units = {c.column: c.unit for c in facts.channels} | dict.fromkeys(facts.sensors, "degC")
-    nodes, limits = {}, {}
+    nodes, limits, written = {}, {}, {}
     named = told.get("channels", {})
     if not isinstance(named, dict):
         raise TwinError("channels is no table", str(path), remedy)
@@ -66,13 +68,16 @@ def read_channels(path: Path | None, facts: Facts) -> Channels:
             raise TwinError(f"no channel '{column}'", str(path), f"channels are: {', '.join(units)}")
         _known(own, _CHANNEL, path, f"channels.{column}")
         where, unit = f"{path}: channels.{column}", units[column]
+        if "unit" in own:
+            _checked(own["unit"], unit, where)
+            written[column] = str(own["unit"])
         if "node" in own:
-            nodes[column] = (str(own["node"]), str(own.get("unit", unit)))
-            _checked(own.get("unit", unit), unit, where)
+            nodes[column] = (str(own["node"]), written.get(column, unit))
         limits[column] = {k: _si(own[k], unit, k, where) for k in ("low", "high", "rate") if k in own}
         if limits[column].get("low", -math.inf) >= limits[column].get("high", math.inf):
             raise TwinError("low is not below high", where, "exchange them")
-    return Channels(path.parent, told.get("opcua", {}), told.get("mqtt", {}), nodes, limits, told.get("outputs", {}))
+    opcua, mqtt, outputs = (told.get(name, {}) for name in ("opcua", "mqtt", "outputs"))
+    return Channels(path.parent, opcua, mqtt, nodes, written, limits, outputs)
 
 
 def _whole(told: dict[str, Any], path: Path, name: str) -> None:
@@ -80,8 +85,11 @@ def _whole(told: dict[str, Any], path: Path, name: str) -> None:
     for key, other in (("user", "password_file"), ("certificate", "key"), ("key", "certificate")):
         if key in told and other not in told and (name, key) != ("mqtt", "user"):
             raise TwinError(f"{key} without {other}", f"{path}: {name}", f'write {other} = "..." beside it')
+    drives = told.get("drives", {})
+    if not isinstance(drives, dict) or not all(isinstance(v, str) for v in drives.values()):
+        raise TwinError("drives is no table of texts", f"{path}: {name}", "write drives = { x = 'X1' }")
     for key, value in told.items():
-        if not isinstance(value, str) and key != "interval":
+        if not isinstance(value, str) and key not in ("interval", "drives"):
             raise TwinError(f"{key} is no text", f"{path}: {name}", f'write {key} = "..."')
     _interval(told.get("interval", "0.1 s"), path, name)
 

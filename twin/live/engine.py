@@ -39,6 +39,11 @@ class Engine(Protocol):
     def displacements(self) -> list[float]:
         """TCP displacement [m] at the end of the last step, tool minus work: 3 * pose + component."""
 
+    def errors(self) -> list[float]:
+        """What offsets are made of [m], per pose c of `Facts.offset_per_error`: these displacements, or of a platform
+        by how much each of its struts is too long.
+        """
+
     def states(self) -> list[float]:
         """Coordinates of the artefact at the end of the last step, bodies one after the other."""
 

@@ -46,10 +46,12 @@ class CEngine:
         self._state_count = int(function("state_count", ctypes.c_int)())
         self._flags = function("flags", ctypes.POINTER(ctypes.c_ubyte), machine)
         self._poses = function("poses", None, machine, ctypes.POINTER(real))
+        self._errors = function("errors", None, machine, ctypes.POINTER(real))
         self._restore = function("restore", None, machine, ctypes.c_char_p)
         self._kept = int(function("saved", ctypes.c_size_t)())
         self._machine = ctypes.create_string_buffer(int(function("size", ctypes.c_size_t)()))
         self._moved = (real * (3 * facts.all_poses))()
+        self._wrong = (real * (len(facts.offset_per_error[0]) * facts.all_poses))()
 
     def start(self, temperature: float) -> None:
         self._start(self._machine, temperature, self.facts.step)
@@ -72,6 +74,10 @@ class CEngine:
     def displacements(self) -> list[float]:
         self._poses(self._machine, self._moved)
         return list(self._moved)
+
+    def errors(self) -> list[float]:
+        self._errors(self._machine, self._wrong)
+        return list(self._wrong)
 
     def states(self) -> list[float]:
         return list(self._states(self._machine)[: self._state_count])

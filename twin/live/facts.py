@@ -12,7 +12,7 @@ from typing import Any
 
 from twin.errors import TwinError
 
-FACTS_VERSION = 1
+FACTS_VERSION = 2
 FACTS, LIBRARY = "facts.json", "machine.so"  # files of a compiled machine
 
 
@@ -26,6 +26,7 @@ class Channel:
     default: float | None  # SI; None: a log must have it
     low: float  # certified range
     high: float
+    axis: str = ""  # whose position it is
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Facts:
     all_poses: int  # with those scattered in the workspace, which come after
     pose_grid: tuple[tuple[float, ...], ...]  # m, per axis
     axes: tuple[Axis, ...]
-    offset_per_error: tuple[tuple[float, ...], ...]  # (a, 3)
+    offset_per_error: tuple[tuple[float, ...], ...]  # (a, 3) per TCP displacement, or (6, 6) per strut error
     fit: tuple[tuple[float, ...], ...]  # (c, n): coefficients = fit @ values at the poses
     certificate: str  # in words
 

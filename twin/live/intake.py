@@ -139,10 +139,10 @@ class Intake:
             elif name in facts.sensors and unit == "degC":
                 self._sensors.append((name, column))
 
-    def displacements(self) -> list[float]:
-        """TCP errors at the poses [m], with what was learnt."""
-        moved = self.engine.displacements()
-        return moved if self.learning is None else self.learning.corrected(moved)
+    def errors(self) -> list[float]:
+        """What offsets are made of (`Engine.errors`), with what was learnt."""
+        errors = self.engine.errors()
+        return errors if self.learning is None else self.learning.corrected(errors)
 
     def stored(self) -> dict[str, Any]:
         return {

@@ -1,4 +1,4 @@
-"""The journal: every block that went into the machine, in the order in which it went, on the disk before it does.
+"""The journal: every block that went into the machine, in the order in which it went, written before it does.
 
 Segments `000000001.twb` of frames as `twin.logs.frame` describes them, so that `twin unpack` makes a run folder of one.
 A segment is only ever appended to. A crash costs the frame that was being written, which is cut off when the journal is
@@ -63,15 +63,19 @@ class Journal:
             if self._file.tell() >= self.size:
                 self._next()
             self._file.write(packed(frame_of(block)))
-            now = time.monotonic()
-            if now - self._synced >= SYNC:
-                os.fdatasync(self._file.fileno())
-                self._synced = now
         except OSError as e:
             raise _failed(e, self.folder) from e
 
+    def sync_when_due(self) -> None:
+        """After SYNC s. Raises TwinError where the disk fails."""
+        if time.monotonic() - self._synced >= SYNC:
+            try:
+                self.sync()
+            except OSError as e:
+                raise _failed(e, self.folder) from e
+
     def sync(self) -> None:
-        """What was appended is on the disk when this returns."""
+        """What was appended is on the disk itself when this returns, which may take a disk a tenth of a second."""
         os.fdatasync(self._file.fileno())
         self._synced = time.monotonic()
 

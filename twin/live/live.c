@@ -46,6 +46,17 @@ int twin_live_state_count(void) { return TWIN_STATES; }
 const unsigned char *twin_live_flags(const twin_live *l) { return l->m.flag; }
 void twin_live_poses(const twin_live *l, twin_real *displacement) { twin_poses(&l->m, displacement); }
 
+/* What offsets are made of, at all poses: TCP displacements, or by how much the struts of a platform are too long. */
+void twin_live_errors(const twin_live *l, twin_real *error)
+{
+#if TWIN_STRUTS
+    for (int i = 0; i < TWIN_STRUTS * TWIN_POSES; i++)
+        error[i] = product(TWIN_STATES, strut_errors + (size_t)i * TWIN_STATES, l->m.z);
+#else
+    twin_poses(&l->m, error);
+#endif
+}
+
 /* A state that was saved by the same program. */
 void twin_live_restore(twin_live *l, const void *saved)
 {

@@ -1,12 +1,14 @@
-"""Axis offsets out of TCP displacements at the poses, as values on the grid or as coefficients of polynomials.
+"""Axis offsets out of errors at the poses, as values on the grid or as coefficients of polynomials.
 
-offset = -J^+ w at every pose (`twin.run.correction_axes`); the polynomials are those of `twin correction`, fitted to
+offset = -J^+ w at every pose (`twin.run.correction_axes`), of a platform on struts minus the errors of their lengths
+(`twin.run.correction_struts`); the polynomials are those of `twin correction`, fitted to
 the offsets, with s = clip((position - centre) / half_range, -1, 1) per axis.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import mul
 from typing import Literal
 
 from twin.live.facts import Facts
@@ -15,12 +17,11 @@ Form = Literal["grid", "polynomial"]
 Values = tuple[tuple[float, ...], ...]  # m, per axis: at every pose, or coefficients
 
 
-def offsets(facts: Facts, displacements: Sequence[float], form: Form) -> Values:
-    """What is added to each axis [m], out of displacements [m] at the poses, 3 * pose + component."""
-    at_poses = []
-    x, y, z = (displacements[c : 3 * facts.poses : 3] for c in range(3))
-    for kx, ky, kz in facts.offset_per_error:
-        at_poses.append(tuple(kx * dx + ky * dy + kz * dz for dx, dy, dz in zip(x, y, z, strict=True)))
+def offsets(facts: Facts, errors: Sequence[float], form: Form) -> Values:
+    """What is added to each axis [m], out of c errors [m] at each pose, c * pose + component (`Engine.errors`)."""
+    c = len(facts.offset_per_error[0])
+    poses = [errors[c * k : c * (k + 1)] for k in range(facts.poses)]
+    at_poses = [tuple(sum(map(mul, row, pose)) for pose in poses) for row in facts.offset_per_error]
     if form == "grid":
         return tuple(at_poses)
     return tuple(

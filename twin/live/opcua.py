@@ -7,10 +7,11 @@ HEARTBEAT makes all values missing. The gap of a lost connection is lost: a serv
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from array import array
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import CancelledError
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import Any
 from twin.errors import TwinError
 from twin.live.block import Block
 from twin.live.channels import Channels
+from twin.live.cnc import nodes_by_default
 from twin.live.facts import Facts
 from twin.live.offsets import Values
 from twin.live.sinks import Sent
@@ -42,6 +44,7 @@ class Connection:
             import asyncua.sync
         except ImportError as e:
             raise TwinError("the package asyncua is missing", url, "python -m pip install 'twin[live]'") from e
+        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # a line per attempt, for as long as a server is away
         self.url, self.channels, self._api = url, channels, asyncua.sync
         self._client: Any = None
         self.error = f"{url} cannot be reached"
@@ -132,17 +135,24 @@ class OpcUaSource:
     speed = 1.0
     ended = False
 
-    def __init__(self, url: str, channels: Channels):
-        """Raises TwinError where the channels file names no nodes."""
-        if not channels.nodes:
-            raise TwinError("no node is named", url, "name them with --channels FILE; docs/live.md has an example")
+    def __init__(self, url: str, channels: Channels, facts: Facts):
+        """Raises TwinError where neither the channels file nor a server that can be reached tells the nodes needed."""
         self._connection = Connection(url, channels)
         self.interval = to_si(channels.opcua.get("interval", "0.1 s"), "s")
-        self.names = tuple(channels.nodes)
-        units = [parse_unit(unit) for _, unit in channels.nodes.values()]
-        self.units, self._units = tuple(u.si for u in units), units
-        self._ids = [node for node, _ in channels.nodes.values()]
-        _refuse_no_nodes(self._ids)
+        self._channels, self._facts, self._wrong = channels, facts, ""
+        _refuse_no_nodes([node for node, _ in channels.nodes.values()])
+        self._by_default = any(
+            c.needed and c.default is None and c.column not in channels.nodes for c in facts.channels
+        )
+        self._read(channels.nodes)
+        if self._by_default:
+            try:
+                self._read(channels.nodes | nodes_by_default(self._connection.client(), facts, channels))
+            except TwinError:
+                self._connection.lose()
+                raise
+            except _LOST:  # later, then
+                self._connection.lose()
         self._beat = channels.opcua.get("heartbeat")
         self._last_beat: tuple[object, float] = (None, time.monotonic())
         self._nodes: list[Any] = []
@@ -150,6 +160,13 @@ class OpcUaSource:
         self._next = 0.0  # s, POSIX: when the next record is due
         self._first = 0.0
         self._rows: array[float] = array("d")
+
+    def _read(self, nodes: Mapping[str, tuple[str, str]]) -> None:
+        """From now on these: column -> node, unit."""
+        self.names = tuple(nodes)
+        self._units = [parse_unit(unit) for _, unit in nodes.values()]
+        self.units = tuple(u.si for u in self._units)
+        self._ids = [node for node, _ in nodes.values()]
 
     def resume(self, mark: Mark | None) -> None:
         return
@@ -162,7 +179,7 @@ class OpcUaSource:
 
     @property
     def error(self) -> str:
-        return self._connection.error
+        return self._connection.error or self._wrong
 
     def poll(self, wait: float) -> Sequence[Block | Damaged]:
         until = time.time() + wait
@@ -181,6 +198,8 @@ class OpcUaSource:
     def _record(self) -> None:
         client = self._connection.client()
         if not self._nodes:  # connected anew: what was missed is a gap, which another stream shows
+            if self._by_default:
+                self._find(client)
             ids = [*self._ids, self._beat] if self._beat else self._ids
             self._nodes = [client.get_node(i) for i in ids]
             self._stream, self._sequence, self._rows = time.time_ns(), 0, array("d")
@@ -195,6 +214,15 @@ class OpcUaSource:
             values = [math.nan] * len(self.names)
         self._rows.extend(v * u.factor + u.offset for v, u in zip(values, self._units, strict=True))
         self._next += self.interval
+
+    def _find(self, client: Any) -> None:
+        """Nodes by default, which a server may call otherwise since it was started anew. Raises ConnectionError."""
+        try:
+            self._read(self._channels.nodes | nodes_by_default(client, self._facts, self._channels))
+        except TwinError as e:  # it may be starting still: no reason to end
+            self._wrong = e.problems[0].what
+            raise ConnectionError(self._wrong) from e
+        self._wrong = ""
 
     def _value(self, found: Any) -> float:
         if found.StatusCode is not None and not found.StatusCode.is_good():

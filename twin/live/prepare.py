@@ -18,15 +18,18 @@ import numpy as np
 from twin.atomic import atomic_folder
 from twin.errors import TwinError
 from twin.export.c.source import Source, source_of
-from twin.export.c.text import identifier, named
+from twin.export.c.text import Arrays, identifier, named
 from twin.export.compiler import own_compiler
 from twin.live.facts import FACTS, LIBRARY, Axis, Channel, Facts, write_facts
 from twin.rom.artefact import Artefact, read_artefact
 from twin.rom.drive import needed_signals
+from twin.rom.model import MachineModel
 from twin.run.correction import PoseErrors, default_degrees
 from twin.run.correction_axes import axis_jacobian, offset_matrix
 from twin.run.correction_polynomial import design_matrix, normalised_axes
-from twin.run.correction_struts import on_struts
+from twin.run.correction_struts import on_struts, strut_error_rows
+from twin.run.system import Prepared
+from twin.run.system import prepare as prepared_of
 
 _FLAGS = ("-std=c99", "-O3", "-shared", "-fPIC")
 
@@ -36,9 +39,6 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
     model, load, c = artefact.model, artefact.model.load_model, artefact.certificate
     if not model.moves:
         raise TwinError("the machine has no TCP, so nothing can be corrected", "artefact", "describe [tcp]")
-    if on_struts(model):
-        remedy = "use `twin run` and `twin correction`"
-        raise TwinError("offsets of a platform's struts are not computed live", "artefact", remedy)
     n = len(model.poses) - model.scattered
     poses = model.poses[:n]
     errors = PoseErrors(model.pose_axes, model.pose_grid, poses, np.zeros((n, 3)))
@@ -46,6 +46,7 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
     jacobian = axis_jacobian(artefact, model.pose_axes)
     needed = needed_signals(load)
     names = [s.name for s in load.signals]
+    axis_of = {a.position: a.name for a in load.axes} | {a.position: a.name for a in load.rotary}
     air = load.environments[load.surroundings]
     words = "no certificate"
     if "max_temperature_error_in_case" in c:
@@ -57,7 +58,10 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
         prefix=identifier(model.name),
         step=float(c.get("step", 60.0)),
         reference_temperature=float(model.reference_temperature),
-        channels=tuple(Channel(s.column, s.unit, s.name in needed, s.default, s.low, s.high) for s in load.signals),
+        channels=tuple(
+            Channel(s.column, s.unit, s.name in needed, s.default, s.low, s.high, axis_of.get(s.name, ""))
+            for s in load.signals
+        ),
         axis_channels=tuple(names.index(a.position) for a in load.axes),
         strokes=tuple((a.low, a.high) for a in load.axes),
         air=names.index(air.signal) if air.signal else -1,
@@ -74,6 +78,12 @@ def facts_of(artefact: Artefact, flags: tuple[str, ...] = ()) -> Facts:
     )
 
 
+def strut_rows(model: MachineModel, prepared: Prepared) -> np.ndarray:
+    """(6 * n, N) [m]: by how much struts are too long at the n poses, per coordinate that is stepped."""
+    rows = strut_error_rows(model, np.asarray(model.poses))
+    return np.hstack([own.reshape(-1, own.shape[-1]) @ X for own, X in zip(rows, prepared.back, strict=True)])
+
+
 def prepare(path: Path, folder: Path) -> None:
     """Write the facts and the library of the artefact at `path` to `folder`.
 
@@ -85,19 +95,22 @@ def prepare(path: Path, folder: Path) -> None:
     artefact = read_artefact(path)
     source = source_of(artefact)
     facts = facts_of(artefact, source.flags)
+    struts = Arrays(False, source.name)
+    if on_struts(artefact.model):
+        struts.reals("strut_errors", strut_rows(artefact.model, prepared_of(artefact.model)))
+    shim = "".join(struts.parts) + (resources.files("twin.live") / "live.c").read_text(encoding="utf-8")
     with atomic_folder(folder) as temporary:
         write_facts(temporary / FACTS, facts)
-        _compile(source, temporary)
+        _compile(source, named(shim, source.name), temporary)
 
 
-def _compile(source: Source, folder: Path) -> None:
+def _compile(source: Source, shim: str, folder: Path) -> None:
     compiler = own_compiler()
     if compiler is None:
         raise TwinError("no C compiler, so no C engine", "--engine", "install gcc, name one in CC, or --engine jax")
     code = folder / f"{source.name}.c"
-    shim = (resources.files("twin.live") / "live.c").read_text(encoding="utf-8")
     (folder / f"{source.name}.h").write_text(source.header, encoding="utf-8")
-    code.write_text(source.code + named(shim, source.name), encoding="utf-8")
+    code.write_text(source.code + shim, encoding="utf-8")
     command = [compiler, *_FLAGS, "-o", str(folder / LIBRARY), str(code), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -117,6 +117,7 @@ class Runtime:
         for block in blocks:
             self._take(block)
             self.latency.take(time.perf_counter() - arrived)
+            self._settle()
         self.source.release(self.resolver.held())
         self._tell()
         return bool(arrivals)
@@ -151,6 +152,10 @@ class Runtime:
             now, age if age > line.spacing else 0.0, why, block.records * block.interval, block.sequence
         )
         self.publisher.tick(now)
+
+    def _settle(self) -> None:
+        """What outputs need not wait for."""
+        self.journal.sync_when_due()
         self._checkpoint()
 
     def _feed(self, block: Block) -> None:
@@ -173,7 +178,7 @@ class Runtime:
 
     def _aim(self) -> None:
         engine, form = self.intake.engine, self.publisher.form
-        self.publisher.aim(offsets(engine.facts, self.intake.displacements(), form))
+        self.publisher.aim(offsets(engine.facts, self.intake.errors(), form))
 
     def _learn(self, learning: Learning) -> None:
         """Measured TCP errors that have come."""
@@ -310,6 +315,7 @@ class Runtime:
                 self.once()
             for block in self.resolver.finish():
                 self._take(block)
+                self._settle()
             whole = True
         finally:
             beat.set()

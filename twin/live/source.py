@@ -10,6 +10,7 @@ from typing import Protocol
 from twin.errors import TwinError
 from twin.live.block import Block
 from twin.live.channels import Channels
+from twin.live.facts import Facts
 from twin.logs.resolver import Damaged
 
 
@@ -53,7 +54,7 @@ class Source(Protocol):
 KINDS = "csv:LOADS.CSV, replay:RUN, ring:FILE, mqtt:HOST:PORT/TOPIC, opcua:opc.tcp://HOST:PORT"
 
 
-def open_source(text: str, speed: float, channels: Channels) -> Source:
+def open_source(text: str, speed: float, channels: Channels, facts: Facts) -> Source:
     """The source that `text` names: kind:place. channels: of the channels file, for OPC UA and MQTT.
 
     Raises TwinError for other kinds, and LogError for files that cannot be read.
@@ -76,7 +77,7 @@ def open_source(text: str, speed: float, channels: Channels) -> Source:
     if kind == "opcua":
         from twin.live.opcua import OpcUaSource
 
-        return OpcUaSource(place, channels)
+        return OpcUaSource(place, channels, facts)
     if kind == "mqtt":
         from twin.live.mqtt import MqttSource
 

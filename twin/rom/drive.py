@@ -91,12 +91,19 @@ def evaluate(
     Raises LogError for missing or empty signals and for times that do not increase, DescriptionError for laws that
     cannot be evaluated.
     """
+    if n_steps is None:
+        n_steps = max(1, int(np.ceil((time[-1] - time[0]) / dt - 1e-9))) if len(time) else 1
+    return evaluate_between(load_model, time, signals, dt * np.arange(n_steps + 1), dt)
+
+
+def evaluate_between(
+    load_model: LoadModel, time: np.ndarray, signals: Mapping[str, np.ndarray], edges: np.ndarray, dt: float
+) -> Drive:
+    """The same between edges (n_steps + 1,) [s since the first sample], of pieces of steps of `dt` [s]."""
     check_laws(load_model)
     time, values, missing, absent = _clean(load_model, time, signals)
-    if n_steps is None:
-        n_steps = max(1, int(np.ceil((time[-1] - time[0]) / dt - 1e-9)))
+    n_steps = len(edges) - 1
     t = time - time[0]  # small numbers: seconds since 1970 would cost seven digits
-    edges = dt * np.arange(n_steps + 1)
     intervals = cut(t, edges)
 
     powers, powers_hold = _read_from_log([(s.use, s.gain) for s in load_model.sources], values, len(t))

@@ -15,7 +15,7 @@ from twin.rom.load_model import LawUse
 
 # Samples go through in blocks of one size, so that logs of any length share one compiled function.
 _BLOCK = 4096
-_BLOCKS_OF_TABLES = (64, 256)  # of a table over states: a minute of a log, as many numbers as in the other blocks
+_BLOCKS_OF_TABLES = (16, 64, 256)  # of a table over states: 10 s of a log, a minute, as many numbers as in _BLOCK
 
 
 def parameters_of(use: LawUse) -> dict[str, float]:
@@ -41,23 +41,34 @@ def states_of(use: LawUse) -> tuple[str, ...]:
 
 @partial(jax.jit, static_argnames=("wiring", "holds"))
 def _evaluate(
-    wiring: tuple, holds: bool, samples: jax.Array, states: tuple, parameters: tuple[dict[str, jax.Array], ...]
+    wiring: tuple, holds: bool, samples: jax.Array, parameters: tuple[dict[str, jax.Array], ...]
 ) -> jax.Array:
-    """Results of laws stacked on axis 1; arguments from rows of `samples`, or from `states` of the same use."""
+    """Results of laws stacked on axis 1; arguments from rows of `samples`."""
     columns = []
-    for (law, arguments), state, values in zip(wiring, states, parameters, strict=True):
+    for (law, arguments), values in zip(wiring, parameters, strict=True):
         given = {name: samples[column] for name, column in arguments}
-        shape = jnp.shape(samples[0])
-        if state:
-            given = {name: value[:, None] for name, value in given.items()}
-            shape = jnp.broadcast_shapes(*(jnp.shape(s) for s in state.values()), (shape[0], 1))
         row = LAWS[law]
         if holds:
-            result = row.validity.holds(**given, **state, **values) if row.validity else True
+            result = row.validity.holds(**given, **values) if row.validity else True
         else:
-            result = row.function(**given, **state, **values)
-        columns.append(jnp.broadcast_to(result, shape))
+            result = row.function(**given, **values)
+        columns.append(jnp.broadcast_to(result, jnp.shape(samples[0])))
     return jnp.stack(columns, axis=1)
+
+
+@partial(jax.jit, static_argnames="wiring")
+def _tabulate(
+    wiring: tuple, samples: jax.Array, state: dict[str, jax.Array], parameters: dict[str, jax.Array]
+) -> tuple[jax.Array, jax.Array | None]:
+    """A law over a grid of its states and whether it holds there, None where no range is published."""
+    law, arguments = wiring
+    given = {name: samples[column][:, None] for name, column in arguments}
+    shape = jnp.broadcast_shapes(*(jnp.shape(s) for s in state.values()), (samples.shape[1], 1))
+    row = LAWS[law]
+    value = jnp.broadcast_to(row.function(**given, **state, **parameters), shape)
+    if row.validity is None:
+        return value, None
+    return value, jnp.broadcast_to(row.validity.holds(**given, **state, **parameters), shape)
 
 
 def _wiring(uses: Sequence[LawUse]) -> tuple[list[str], tuple]:
@@ -65,29 +76,23 @@ def _wiring(uses: Sequence[LawUse]) -> tuple[list[str], tuple]:
     return names, tuple((u.law, tuple((a, names.index(s)) for a, s in sorted(u.signals.items()))) for u in uses)
 
 
-def _over_samples(
-    uses: Sequence[LawUse],
-    signals: Mapping[str, np.ndarray],
-    n_samples: int,
-    states: Sequence[Mapping[str, np.ndarray]],
-    holds: bool,
-    block: int,
-) -> list[np.ndarray]:
-    """Blocks of results; states of each use: (n_samples, m) or (1, m) arrays by argument."""
+def _padded(
+    names: Sequence[str], signals: Mapping[str, np.ndarray], n_samples: int, block: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of signals in whole blocks (names, k * block), and which sample each column is: the last again and again."""
+    sample = np.minimum(np.arange(-(-n_samples // block) * block), n_samples - 1)
+    table = np.zeros((max(len(names), 1), len(sample)))
+    for row, name in enumerate(names):
+        table[row] = signals[name][sample]
+    return table, sample
+
+
+def _over_samples(uses: Sequence[LawUse], signals: Mapping[str, np.ndarray], n_samples: int, holds: bool) -> np.ndarray:
     names, wiring = _wiring(uses)
     parameters = tuple(parameters_of(use) for use in uses)
-    blocks = -(-n_samples // block)
-    padded = np.minimum(np.arange(blocks * block), n_samples - 1)
-    table = np.zeros((max(len(names), 1), blocks * block))
-    for row, name in enumerate(names):
-        table[row] = signals[name][padded]
-    results = []
-    for b in range(blocks):
-        part = slice(b * block, (b + 1) * block)
-        here = tuple({k: s if len(s) == 1 else s[padded[part]] for k, s in state.items()} for state in states)
-        results.append(np.asarray(_evaluate(wiring, holds, table[:, part], here, parameters)))
-    results[-1] = results[-1][: n_samples - (blocks - 1) * block]
-    return results
+    table, _ = _padded(names, signals, n_samples, _BLOCK)
+    blocks = np.split(table, table.shape[1] // _BLOCK, axis=1)
+    return np.concatenate([np.asarray(_evaluate(wiring, holds, b, parameters)) for b in blocks])[:n_samples]
 
 
 def law_values(uses: Sequence[LawUse], signals: Mapping[str, np.ndarray], n_samples: int) -> np.ndarray:
@@ -97,15 +102,14 @@ def law_values(uses: Sequence[LawUse], signals: Mapping[str, np.ndarray], n_samp
     """
     if not uses:
         return np.zeros((n_samples, 0))
-    return np.concatenate(_over_samples(uses, signals, n_samples, [{}] * len(uses), False, _BLOCK))
+    return _over_samples(uses, signals, n_samples, False)
 
 
 def laws_hold(uses: Sequence[LawUse], signals: Mapping[str, np.ndarray], n_samples: int) -> np.ndarray:
     """Whether laws are inside their validity (n_samples, len(uses)); True where none is published."""
     if not uses:
         return np.ones((n_samples, 0), dtype=bool)
-    blocks = _over_samples(uses, signals, n_samples, [{}] * len(uses), True, _BLOCK)
-    return np.concatenate(blocks).astype(bool)
+    return _over_samples(uses, signals, n_samples, True).astype(bool)
 
 
 def law_table(
@@ -113,14 +117,21 @@ def law_table(
     signals: Mapping[str, np.ndarray],
     n_samples: int,
     states: Mapping[str, np.ndarray],
-    holds: bool = False,
-) -> np.ndarray:
-    """One law over a grid of its states: (n_samples, m) values, or whether it holds.
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """One law over a grid of its states: (n_samples, m) values, and whether it holds; None where no range is published.
 
     states: argument -> (n_samples, m) or (1, m) [degC].
     Raises DescriptionError for an unknown law or a missing parameter.
     """
     block = next((b for b in _BLOCKS_OF_TABLES if n_samples <= b), _BLOCKS_OF_TABLES[-1])
-    blocks = _over_samples([use], signals, n_samples, [states], holds, block)
-    result = np.concatenate(blocks)[:, 0]
-    return result.astype(bool) if holds else result
+    names, (wiring,) = _wiring([use])
+    table, sample = _padded(names, signals, n_samples, block)
+    parameters, results = parameters_of(use), []
+    for first in range(0, len(sample), block):
+        part = slice(first, first + block)
+        here = {name: s if len(s) == 1 else s[sample[part]] for name, s in states.items()}
+        results.append(_tabulate(wiring, table[:, part], here, parameters))
+    value = np.concatenate([v for v, _ in results])[:n_samples]
+    if results[0][1] is None:
+        return value, None
+    return value, np.concatenate([h for _, h in results])[:n_samples]

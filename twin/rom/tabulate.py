@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.physics.laws import LAWS
 from twin.rom.following import DIFFERENCES, TEMPERATURES, Following
 from twin.rom.law_values import law_table, states_of
 from twin.rom.load_model import LawUse, LoadModel
 from twin.rom.sampling import Intervals
 
 _SAMPLES_AT_ONCE = 8192  # bounds the memory of logs at 100 Hz
+_NOWHERE = np.zeros((1, 1), dtype=bool)
 
 
 def following_films(
@@ -48,12 +48,12 @@ def _tabulate(
     air (n_samples,) [degC] of a film, None for a loss.
     """
     m = len(TEMPERATURES if air is None else DIFFERENCES)
-    judged = LAWS[use.law].validity is not None
     if not use.signals:  # nothing nonlinear varies within a step: the mean state will do
         n = intervals.n_steps
         states = _states(use, None if air is None else intervals.mean(air))
-        outside = ~law_table(use, {}, n, states, holds=True) if judged else np.zeros((1, 1), dtype=bool)
-        return np.broadcast_to(gain * law_table(use, {}, n, states), (n, m)), np.broadcast_to(outside, (n, m))
+        value, holds = law_table(use, {}, n, states)
+        outside = _NOWHERE if holds is None else ~holds
+        return np.broadcast_to(gain * value, (n, m)), np.broadcast_to(outside, (n, m))
     parts = []
     begin = 0
     last = np.append(intervals.first[1:], len(intervals.start)) - 1  # last interval of each step
@@ -68,10 +68,9 @@ def _tabulate(
         part, count = part.merged(np.cumsum(new) - 1), int(new.sum())
         signals = {name: values[name][here][new] for name in use.signals.values()}
         states = _states(use, None if air is None else air[here][new])
-        mean = part.mean(gain * law_table(use, signals, count, states))
-        outside = np.zeros((1, 1), dtype=bool)
-        if judged:
-            outside = part.any(~law_table(use, signals, count, states, holds=True)[part.sample])
+        value, holds = law_table(use, signals, count, states)
+        mean = part.mean(gain * value)
+        outside = _NOWHERE if holds is None else part.any(~holds[part.sample])
         # a law whose surface is measured has one value for the whole grid
         parts.append((np.broadcast_to(mean, (len(mean), m)), np.broadcast_to(outside, (len(mean), m))))
         begin = end

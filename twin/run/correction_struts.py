@@ -56,11 +56,13 @@ def in_struts(errors: PoseErrors) -> PoseErrors:
 
 def strut_errors(model: MachineModel, state: np.ndarray, position: np.ndarray) -> np.ndarray:
     """By how much the struts are too long (m, 6) [m] at a state (N,) and strut positions (m, 6) [m]."""
+    parts = zip(strut_error_rows(model, position), by_body(model, state), strict=True)
+    return np.sum([rows @ x for rows, x in parts], axis=0)
+
+
+def strut_error_rows(model: MachineModel, position: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Per body (m, 6, n_b): `strut_errors` at strut positions (m, 6) [m] per coordinate of the artefact."""
     structure = model.structure
     assert isinstance(structure, LumpedStructure)
-    read = [inputs(model, b) @ x for b, x in enumerate(by_body(model, state))]
-    found = np.zeros((len(position), len(structure.axes)))
-    for i, place in enumerate(position):
-        for rows, values in zip(structure.strut_error_rows(place), read, strict=True):
-            found[i] += rows @ values
-    return found
+    by_position = zip(*(structure.strut_error_rows(place) for place in position), strict=True)
+    return tuple(np.array(rows) @ inputs(model, b) for b, rows in enumerate(by_position))

@@ -65,7 +65,7 @@ class Stage {
     const now = performance.now(), took = now - this.before;
     if (this.before && took < 1000) {
       this.mean = 0.7 * (this.mean || took) + 0.3 * took;
-      if (this.mean > 32 && this.share > 0.45) { this.share *= 0.8; this.mean = 0; this.sharp(this.share); }
+      if (this.mean > 32 && this.share > 0.3) { this.share *= 0.8; this.mean = 0; this.sharp(this.share); }
     }
     this.before = now;
   }
