@@ -11,7 +11,7 @@ from tests.support.descriptions import SLIDE
 from twin.build.displacement_field import DisplacementField
 from twin.build.full_model import assemble
 from twin.build.structure import Structure
-from twin.build.surface_motion import SurfaceMotion
+from twin.build.surface_motion import surface_motion
 from twin.calibrate.fit.product import write_calibrated
 from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact
@@ -26,8 +26,7 @@ def test_heat_forces_and_rigid_motion_make_the_displacements_of_all_nodes():
     assert isinstance(full.structure, Structure)
     rng = np.random.default_rng(1)
     fields = [20.0 * rng.standard_normal(b.n) for b in full.thermal.bodies]
-    motion = SurfaceMotion(machine, full)
-    flexible = motion.by_forces()
+    motion = surface_motion(machine, full, [T[:, None] for T in fields])
     for position in (-0.2, 0.013, 0.2):
         at = np.array([position])
         exact = DisplacementField(machine, full.bodies, full.structure)(at, fields)
@@ -35,9 +34,9 @@ def test_heat_forces_and_rigid_motion_make_the_displacements_of_all_nodes():
         p, a, w = full.structure.motion(at, heat)
         forces = np.split(p, full.structure.system.offsets[1:-1])
         assert full.structure.port_displacements(at, heat) == pytest.approx(w, rel=1e-12)
-        for b, (T, F, surface) in enumerate(zip(fields, flexible, full.surfaces, strict=True)):
+        for b, ((by_heat, by_forces), surface) in enumerate(zip(motion, full.surfaces, strict=True)):
             wanted = full.thermal.bodies[b].F @ exact[b]
-            moved = (motion.by_heat(b, T[:, None])[:, 0] + F @ forces[b]).reshape(-1, 3)
+            moved = (by_heat[:, 0] + by_forces @ forces[b]).reshape(-1, 3)
             moved += a[b, :3] + np.cross(a[b, 3:], surface.points)
             assert np.abs(moved - wanted).max() < 1e-9 * np.abs(wanted).max()
 

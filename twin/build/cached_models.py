@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +10,9 @@ from twin.build.cache import cached, machine_hash
 from twin.build.full_model import FullModel, assemble
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, basis_of, sample_responses
-from twin.build.rich_check import SHARE, rich_error
+from twin.build.rich_check import SHARE, check_points, rich_error
 from twin.build.scenario import theta_bounds
 from twin.build.stored_model import restored, stored
-from twin.build.structure import Structure
-from twin.build.surface_motion import SurfaceMotion
 from twin.machine.description import Limits, Machine
 from twin.progress import Progress, silent
 from twin.rom.model import AffineBody, MachineModel
@@ -44,8 +41,7 @@ def rich_model(
             own = (project(body, np.diag(body.E.diagonal() ** -0.5)) for body in model.bodies)
             return replace(model, bodies=tuple(own))
         assembled = full or full_model(machine, progress)
-        moved = SurfaceMotion(machine, assembled).by_heat if isinstance(assembled.structure, Structure) else None
-        return on_rich_bases(assembled.thermal, options, machine.limits, progress, moved)
+        return on_rich_bases(assembled.thermal, options, machine.limits, progress)
 
     return cached("rich", __name__, (machine_hash(machine), options), make)
 
@@ -55,25 +51,22 @@ def on_rich_bases(
     options: RichOptions,
     limits: Limits,
     progress: Progress = silent,
-    displaced: Callable[[int, np.ndarray], np.ndarray] | None = None,
 ) -> MachineModel:
-    """A sparse model projected on the rich bases of its bodies, fine enough for the limits; not cached.
-
-    displaced: U (3m, r) of a body by its number and its basis (n, r).
-    """
+    """A sparse model projected on the rich bases of its bodies, fine enough for the limits; not cached."""
     low, high = theta_bounds(model.load_model)
     bodies = []
     with progress("rich basis", options.samples * len(model.bodies)) as advance:
-        for b, body in enumerate(model.bodies):
+        for body in model.bodies:
             responses = sample_responses(body, low, high, options, advance)
             tolerance = options.tolerance
             V = basis_of(body, responses, tolerance)
             rich = _projected(body, V)
-            while tolerance > FINEST and (rich.n < FREE or not rich_error(body, rich, low, high, limits) <= SHARE):
+            points = check_points(body, low, high)
+            while tolerance > FINEST and (rich.n < FREE or not rich_error(body, rich, points, limits) <= SHARE):
                 tolerance /= 2.0
                 V = basis_of(body, responses, tolerance)
                 rich = _projected(body, V)
-            bodies.append(replace(rich, U=displaced(b, V)) if displaced else rich)
+            bodies.append(replace(rich, V=V))
     return replace(model, bodies=tuple(bodies))
 
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import sys
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -167,6 +169,7 @@ class _Pardiso(Factor):
     def __init__(self, A: sp.csr_array, refine: int = 0):
         # Same input, same bits: MKL otherwise picks kernels by memory alignment, which changes from run to run.
         os.environ.setdefault("MKL_CBWR", "AUTO,STRICT")
+        _tell_where_mkl_is()
         from pypardiso.pardiso_wrapper import PyPardisoError, PyPardisoSolver
 
         self.n = A.shape[0]
@@ -175,7 +178,7 @@ class _Pardiso(Factor):
         upper.indices, upper.indptr = upper.indices.astype(np.int32), upper.indptr.astype(np.int32)
         self._upper = upper
         self._pardiso = PyPardisoSolver(mtype=2)
-        # it searches the whole environment for MKL each time, half a second: tell the next one
+        # where it had to search, tell the next one
         os.environ.setdefault("PYPARDISO_MKL_RT", str(self._pardiso.libmkl._name))
         self._pardiso.set_iparm(1, 1)  # the following are ours, zeros would all mean "default"
         self._pardiso.set_iparm(2, 2)  # METIS, serial: the parallel ordering is not reproducible
@@ -270,6 +273,14 @@ class _Amg(Factor):
 
     def close(self) -> None:
         self._preconditioner = None
+
+
+def _tell_where_mkl_is() -> None:
+    """pypardiso searches every folder of the environment for MKL, twice, half a second each; pip puts it into one."""
+    folders = (Path(sys.prefix) / "lib", Path(sys.prefix) / "Library" / "bin")
+    found = sorted((str(path) for folder in folders for path in folder.glob("*mkl_rt*")), key=len)
+    if found:
+        os.environ.setdefault("PYPARDISO_MKL_RT", found[0])
 
 
 def _no_memory(n: int) -> ModelError:

@@ -37,12 +37,14 @@ class BodyFlexibility(PortFlexibility):
 class SupportedBody:
     """A factored body on six node supports."""
 
-    def __init__(self, elasticity: Elasticity, points: np.ndarray):
-        """points (n, 3) [m]. Raises ModelError (from factorize) where the body is not connected."""
+    def __init__(self, elasticity: Elasticity, points: np.ndarray, refine: int = 1):
+        """points (n, 3) [m]; refine: as `factorize` has it. Raises ModelError (from there) where the body is not
+        connected.
+        """
         self.fixed = isostatic_supports(points)
         self.free = np.setdiff1d(np.arange(3 * len(points)), self.fixed)
         modes = rigid_modes(points - points.mean(axis=0))[self.free]  # for the iterative solver only
-        self._factor = factorize(elasticity.K[self.free][:, self.free], null_space=modes, refine=1)
+        self._factor = factorize(elasticity.K[self.free][:, self.free], null_space=modes, refine=refine)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Displacements (3n, m) [m] of loads (3n, m) [N], zero at the supports."""

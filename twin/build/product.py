@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import numpy as np
 from twin import __version__
 from twin.build.cache import machine_hash
 from twin.build.certificate import MESH, Certificate, known_parts, with_part
+from twin.build.full_model import FullModel
 from twin.build.import_closure import closure_hash
 from twin.build.mesh_error import SCENARIOS, mesh_part, refuse_lumped
 from twin.build.pipeline import (
@@ -27,7 +27,7 @@ from twin.build.pipeline import (
     rich_model,
 )
 from twin.build.same_model import same_model
-from twin.build.surface_motion import surface_flexibility
+from twin.build.surface_motion import surface_motion
 from twin.build.turned_nodes import turned_nodes
 from twin.errors import ArtefactError
 from twin.machine.description import Machine
@@ -36,7 +36,7 @@ from twin.machine.load import load_machine, read_text
 from twin.machine.parameters import parameters
 from twin.progress import Progress, silent
 from twin.rom.artefact import Artefact, SurfaceField, read_artefact, write_artefact
-from twin.rom.model import AffineBody
+from twin.rom.model import MachineModel
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "h5py", "jax")
 
@@ -54,15 +54,8 @@ def build_artefact(
     rich = rich_model(machine, full, options.rich, progress)
     compact = compact_model(machine, rich, options, progress)
     result = certificate(machine, rich, compact, None, options, BUILD_SEED, progress=progress)
-    flexible = surface_flexibility(machine, full) if machine.has_tcp and full.surfaces else ()
-    turned = [turned_nodes(machine, body) for body in full.bodies]
-    fields = [
-        SurfaceField(body.name, surface.points, surface.triangles, np.asarray(body.F), *_moved(body, flexible, b), own)
-        for b, (body, surface, own) in enumerate(
-            zip(compact.bodies if full.surfaces else (), full.surfaces, turned, strict=True)
-        )
-    ]
-    bare = replace(compact, bodies=tuple(replace(b, F=None, U=None) for b in compact.bodies))
+    fields = surface_fields(machine, full, compact)
+    bare = replace(compact, bodies=tuple(replace(b, F=None, V=None) for b in compact.bodies))
     description = Path(machine_path) / "machine.toml" if Path(machine_path).is_dir() else Path(machine_path)
     provenance = {
         "machine": str(description.resolve()),
@@ -81,13 +74,18 @@ def build_artefact(
     return result
 
 
-def _moved(
-    body: AffineBody, flexible: Sequence[np.ndarray], number: int
-) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """How the surface of a body moves, as a `SurfaceField` has it; None of machines without elastic structure."""
-    if body.U is None or not flexible:
-        return None, None
-    return body.U.reshape(-1, 3, body.n), flexible[number].reshape(len(body.U) // 3, 3, -1)
+def surface_fields(machine: Machine, full: FullModel, compact: MachineModel) -> list[SurfaceField]:
+    """The surfaces of all bodies, for pictures; how they move where the machine has an elastic structure."""
+    bodies = compact.bodies if full.surfaces else ()
+    bases = [body.V for body in bodies if body.V is not None]
+    motion = surface_motion(machine, full, bases) if machine.has_tcp and bases else (None,) * len(bodies)
+    fields = []
+    for body, mesh, surface, moved in zip(bodies, full.bodies, full.surfaces, motion, strict=True):
+        m = len(surface.points)
+        u, f = (None, None) if moved is None else (by.reshape(m, 3, -1) for by in moved)
+        turned = turned_nodes(machine, mesh)
+        fields.append(SurfaceField(body.name, surface.points, surface.triangles, np.asarray(body.F), u, f, turned))
+    return fields
 
 
 def verify_artefact(

@@ -58,7 +58,7 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
         one=one,
         energy=V.T @ body.energy,
         F=None if body.F is None else body.F @ V,
-        U=None if body.U is None else body.U @ V,
+        V=None if body.V is None else body.V @ V,
     )
 
 

@@ -7,6 +7,9 @@ are for, so that kelvins and micrometres of the certificate can be compared with
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from twin.build.body_matrix import system_matrix
@@ -21,17 +24,30 @@ SHIFTS = (1.0 / (SDIRK2_6.diagonal * 60.0), 1e-4)
 SHARE = 1 / 3  # of the limits that a rich basis may use; the rest is for the reduction and the time step
 
 
-def rich_error(full: AffineBody, rich: AffineBody, low: np.ndarray, high: np.ndarray, limits: Limits) -> float:
-    """Largest error of any temperature or TCP row for any input, as a share of the limit for it.
+@dataclass(frozen=True)
+class CheckPoint:
+    """Where a rich basis is held against the full body, and what that has there."""
 
-    full, rich: the same body before and after projection. low, high: (n_theta,) bounds of all coefficients
-    [W/(m^2 K)]; checked are one point near the lower bounds at the fast shift, one near the upper ones at the slow.
-    Temperatures are those of sensors and ports.
+    theta: np.ndarray  # (n_theta,) W/(m^2 K)
+    shift: float  # 1/s
+    exact: np.ndarray  # (n, n_inputs) states of the full body
+
+
+def check_points(full: AffineBody, low: np.ndarray, high: np.ndarray) -> list[CheckPoint]:
+    """One point near the lower bounds of all coefficients (n_theta,) [W/(m^2 K)] at the fast shift, one near the upper
+    ones at the slow."""
+    made = [(low * (high / low) ** place, shift) for shift, place in zip(SHIFTS, (0.25, 0.75), strict=True)]
+    return [CheckPoint(theta, shift, _responses(full, theta, shift)) for theta, shift in made]
+
+
+def rich_error(full: AffineBody, rich: AffineBody, points: Sequence[CheckPoint], limits: Limits) -> float:
+    """Largest error of any temperature or TCP row for any input at the points, as a share of the limit for it.
+
+    full, rich: the same body before and after projection. Temperatures are those of sensors and ports.
     """
     worst = 0.0
-    for shift, place in zip(SHIFTS, (0.25, 0.75), strict=True):
-        theta = low * (high / low) ** place
-        exact, reduced = _responses(full, theta, shift), _responses(rich, theta, shift)
+    for point in points:
+        exact, reduced = point.exact, _responses(rich, point.theta, point.shift)
         warmest = np.abs(exact).max(axis=0)
         acts = warmest > 0.0  # sources without a surface on this body have zero columns
         exact, reduced, scale = exact[:, acts], reduced[:, acts], limits.at_temperature_range / warmest[acts]

@@ -12,7 +12,7 @@ from twin.rom.model import MachineModel
 
 def same_model(a: MachineModel, b: MachineModel) -> bool:
     """True where both step and read alike, to the last bit; rows for pictures, which artefacts keep apart, aside."""
-    return _equal(*(replace(m, bodies=tuple(replace(body, F=None, U=None) for body in m.bodies)) for m in (a, b)))
+    return _equal(*(replace(m, bodies=tuple(replace(body, F=None, V=None) for body in m.bodies)) for m in (a, b)))
 
 
 def _equal(a: Any, b: Any) -> bool:

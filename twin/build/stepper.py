@@ -16,9 +16,9 @@ deviation. The heat balance counts what was solved and stays exact, and it is st
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 import scipy.sparse
@@ -56,6 +56,7 @@ class _Factored:
     solve: Callable[[np.ndarray], np.ndarray]
     X: np.ndarray  # (n, n_ports_b) S^-1 P
     Q: np.ndarray  # (n_ports_b, n_ports_b)
+    number: int = field(default_factory=count().__next__)  # no two have the same
 
     @cached_property
     def inverse(self) -> np.ndarray:
@@ -72,10 +73,13 @@ class CoupledStepper:
         self._keep, self._follow = keep, follow
         ends = np.cumsum([0, *(b.n for b in model.bodies)]).tolist()
         self._rows = [slice(a, b) for a, b in pairwise(ends)]
+        self._ports = [np.array(body.ports, dtype=int) for body in model.bodies]
         n_films, n_theta = len(model.load_model.films), len(model.load_model.theta_names)
         self._film_rows = tuple(body.film_rows for body in model.bodies)
         self._dense = tuple(None if scipy.sparse.issparse(b.E) else DenseTerms(b, n_films) for b in model.bodies)
-        self._small = all(self._dense) and ends[-1] <= SMALL
+        self._all_dense = None not in self._dense
+        self._small = self._all_dense and ends[-1] <= SMALL
+        self._unit = all(d is not None and d.unit for d in self._dense)  # E = 1
         # area and first moment of height of the films, and what a metre of each axis adds to that
         axes = len(model.load_model.axes) if any(body.raised is not None for body in model.bodies) else 0
         self._area, self._moment = np.zeros(n_theta), np.zeros((1 + axes, n_theta))
@@ -90,11 +94,14 @@ class CoupledStepper:
         self._safe_area = np.where(self._area[:n_films] > 0, self._area[:n_films], 1.0)
         self._plan = FilmPlan.of(model.load_model, self._moment[:, :n_films], self._safe_area)
         self._contacts = ContactPlaces.of(model.load_model)
+        self._joins: tuple[tuple[int, ...], np.ndarray] | None = None
+        self._crossed: tuple[tuple[int, ...], np.ndarray, np.ndarray] | None = None
         self._feeds: dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]] = {}
 
     def __reduce__(self) -> tuple:
-        """A copy starts without factors: those of sparse solvers cannot be copied."""
-        return CoupledStepper, (self.model, self._keep, self._follow, self._tableau)
+        """A copy starts without factors, as those of sparse solvers cannot be copied, and has no rows for pictures."""
+        bodies = tuple(replace(body, F=None, V=None) for body in self.model.bodies)
+        return CoupledStepper, (replace(self.model, bodies=bodies), self._keep, self._follow, self._tableau)
 
     def forget(self) -> None:
         """Drop all factors: what follows depends on its own input only, to the last bit."""
@@ -142,12 +149,12 @@ class CoupledStepper:
         index = list(drive.losses.index)
         if not index:
             return None
-        T_ref, table = self.model.reference_temperature, drive.losses.value[step]
+        T_ref, table, begun = self.model.reference_temperature, drive.losses.value[step], power[index]
         B, rows = self._fed(drive.losses.index)
 
         def feedback(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             now = read_table(np, table, temperature_place(np, T_ref + rows @ x))
-            return B @ (now - power[index]), now
+            return B @ (now - begun), now
 
         return feedback
 
@@ -220,12 +227,16 @@ class CoupledStepper:
 
     def across(self, factors: list[_Factored], gamma: np.ndarray) -> np.ndarray:
         """Gamma (1 + Q Gamma)^-1 (n_ports, n_ports) W/K: heat that leaves the ports of bodies in contact, by the port
-        temperatures that they would have without. Inverted once, as all stages of a step share it.
+        temperatures that they would have without. Inverted once, as all stages of a step share it, and kept while no
+        axis moves.
         """
-        Q = np.zeros(gamma.shape)
-        for body, f in zip(self.model.bodies, factors, strict=True):
-            Q[np.ix_(body.ports, body.ports)] = f.Q
-        return np.asarray(gamma @ np.linalg.inv(np.eye(len(gamma)) + Q @ gamma))
+        numbers = tuple(f.number for f in factors)
+        if self._crossed is None or self._crossed[0] != numbers or not np.array_equal(self._crossed[1], gamma):
+            Q = np.zeros(gamma.shape)
+            for ports, f in zip(self._ports, factors, strict=True):
+                Q[np.ix_(ports, ports)] = f.Q
+            self._crossed = numbers, gamma, gamma @ np.linalg.inv(np.eye(len(gamma)) + Q @ gamma)
+        return self._crossed[2]
 
     def solve(self, rhs: list[np.ndarray], factors: list[_Factored], across: np.ndarray) -> list[np.ndarray]:
         """Solve (rate E + A + P Gamma P^T) x = rhs for all bodies, with rate and A of the factors; across: of both."""
@@ -236,10 +247,10 @@ class CoupledStepper:
         if not len(across):
             return y
         t = np.zeros(len(across))
-        for body, yb in zip(self.model.bodies, y, strict=True):
-            t[list(body.ports)] = body.port_rows @ yb
+        for body, ports, yb in zip(self.model.bodies, self._ports, y, strict=True):
+            t[ports] = body.port_rows @ yb
         q = across @ t
-        return [yb - f.X @ q[list(body.ports)] for body, f, yb in zip(self.model.bodies, factors, y, strict=True)]
+        return [yb - f.X @ q[ports] for ports, f, yb in zip(self._ports, factors, y, strict=True)]
 
     def run(
         self, drive: Drive, start: list[np.ndarray], substeps: int = 1, first: int = 0
@@ -249,6 +260,7 @@ class CoupledStepper:
         States per body (n_b,) K.
         """
         tableau, contacts = self._tableau, contact_entries(self.model.load_model, drive)
+        weights = np.array(tableau.weights) / substeps
         x = list(start)
         for step in range(first, drive.n_steps):
             dt = drive.time[step + 1] - drive.time[step]
@@ -267,10 +279,10 @@ class CoupledStepper:
             power[following] = 0.0
             for _ in range(substeps):
                 after, made = stages(tableau, solve, capacity, after, forcing, feedback)
-                for weight, (at, saw, powers) in zip(tableau.weights, made, strict=True):
-                    own, seen = own + weight * at / substeps, seen + weight * saw / substeps
-                    if following:
-                        power[following] += weight * powers / substeps
+                at, saw, powers = zip(*made, strict=True)
+                own, seen = own + weights @ np.array(at), seen + weights @ np.array(saw)
+                if following:
+                    power[following] += weights @ np.array(powers)
             x = self._parts(after)
             loads = replace(loads, power=power)
             yield step, x, self._heat(loads, factors, dt, *map(self._parts, (after - before, seen, own)))
@@ -281,21 +293,48 @@ class CoupledStepper:
 
     def _capacity(self, factors: list[_Factored], x: np.ndarray) -> np.ndarray:
         """rate E x of all bodies, one after the other (N,)."""
+        if self._unit and len({factor.rate for factor in factors}) == 1:
+            return factors[0].rate * x
         parts = zip(factors, self._parts(x), strict=True)
         return np.concatenate([factor.rate * self._stored(b, xb) for b, (factor, xb) in enumerate(parts)])
 
     def _whole(self, factors: list[_Factored], across: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The solution (N,) of all bodies in contact for a right-hand side (N,)."""
-        if not self._small:
+        if not self._all_dense:
             return lambda right: np.concatenate(self.solve(self._parts(right), factors, across))
+        if not self._small:
+            X, rows, P = self._joining(factors), self._rows, self._port_rows
+
+            def by_body(right: np.ndarray) -> np.ndarray:
+                y = np.concatenate([f.solve(right[own]) for f, own in zip(factors, rows, strict=True)])
+                return y - X @ (across @ (P @ y)) if len(across) else y
+
+            return by_body
         N = self._rows[-1].stop
-        inverse, X, Y = np.zeros((N, N)), np.zeros((N, len(across))), np.zeros((len(across), N))
-        for body, f, own in zip(self.model.bodies, factors, self._rows, strict=True):
-            ports = list(body.ports)
+        inverse, Y = np.zeros((N, N)), np.zeros((len(across), N))
+        for body, f, own, ports in zip(self.model.bodies, factors, self._rows, self._ports, strict=True):
             inverse[own, own] = f.inverse
-            X[own, ports], Y[ports, own] = f.X, body.port_rows @ f.inverse
-        inverse -= X @ (across @ Y)
+            Y[ports, own] = body.port_rows @ f.inverse
+        inverse -= self._joining(factors) @ (across @ Y)
         return lambda right: inverse @ right
+
+    def _joining(self, factors: list[_Factored]) -> np.ndarray:
+        """S^-1 P of all bodies (N, n_ports); kept, as factors are."""
+        numbers = tuple(f.number for f in factors)
+        if self._joins is None or self._joins[0] != numbers:
+            X = np.zeros((self._rows[-1].stop, len(self.model.load_model.ports)))
+            for f, own, ports in zip(factors, self._rows, self._ports, strict=True):
+                X[own, ports] = f.X
+            self._joins = numbers, X
+        return self._joins[1]
+
+    @cached_property
+    def _port_rows(self) -> np.ndarray:
+        """P^T of all bodies (n_ports, N)."""
+        rows = np.zeros((len(self.model.load_model.ports), self._rows[-1].stop))
+        for body, own, ports in zip(self.model.bodies, self._rows, self._ports, strict=True):
+            rows[ports, own] = body.port_rows
+        return rows
 
     def _far(self, theta: np.ndarray, factors: list[_Factored]) -> bool:
         """Whether coefficients are so far from those of the factors that one pass would be worse than the step itself;

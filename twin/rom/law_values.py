@@ -9,8 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+import twin.compiled  # noqa: F401
 from twin.errors import DescriptionError
 from twin.physics.laws import LAWS
+from twin.rom.following import DIFFERENCES
 from twin.rom.load_model import LawUse
 
 # Samples go through in blocks of one size, so that logs of any length share one compiled function.
@@ -123,7 +125,10 @@ def law_table(
     states: argument -> (n_samples, m) or (1, m) [degC].
     Raises DescriptionError for an unknown law or a missing parameter.
     """
-    block = next((b for b in _BLOCKS_OF_TABLES if n_samples <= b), _BLOCKS_OF_TABLES[-1])
+    small, middle, large = _BLOCKS_OF_TABLES
+    block = small if n_samples <= small else middle if n_samples <= large else large  # four take less than to compile
+    m = max(s.shape[1] for s in states.values())
+    states = {name: _widened(s) if s.shape[1] == m else s for name, s in states.items()}
     names, (wiring,) = _wiring([use])
     table, sample = _padded(names, signals, n_samples, block)
     parameters, results = parameters_of(use), []
@@ -131,7 +136,13 @@ def law_table(
         part = slice(first, first + block)
         here = {name: s if len(s) == 1 else s[sample[part]] for name, s in states.items()}
         results.append(_tabulate(wiring, table[:, part], here, parameters))
-    value = np.concatenate([v for v, _ in results])[:n_samples]
+    value = np.concatenate([v for v, _ in results])[:n_samples, :m]
     if results[0][1] is None:
         return value, None
-    return value, np.concatenate([h for _, h in results])[:n_samples]
+    return value, np.concatenate([h for _, h in results])[:n_samples, :m]
+
+
+def _widened(grid: np.ndarray) -> np.ndarray:
+    """A grid of states with its last column again and again up to the width of the tables of films, which share their
+    compiled functions: each takes a quarter of a second."""
+    return np.pad(grid, ((0, 0), (0, max(len(DIFFERENCES) - grid.shape[1], 0))), mode="edge")

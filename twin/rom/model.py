@@ -57,7 +57,7 @@ class AffineBody:
     H: np.ndarray | None = None  # (n, len(theta)) m^3: A_k @ height of film terms, axes at zero; None: zero
     raised: np.ndarray | None = None  # (n_axes, n, len(theta)) m^2: what a metre of each axis adds to H; None: zero
     F: Matrix | None = None  # (m, n) 1: temperatures of the surface vertices, for pictures
-    U: np.ndarray | None = None  # (3m, n) m/K: their displacements by heat on isostatic supports, of reduced models
+    V: np.ndarray | None = None  # (n of the full model, n) 1: all its temperatures, of models not yet in an artefact
     # What parameters of single members (parts; nodes and bars of lumped machines) act on, summing to E and G:
     members: tuple[str, ...] = ()
     first: tuple[int, ...] = ()  # of the full model: the first state of each member; the reduced ones have instead

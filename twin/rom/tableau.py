@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,7 @@ class Tableau:
         """Whether the last stage is the state after a step."""
         return self.rows[-1] == self.weights
 
-    @property
+    @cached_property
     def chain(self) -> bool:
         """Whether each stage is an implicit Euler step from the stage before: base_i = X_(i-1)."""
         return len(self.rows) > 1 and all(a == self.diagonal for row in self.rows for a in row)
@@ -113,8 +114,9 @@ def stages(
         return state
 
     before = near = x
+    chain = tableau.chain
     for row, ahead in zip(tableau.rows, tableau.ahead, strict=True):
-        base = beyond(row)  # the stages before: the diagonal entry is on the left side
+        base = near if chain else beyond(row)  # the stages before: the diagonal entry is on the left side
         more, powers = (0.0, None) if feedback is None else feedback(near + ahead * (near - before))
         before = near
         near, seen = solve(capacity(base) + (forcing if feedback is None else forcing + more), near)
