@@ -1,5 +1,7 @@
 """Block elimination along chains, trees and loops of bodies."""
 
+from itertools import pairwise
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -27,22 +29,27 @@ def test_solves_the_whole_system(graph, symmetric):
     n, edges = GRAPHS[graph]
     rng = np.random.default_rng(1)
     sizes = rng.integers(1, 6, n)
+    sizes[0] = 150  # in strips
     starts = np.cumsum([0, *sizes])
     A = np.zeros((starts[-1], starts[-1]))
-    for i, j in {*edges, *((b, a) for a, b in edges), *((k, k) for k in range(n))}:
-        A[starts[i] : starts[i + 1], starts[j] : starts[j + 1]] = rng.standard_normal((sizes[i], sizes[j]))
-    A = (A + A.T) / 2 if symmetric else A
-    A += 12.0 * np.eye(len(A))
-    blocks = {
-        (i, j): jnp.asarray(A[starts[i] : starts[i + 1], starts[j] : starts[j + 1]])
-        for i in range(n)
-        for j in range(n)
-        if i == j or (i, j) in edges or (j, i) in edges
-    }
+    both_ways = {*edges, *((b, a) for a, b in edges)}
+    couplings = {}
+    for i, j in sorted(both_ways):
+        pads = 2 if symmetric else rng.integers(1, 3)
+        U, V = rng.standard_normal((sizes[i], pads)), rng.standard_normal((pads, sizes[j]))
+        if symmetric and (j, i) in couplings:
+            U, V = (np.asarray(part).T for part in reversed(couplings[j, i]))
+        couplings[i, j] = jnp.asarray(U), jnp.asarray(V)
+        A[starts[i] : starts[i + 1], starts[j] : starts[j + 1]] = U @ V
+    diagonal = []
+    for own in (slice(a, b) for a, b in pairwise(starts)):
+        A[own, own] = rng.standard_normal(A[own, own].shape)
+        A[own, own] += (A[own, own].T if symmetric else 0.0) + 100.0 * np.eye(own.stop - own.start)
+        diagonal.append(jnp.asarray(A[own, own]))
     b = rng.standard_normal(len(A))
     elimination = plan(n, edges)
     x = solve(
-        factorise(blocks, elimination, symmetric),
+        factorise(diagonal, couplings, elimination, symmetric),
         elimination,
         [jnp.asarray(p) for p in np.split(b, starts[1:-1])],
         symmetric,

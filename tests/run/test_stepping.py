@@ -12,7 +12,7 @@ from twin.rom.contact import station_weights
 from twin.rom.drive import evaluate
 from twin.rom.load_model import EnvironmentWiring
 from twin.rom.tableau import IMPLICIT_EULER, SDIRK2_6
-from twin.run.matrix import system_blocks
+from twin.run.matrix import couplings_of, diagonal_blocks
 from twin.run.replay import integrate
 from twin.run.stepping import advance, inputs_of
 from twin.run.system import prepare
@@ -52,7 +52,10 @@ def test_system_matrix_equals_the_dense_one(model):
     prepared, dense = prepare(model), Dense(model, DRIVE)
     inputs = inputs_of(model.load_model, DRIVE, 4, follow=0.0)
     one_step = jax.tree.map(lambda a: a[9], inputs)
-    blocks = system_blocks(prepared.layout, prepared.system, one_step.rate, one_step.contacts, one_step.theta)
+    layout, system = prepared.layout, prepared.system
+    blocks = {key: U @ V for key, (U, V) in couplings_of(layout, system, one_step.contacts).items()}
+    diagonal = diagonal_blocks(layout, system, one_step.rate, one_step.contacts, one_step.theta)
+    blocks |= {(b, b): block for b, block in enumerate(diagonal)}
     offsets = prepared.layout.offsets
     S = np.zeros((model.n, model.n))
     for (i, j), block in blocks.items():

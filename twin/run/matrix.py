@@ -18,20 +18,28 @@ import numpy as np
 from jax import lax
 
 from twin.rom.contact_matrix import ContactEntries, tridiagonal_product
-from twin.run.block_factor import BlockFactor, Blocks, factorise, solve
+from twin.run.block_factor import BlockFactor, Couplings, Product, factorise, solve
 from twin.run.system import Array, Layout, System
 
 
-def system_blocks(layout: Layout, system: System, rate: Array, contacts: ContactEntries, theta: Array) -> Blocks:
-    """Blocks of S [1/s] by body, for one step's contacts and all coefficients theta (n_theta,)."""
-    blocks: Blocks = {}
+def diagonal_blocks(
+    layout: Layout, system: System, rate: Array, contacts: ContactEntries, theta: Array
+) -> list[jax.Array]:
+    """Blocks of S [1/s] of each body, for one step's contacts and all coefficients theta (n_theta,)."""
+    blocks = []
     for b, size in enumerate(layout.sizes):
         block = system.A0[b] + terms_of(layout, system, b, theta - system.nominal) + rate * jnp.eye(size)
         ports = np.array(layout.ports[b], dtype=int)
         if len(ports):  # neighbours on a rail have consecutive local ports
             PG = tridiagonal_product(jnp, system.P[b], contacts.diagonal[ports], contacts.neighbour[ports])
             block = block + PG @ system.port_rows[b]
-        blocks[b, b] = jnp.asarray(block)
+        blocks.append(jnp.asarray(block))
+    return blocks
+
+
+def couplings_of(layout: Layout, system: System, contacts: ContactEntries) -> Couplings:
+    """Blocks of S [1/s] between bodies, by the pads of one on the rails of the other."""
+    blocks: dict[tuple[int, int], Product] = {}
     for c in layout.couplings:
         r, p, pads = c.rail_body, c.pad_body, np.array(c.pad_ports)
         facing = [
@@ -40,11 +48,12 @@ def system_blocks(layout: Layout, system: System, rate: Array, contacts: Contact
         ]
         rail_in = jnp.stack([system.P[r][:, rail] @ w for rail, w in facing], axis=1)
         rail_out = jnp.stack([w @ system.port_rows[r][rail] for rail, w in facing])
-        for key, part in (
-            ((r, p), rail_in @ jnp.asarray(system.port_rows[p])[pads]),
-            ((p, r), jnp.asarray(system.P[p])[:, pads] @ rail_out),
+        for key, U, V in (
+            ((r, p), rail_in, jnp.asarray(system.port_rows[p])[pads]),
+            ((p, r), jnp.asarray(system.P[p])[:, pads], rail_out),
         ):
-            blocks[key] = blocks[key] - part if key in blocks else -part
+            before = blocks.get(key)
+            blocks[key] = (-U, V) if before is None else (jnp.hstack([before[0], -U]), jnp.vstack([before[1], V]))
     return blocks
 
 
@@ -68,7 +77,8 @@ def terms_of(layout: Layout, system: System, b: int, theta: Array) -> jax.Array:
 
 def factor_of(layout: Layout, system: System, rate: Array, contacts: ContactEntries, theta: Array) -> BlockFactor:
     """Factor of the matrix of a step with coefficients theta (n_theta,)."""
-    return factorise(system_blocks(layout, system, rate, contacts, theta), layout.elimination, layout.symmetric)
+    diagonal = diagonal_blocks(layout, system, rate, contacts, theta)
+    return factorise(diagonal, couplings_of(layout, system, contacts), layout.elimination, layout.symmetric)
 
 
 def by_factor(
