@@ -13,6 +13,7 @@ from benchmarks.shared_space import products
 from benchmarks.steel_profile_model import profile
 from twin.build.body_matrix import system_matrix
 from twin.build.compress import Tolerances, balanced, galerkin
+from twin.build.fitted_basis import fitted_galerkin
 from twin.build.frequency_training import drawn_films, responses
 from twin.build.project import project
 from twin.build.rich_basis import RichOptions, rich_basis
@@ -86,7 +87,14 @@ def training(model: MachineModel) -> list[np.ndarray]:
 
 
 Method = Callable[..., MachineModel]  # (rich, snapshots, states, unit) -> reduced
-METHODS: dict[str, Method] = {"galerkin": galerkin, "balanced": balanced}
+
+
+def fitted(rich: MachineModel, snapshots: list[np.ndarray], states: int, unit: Tolerances) -> MachineModel:
+    """As `twin import` makes a model of few states."""
+    return fitted_galerkin(rich, snapshots, states, unit, training(rich))
+
+
+METHODS: dict[str, Method] = {"galerkin": galerkin, "fitted": fitted, "balanced": balanced}
 
 
 def errors(

@@ -23,4 +23,4 @@ def fit(rich: MachineModel, snapshots: list[np.ndarray], states: int, unit: Tole
 
 
 def main() -> None:
-    table(METHODS | {"fitted": fit}, (40, 56))
+    table(METHODS | {"free": fit}, (40, 56))

@@ -112,6 +112,43 @@ def galerkin(rich: MachineModel, snapshots: list[np.ndarray], states: int, unit:
 PORT_WEIGHT = 1 / 30  # of a port's temperature beside a sensor's: as outputs of full weight ports crowd out the TCP
 
 
+def balanced_directions(
+    body: AffineBody,
+    X: np.ndarray,
+    unit: Tolerances,
+    low: np.ndarray,
+    high: np.ndarray,
+    films: int,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Right and left directions (n, k) of a body by its snapshots X (n, m), the largest first, and how large they are.
+
+    Of the observability Gramian, see `balanced`; the constant field is in neither.
+    """
+    rows = body.G.reshape(-1, body.n)
+    output = np.vstack(
+        [
+            body.C / unit.temperature,
+            rows / unit.displacement / np.sqrt(max(len(rows) / 3, 1)),
+            PORT_WEIGHT * body.port_rows / unit.temperature,
+        ]
+    )
+    Q = np.zeros((body.n, body.n))
+    for _ in range(films):
+        theta = low * (high / low) ** rng.random(len(low))
+        rate, U = np.linalg.eigh(system_matrix(body, theta, 0.0))
+        CU = output @ U
+        # the slowest port-decoupled mode may be nearly adiabatic: contacts hold it in the machine
+        rate = np.maximum(rate, 1e-6)
+        Q += U @ ((CU.T @ CU) / (rate[:, None] + rate[None, :])) @ U.T / films
+    eigenvalue, U = np.linalg.eigh((Q + Q.T) / 2)
+    L = U * np.sqrt(np.maximum(eigenvalue, 0.0))
+    X0, L0 = _without_mean(body, X) / np.sqrt(X.shape[1]), _without_mean(body, L)
+    Us, s, Zt = np.linalg.svd(L0.T @ X0, full_matrices=False)
+    use = s > 1e-10 * s[0]
+    return X0 @ Zt[use].T / np.sqrt(s[use]), L0 @ Us[:, use] / np.sqrt(s[use]), s[use]
+
+
 def balanced(
     rich: MachineModel, snapshots: list[np.ndarray], states: int, unit: Tolerances, films: int = 8, seed: int = 7
 ) -> MachineModel:
@@ -123,32 +160,9 @@ def balanced(
     """
     low, high = theta_bounds(rich.load_model)
     rng = np.random.default_rng(seed)
-    right, left, values = [], [], []
-    for body, X in zip(rich.bodies, snapshots, strict=True):
-        rows = body.G.reshape(-1, body.n)
-        output = np.vstack(
-            [
-                body.C / unit.temperature,
-                rows / unit.displacement / np.sqrt(max(len(rows) / 3, 1)),
-                PORT_WEIGHT * body.port_rows / unit.temperature,
-            ]
-        )
-        Q = np.zeros((body.n, body.n))
-        for _ in range(films):
-            theta = low * (high / low) ** rng.random(len(low))
-            rate, U = np.linalg.eigh(system_matrix(body, theta, 0.0))
-            CU = output @ U
-            # the slowest port-decoupled mode may be nearly adiabatic: contacts hold it in the machine
-            rate = np.maximum(rate, 1e-6)
-            Q += U @ ((CU.T @ CU) / (rate[:, None] + rate[None, :])) @ U.T / films
-        eigenvalue, U = np.linalg.eigh((Q + Q.T) / 2)
-        L = U * np.sqrt(np.maximum(eigenvalue, 0.0))
-        X0, L0 = _without_mean(body, X) / np.sqrt(X.shape[1]), _without_mean(body, L)
-        Us, s, Zt = np.linalg.svd(L0.T @ X0, full_matrices=False)
-        use = s > 1e-10 * s[0]
-        right.append(X0 @ Zt[use].T / np.sqrt(s[use]))
-        left.append(L0 @ Us[:, use] / np.sqrt(s[use]))
-        values.append(s[use])
+    pairs = zip(rich.bodies, snapshots, strict=True)
+    made = [balanced_directions(body, X, unit, low, high, films, rng) for body, X in pairs]
+    right, left, values = (list(of_all) for of_all in zip(*made, strict=True))
     bodies = []
     for body, V, W, r in zip(rich.bodies, right, left, _share(values, states), strict=True):
         mean = body.one[:, None] / np.sqrt(body.one @ body.energy)

@@ -13,6 +13,7 @@ import numpy as np
 from twin import __version__
 from twin.build.cached_models import on_rich_bases
 from twin.build.compress import Tolerances, balanced, galerkin
+from twin.build.fitted_basis import MOST_STATES, fitted_galerkin
 from twin.build.frequency_training import drawn_films, responses
 from twin.build.matrices.files import read_matrices
 from twin.build.matrices.model import MatrixOptions, Output, as_given, model_of, outputs, stem
@@ -89,6 +90,10 @@ def reduced(
     snapshots = [responses(body, films, heat)]
     unit = Tolerances(matrix.limits.temperature, matrix.limits.displacement)
     for_outputs = replace(body, C=np.vstack([as_given(watched, body.C), SIDES * body.C]), F=body.C)
-    compress = {"galerkin": galerkin, "balanced": balanced}[options.method]
-    (made,) = compress(replace(rich, bodies=(for_outputs,)), snapshots, options.states, unit).bodies
+    watching = replace(rich, bodies=(for_outputs,))
+    if options.method == "galerkin" and options.states <= MOST_STATES:
+        (made,) = fitted_galerkin(watching, snapshots, options.states, unit, films, heat).bodies
+    else:
+        compress = {"galerkin": galerkin, "balanced": balanced}[options.method]
+        (made,) = compress(watching, snapshots, options.states, unit).bodies
     return replace(rich, bodies=(replace(made, C=np.asarray(made.F), F=None),))
