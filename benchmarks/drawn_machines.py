@@ -104,7 +104,7 @@ def answer(row: Row) -> str:
     family = {"factor": "signal"}.get(kind, "sensor" if kind in IN_LOG else kind)
     sought = {_pair(f"{place}<>{size.removeprefix('sensors.')}")} if kind == "swapped" else {place}
     named = [(c[0], _pair(c[1]) if "<>" in c[1] else c[1]) for c in row["causes"]]
-    right = {(family, p) for p in sought}
+    right = {(family, p) for p in sought | set(row.get("same", ()))}
     if named and named[0] in right:
         return "right"
     rivals = [tuple(r) for r in row["rivals"]] if row["verdict"] == "ambiguous" else []
@@ -200,8 +200,14 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
         own = [read_run(p) for p in paths]
         beside = healthy[0] if hidden[0] in IN_MACHINE else healthy[1] if hidden[0] == "factor" else None
         by = (np.inf, np.inf) if beside is None else moved(own, beside)
-        rows.append(said(detector, hidden, own) | {"moved": by})
+        rows.append(said(detector, hidden, own) | {"moved": by, "same": same_place(machine, hidden[1])})
     return rows
+
+
+def same_place(machine: Machine, place: str) -> list[str]:
+    """The surface that is all of a film: both names are right."""
+    film = machine.films.get(place.removeprefix("films."))
+    return list(film.surfaces) if film is not None and len(film.surfaces) == 1 and place.startswith("films.") else []
 
 
 def moved(runs: Sequence[Run], healthy: Sequence[Run]) -> tuple[float, float]:

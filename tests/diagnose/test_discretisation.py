@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.evidence.discretisation import _acting, _others, differences, inside_of, with_insides
+from twin.diagnose.evidence.discretisation import _acting, _others, differences, inside_of, with_inside
 from twin.diagnose.evidence.pulls import Pulls
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import make_study
@@ -33,18 +33,23 @@ def both():
     machine, study = small_case.machine(), small_case.study()
     plans = [p.measured for p in study.runs]
     found = differences(machine, study, make_surrogate(study), parameters(machine), small_case.runs(), plans)
-    assert len(found) == 2  # bars, nodes
+    assert len(found) == 1 + len(heavy(machine))  # bars, nodes
     return found
 
 
+def heavy(machine: Machine) -> list[str]:
+    """The nodes that get an inside."""
+    return [n for n in machine.nodes if with_inside(machine, n) is not machine]
+
+
 @pytest.mark.long
-def test_bars_of_half_the_element_size_tell_the_error_of_the_described_ones(both):
+def test_bars_of_finer_elements_tell_the_error_of_the_described_ones(both):
     """A machine of eight times as many elements, which nothing was made with, is where the difference leads to."""
     machine = small_case.machine()
     bars = {n: b.model_copy(update={"elements": 8 * b.elements}) for n, b in machine.bars.items()}
     error = outputs(machine.model_copy(update={"bars": bars})) - outputs(machine)
     d = both[0].d
-    assert np.linalg.norm(error - d) < 0.3 * np.linalg.norm(
+    assert np.linalg.norm(error - d) < 0.4 * np.linalg.norm(
         error
     )  # the nut heats within an element: less than second order
 
@@ -55,7 +60,7 @@ def test_the_difference_follows_the_parameters(both):
     n = len(study.probed.parameters)
     x = 0.3 * np.random.default_rng(4).standard_normal(n)
     machine, known = small_case.machine(), parameters(small_case.machine())
-    split = with_insides(machine)
+    split = with_inside(machine, heavy(machine)[0])
     plans = [p.measured for p in study.runs]
     acting = [_acting(p, split) for p in known]
     other = make_study(make_probed_model(split, acting, small_case.runs()), plans, study.fitted)
@@ -79,19 +84,15 @@ def test_rails_in_segments_of_half_the_length_are_another_discretisation():
 
 def test_an_inside_takes_half_of_a_node_and_nothing_is_lost():
     machine = small_case.machine()
-    split = with_insides(machine)
-    assert total_capacity(split) == pytest.approx(total_capacity(machine))
-    added = [n for n in machine.nodes if inside_of(n) in split.nodes]
-    assert added
-    assert len(split.nodes) == len(machine.nodes) + len(added)
-    heaviest = max(machine.nodes, key=lambda n: node_capacity(machine, n))
-    assert heaviest in added
-    for n in added:
-        row = machine.tcp.expansion.get(n, (0.0, 0.0, 0.0))
-        both = [split.tcp.expansion.get(m, (0.0, 0.0, 0.0)) for m in (n, inside_of(n))]
-        assert np.sum(both, axis=0) == pytest.approx(row)
+    assert max(machine.nodes, key=lambda n: node_capacity(machine, n)) in heavy(machine)
+    for name in heavy(machine):
+        split = with_inside(machine, name)
+        assert split.nodes.keys() - machine.nodes.keys() == {inside_of(name)}
+        assert total_capacity(split) == pytest.approx(total_capacity(machine))
+        both = [split.tcp.expansion.get(m, (0.0, 0.0, 0.0)) for m in (name, inside_of(name))]
+        assert np.sum(both, axis=0) == pytest.approx(machine.tcp.expansion.get(name, (0.0, 0.0, 0.0)))
     light = {n: v.model_copy(update={"capacity": 50.0}) for n, v in machine.nodes.items()}
-    assert with_insides(machine.model_copy(update={"nodes": light})).nodes.keys() == machine.nodes.keys()
+    assert not heavy(machine.model_copy(update={"nodes": light}))
 
 
 def test_a_parameter_is_out_of_its_tolerance_where_few_synthetic_measurements_move_one_so_far():

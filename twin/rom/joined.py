@@ -15,7 +15,10 @@ import numpy as np
 from twin.rom.drive import Drive
 from twin.rom.following import Following
 
-_MEANS = ("power", "contact_heat", "theta", "environment", "conductance", "weight", "square", "neighbour", "switched")
+_MEANS = (
+    "power", "contact_heat", "theta", "environment", "mean_position", "conductance", "weight", "square", "neighbour",
+    "switched",
+)  # fmt: skip
 
 
 def joined(pieces: Sequence[Drive]) -> Drive:

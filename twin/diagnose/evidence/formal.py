@@ -74,12 +74,14 @@ def _wobbles(study: Study, described: Described, raw: np.ndarray, whiten: Whiten
     memory = form.shape_time / (time[1] - time[0])
     R = np.exp(-0.5 * ((when[:, None] - when) / memory) ** 2) * (run[:, None] == run)
     root = np.linalg.cholesky(R + 1e-6 * np.eye(len(R)))
-    result = []
-    for own in described.slow:
-        U, s, _ = np.linalg.svd(whiten(form.shape * raw[:, own].astype(float) @ root), full_matrices=False)
-        kept = s > LEAST
-        result.append(U[:, kept] * s[kept])
-    return result
+    return [leading(whiten(form.shape * raw[:, own].astype(float) @ root)) for own in described.slow]
+
+
+def leading(white: np.ndarray) -> np.ndarray:
+    """(m, k) the leading directions of white columns (m, n) of unit prior variance: nearly the same covariance."""
+    U, s, _ = np.linalg.svd(white, full_matrices=False)
+    kept = s > LEAST
+    return np.asarray(U[:, kept] * s[kept])
 
 
 def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.ndarray:
@@ -92,16 +94,15 @@ def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.nda
 
 def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
     """Per channel the leading directions of what sources and contacts do to it, in all runs."""
-    own = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
-    white = whiten(form.reading * J[:, own] / study.scale[own])
+    heated = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
+    white = whiten(form.reading * J[:, heated] / study.scale[heated])
     label = np.concatenate([_labels(study, k) for k in study.fitted])
     result = []
     for channel in np.unique(label):
         rows = np.flatnonzero(label == channel)
-        U, s, _ = np.linalg.svd(white[rows], full_matrices=False)
-        kept = s > LEAST
-        block = np.zeros((len(white), int(kept.sum())))
-        block[rows] = U[:, kept] * s[kept]
+        own = leading(white[rows])
+        block = np.zeros((len(white), own.shape[1]))
+        block[rows] = own
         result.append(block)
     return result
 

@@ -19,7 +19,7 @@ from twin.build.workers import each
 from twin.calibrate.fit.noise import Channels, estimated
 from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.evidence.fitter import Fitter
-from twin.diagnose.evidence.formal import known_forms
+from twin.diagnose.evidence.formal import known_forms, leading
 from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, null
 from twin.diagnose.evidence.pulls import Pulls, gumbel
 from twin.diagnose.evidence.settled import settled_alone
@@ -167,10 +167,10 @@ def make_detector(
     wind = wind_columns(study, form, progress)
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
-    bare = [*bare_forms(study, raw, index), _discretised(other, len(J))]
+    bare = np.hstack(bare_forms(study, raw, index))
     described = described_forms(study, elements, nominal, raw, form)
     known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
-    fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known]))
+    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *_discretised(other, whiten), known]))
     with progress("measurements without a cause: form", counts[0]) as advance:
         shared = (fitter, J_of, instruments, form, other)
         left = np.stack(each(_null_residual, shared, list(range(counts[0])), lambda _: advance("")), axis=1)
@@ -180,7 +180,7 @@ def make_detector(
     kept = min(MODES, int(np.sum(variance > 3.0)))
     modes = U[:, :kept] * np.sqrt(np.maximum(variance[:kept] - 1.0, 0.0))
     known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
-    fitter = Fitter(study, surrogate, whiten, np.hstack([*map(whiten, bare), known, modes]))
+    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *_discretised(other, whiten), known, modes]))
     context = Context(study, elements, index)
     batches = [b for f in families for b in f.batches(context) if b.columns.size]
     columns = Columns.of(
@@ -213,10 +213,9 @@ def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.nda
     return np.asarray(LATE * raw[:, own].astype(float).sum(axis=1, keepdims=True))
 
 
-def _discretised(differences: Differences, m: int) -> np.ndarray:
-    """(m, k) of unit variance: the difference to each other discretisation, and of each parameter's effect."""
-    columns = [np.column_stack([o.d, SPREAD * o.D]) for o in differences]
-    return np.hstack(columns) if columns else np.zeros((m, 0))
+def _discretised(differences: Differences, whiten: Whitener) -> list[np.ndarray]:
+    """White (m, k) of unit variance: the difference to each other discretisation, and of each parameter's effect."""
+    return [leading(whiten(np.column_stack([o.d, SPREAD * o.D]))) for o in differences]
 
 
 def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:
