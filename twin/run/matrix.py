@@ -38,7 +38,7 @@ def diagonal_blocks(
 
 
 def couplings_of(layout: Layout, system: System, contacts: ContactEntries) -> Couplings:
-    """Blocks of S [1/s] between bodies, by the pads of one on the rails of the other."""
+    """Blocks of S [1/s] by the pads of one body on the rails of another, or of the same (b, b) where it has both."""
     blocks: dict[tuple[int, int], Product] = {}
     for c in layout.couplings:
         r, p, pads = c.rail_body, c.pad_body, np.array(c.pad_ports)
@@ -78,7 +78,12 @@ def terms_of(layout: Layout, system: System, b: int, theta: Array) -> jax.Array:
 def factor_of(layout: Layout, system: System, rate: Array, contacts: ContactEntries, theta: Array) -> BlockFactor:
     """Factor of the matrix of a step with coefficients theta (n_theta,)."""
     diagonal = diagonal_blocks(layout, system, rate, contacts, theta)
-    return factorise(diagonal, couplings_of(layout, system, contacts), layout.elimination, layout.symmetric)
+    couplings = dict(couplings_of(layout, system, contacts))
+    for b in range(len(diagonal)):
+        if (b, b) in couplings:
+            U, V = couplings.pop((b, b))
+            diagonal[b] = diagonal[b] + U @ V
+    return factorise(diagonal, couplings, layout.elimination, layout.symmetric)
 
 
 def by_factor(
