@@ -10,9 +10,9 @@ stable for every theta >= 0.
 The derivative of H_r by V goes through the reduced matrices only: with X = S_r^-1 B_r and Y = S_r^-1 C_r^T it is
 dH_r = dC_r X + Y^T dB_r - Y^T dS_r X, and all frequencies of one theta share one eigendecomposition.
 
-The start decides. From the default's own basis, or from right balanced directions alone, the gradient leads to bases
-hardly better than these; from half right, half left balanced directions, which has four times the error to begin with,
-to a quarter of it.
+The start decides. From the default's own basis, or from the right projection matrix of balanced truncation alone, the
+gradient leads to bases hardly better than these; from the first columns of its right and of its left one, half of each,
+whose error is four times as large, to a quarter of it.
 """
 
 from __future__ import annotations

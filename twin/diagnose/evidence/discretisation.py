@@ -31,6 +31,7 @@ FINER = 2  # times the segments of a rail: the half size of a Richardson extrapo
 OF_SEGMENTS = 2.0  # of the difference to half the length: heat enters beside the pad by an error that goes with it
 # times the elements of a bar. Twice as many have every old node, and a sensor or a nut that sits on one still does
 # (in the shipped ball-screw axis all do): multiples of the golden ratio are the farthest from all simple fractions
+# (Hurwitz' theorem; Hardy, Wright, An Introduction to the Theory of Numbers, 5th ed. 1979, 11.8)
 BARS = (1.0 + 5.0**0.5) / 2.0
 OF_BARS = 1.0 / (1.0 - BARS**-2)  # of the difference: the error of linear elements goes with the square of their size
 DIFFUSIVITY = 1.3e-5  # m^2/s, of steel and cast iron (VDI Heat Atlas, 2nd ed., D6.1)
