@@ -49,7 +49,7 @@ def test_bars_of_finer_elements_tell_the_error_of_the_described_ones(both):
     bars = {n: b.model_copy(update={"elements": 8 * b.elements}) for n, b in machine.bars.items()}
     error = outputs(machine.model_copy(update={"bars": bars})) - outputs(machine)
     d = both[0].d
-    assert np.linalg.norm(error - d) < 0.4 * np.linalg.norm(
+    assert np.linalg.norm(error - d) < 0.35 * np.linalg.norm(
         error
     )  # the nut heats within an element: less than second order
 
