@@ -11,7 +11,7 @@ import numpy as np
 from twin.diagnose.evidence import bells
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.elements import Elements
-from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.fault import Slot, Unit
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
@@ -74,5 +74,5 @@ def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) 
     if len(units) > slots.gate.shape[1]:
         raise ValueError("more amplitudes than slots")
     for s, unit in enumerate(units):
-        unit.fault.fill(slots, s, unit, k, study, elements)
+        unit.fault.fill(Slot(slots, s, unit, k, study, elements))
     return slots

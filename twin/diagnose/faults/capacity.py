@@ -6,11 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, single
-from twin.diagnose.faults.elements import Elements
-from twin.diagnose.faults.fault import Family, Fault, Unit, as_found, place_number
-from twin.diagnose.model.slots import Slots
+from twin.diagnose.faults.context import Singly
+from twin.diagnose.faults.fault import Family, Fault, Slot, as_found
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 from twin.machine.effects.effect import Effect
@@ -22,18 +19,12 @@ RIGID = 300.0  # s: time constant of a capacity that the diagnosis attached rigi
 class Capacity(Fault):
     """At a surface."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        b = study.probed.B[place_number(study, unit.place)]
-        slots.E[s] = np.outer(b, b)
+    def fill(self, slot: Slot) -> None:
+        b = slot.study.probed.B[slot.place]
+        slot.slots.E[slot.s] = np.outer(b, b)
 
 
-CAPACITY = Capacity("capacity", "capacity", "J/K", "", 1, 2000.0, own=0.1, bent=True, saturates=True)
-FAULTS = (CAPACITY,)
-
-
-def batches(context: Context) -> list[Batch]:
-    """Every surface."""
-    return single(context, CAPACITY)
+FAULTS = (Capacity("capacity", "capacity", "J/K", "", 1, 2000.0, own=0.1, bent=True, saturates=True),)
 
 
 def edit(cause: Cause, study: Study) -> Effect:
@@ -46,5 +37,5 @@ FAMILY = Family(
     14, "capacity", "Heat capacity missing",
     "An oil tank, a workpiece, a fixture takes part and is not described.",
     "C_t x_t' = k (T_surface - x_t)", "an extra slow pole at one place", "2 kJ/K", "positive", "every surface",
-    "machine", batches, what="stored heat that the description lacks", edit=edit,
+    "machine", Singly(FAULTS), what="stored heat that the description lacks", edit=edit,
 )  # fmt: skip

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context
+from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
 
-FAULTS: tuple[Fault, ...] = ()
-
-
-def batches(context: Context) -> list[Batch]:
-    """None: it is computed, and not searched."""
-    return []
-
+FAULTS: tuple[Fault, ...] = ()  # it is computed, and not searched
 
 FAMILY = Family(
     16, "coarse_model", "Reduced model or time step too coarse",
     "The artefact does not follow its own full model on this input: a note, never a cause.",
     "none: more states, a shorter step", "the artefact differs from the full model; the full model fits",
     "the noise of one reading (rms)", "-", "the artefact's runtime against the larger model of the diagnosis",
-    "reading", batches, what="a model too coarse",
+    "reading", Singly(FAULTS), what="a model too coarse",
 )  # fmt: skip

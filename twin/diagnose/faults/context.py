@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,33 +31,52 @@ class Context:
         """(place, history, column) of a kind."""
         return [(p, h, c) for (k, p, h), c in self.index.items() if k == kind]
 
+    def rows(self, fault: Fault, history: str = "always") -> list[tuple[str, list[int]]]:
+        """Places of a fault's kind, each with its column of a history."""
+        return [(p, [c]) for p, h, c in self.named(fault.kind) if h == history]
+
+    def blocks(self, fault: Fault) -> list[tuple[str, list[int]]]:
+        """Places of a fault's kind, each with its columns of all blocks."""
+        return [(p, c.tolist()) for (k, p), c in self.elements.block_of.items() if k == fault.kind]
+
     @property
     def outer(self) -> list[Place]:
         """Places with a film."""
         return [p for p in self.study.probed.places if p.film]
 
 
-def single(context: Context, fault: Fault) -> list[Batch]:
-    """Every column of a kind a hypothesis of its own."""
-    found = context.named(fault.kind)
-    return [fault.batch([(p, [c]) for p, h, c in found if h == name], (alone(context, name),))
-            for name in dict.fromkeys(h for _, h, _ in found)]  # fmt: skip
+def single(context: Context, fault: Fault, largest: float | None = None) -> list[Batch]:
+    """Every column of a kind a hypothesis of its own; a batch for each history."""
+    names = dict.fromkeys(h for _, h, _ in context.named(fault.kind))
+    return [
+        batch for name in names
+        for batch in fault.batches(context.rows(fault, name), (alone(context, name, fault.called),), largest)
+    ]  # fmt: skip
 
 
-def called(context: Context, fault: Fault, history: str) -> list[Batch]:
-    """Hypotheses of a kind of one history, under another name; none where there is no column."""
-    rows = [(p, [c]) for p, _, c in context.named(fault.kind)]
-    return [fault.batch(rows, (History(history, np.ones((1, 1))),))] if rows else []
+@dataclass(frozen=True)
+class Singly:
+    """The batches of a family: every column of its faults a hypothesis of its own."""
+
+    faults: tuple[Fault, ...]
+
+    def __call__(self, context: Context) -> list[Batch]:
+        return [batch for fault in self.faults for batch in single(context, fault)]
 
 
-def alone(context: Context, name: str) -> History:
-    """The history of one column."""
-    return logged(context, name, np.ones((1, 1)))
+def alone(context: Context, name: str, called: str = "") -> History:
+    """The history of one column, perhaps under another name."""
+    return replace(logged(context, name, np.ones((1, 1))), name=called or name)
 
 
 def logged(context: Context, name: str, weights: np.ndarray) -> History:
     signal, exponent, reference = context.elements.histories.unit.get(name, ("", 1.0, 1.0))
     return History(name, weights, signal, exponent, reference)
+
+
+def logs(context: Context, names: Sequence[str], n: int) -> list[History]:
+    """Histories of the first of n columns of a place."""
+    return [logged(context, name, row[None]) for name, row in zip(names, np.eye(n), strict=False)]
 
 
 def windows_of(context: Context) -> list[Stretch]:
@@ -108,15 +127,9 @@ def lasting(context: Context) -> list[Stretch]:
     return [w for w in stretches(context) if w[1][n - 1] == 1.0 and w[2][-1].run == last]
 
 
-def of_stretches(found: Sequence[Stretch]) -> list[History]:
-    return [History(name, w[None], windows=windows) for name, w, windows in found]
-
-
-def wide(one: np.ndarray, at: int, length: int) -> np.ndarray:
-    """(length,) weights `one` from a column on, zero elsewhere."""
-    result = np.zeros(length)
-    result[at : at + len(one)] = one
-    return result
+def of_stretches(found: Sequence[Stretch], before: int = 0) -> list[History]:
+    """Histories of stretches, whose blocks come after some columns of a place."""
+    return [History(name, np.pad(w, (before, 0))[None], windows=windows) for name, w, windows in found]
 
 
 def most_heat(context: Context) -> float:

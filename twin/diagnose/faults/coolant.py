@@ -9,12 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
-from twin.diagnose.faults.context import Context, wide, windows_of
-from twin.diagnose.faults.elements import Elements
-from twin.diagnose.faults.fault import Described, Family, Fault, Unit, as_found, coarse, place_number
+from twin.diagnose.faults.context import Context, windows_of
+from twin.diagnose.faults.fault import Described, Family, Fault, Slot, Unit, as_found
 from twin.diagnose.faults.heat_source import HEAT
 from twin.diagnose.model.bank import Nominal
-from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.numbers import size_words
@@ -31,9 +29,9 @@ MEDIUM = 0.15  # relative standard deviation of its film where its temperature i
 class Wetted(Fault):
     """Its film alone: a liquid keeps its temperature while the air's drifts, and heat tells by how much."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        slots.A[s] = study.probed.A[place_number(study, unit.place)]  # to the reference temperature: no rise
-        slots.gate[:, s] = coarse(unit, k)
+    def fill(self, slot: Slot) -> None:
+        slot.slots.A[slot.s] = slot.study.probed.A[slot.place]  # to the reference temperature: no rise
+        slot.slots.gate[:, slot.s] = slot.gate
 
 
 @dataclass(frozen=True)
@@ -110,13 +108,9 @@ FAULTS = (COOLANT,)
 def batches(context: Context) -> list[Batch]:
     """A film to a medium of its own temperature, in every window."""
     blocks, heat = context.elements.block_of, context.elements.heat_blocks
-    n = len(context.elements.histories.blocks)
-    histories = [
-        History(name, np.stack([wide(w, 0, 2 * n), wide(w, n, 2 * n)]), windows=windows)
-        for name, w, windows in windows_of(context)
-    ]
+    histories = [History(name, np.kron(np.eye(2), w), windows=windows) for name, w, windows in windows_of(context)]
     rows = [(p.name, [*blocks["film", p.name], *heat[p.name]]) for p in context.outer]
-    return [COOLANT.batch(rows, histories)] if rows else []
+    return COOLANT.batches(rows, histories)
 
 
 def said(cause: Cause) -> list[str]:

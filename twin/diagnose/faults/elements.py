@@ -210,7 +210,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     for c, name in enumerate(probed.base.load_model.contacts):
         v = vector([_contact_flow(study, k, c, x) for k, x in enumerate(z)])
         blocks("contact", name, v)
-    powers = [_powers(study, k, own) for k, own in enumerate(nominal)]
+    powers = [_power_of(system, run.drive, own) for run, own in zip(runs, nominal, strict=True)]
     for j, source in enumerate(load.sources):
         if source.contact:
             continue
@@ -258,12 +258,8 @@ def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:
     return np.asarray(-np.einsum("tij,tj->ti", gamma, z @ P) @ P.T)
 
 
-def _powers(study: Study, k: int, nominal: Nominal) -> np.ndarray:
-    """(n_fine, n_sources) W of all sources of a run at the nominal windings."""
-    return _power_of(study.probed.system, study.runs[k].run.drive, nominal)
-
-
 def _power_of(system: System, drive: Drive, nominal: Nominal) -> np.ndarray:
+    """(n_fine, n_sources) W of all sources of a run at the nominal windings."""
     power = drive.power.copy()
     if drive.losses.index:
         winding = float(system.reference_temperature) + nominal.states[:-1] @ np.asarray(system.source_rows).T
@@ -300,6 +296,10 @@ def _signals(
     uses = [s.use for s in load.sources] + [f.use for f in load.films]
     read = {s for use in uses for s in use.signals.values()}
     A, M = np.asarray(probed.system.A[0]), np.asarray(probed.system.M)
+    in_contact = list(load.contact_sources)
+    B = np.zeros((body.n, len(load.sources)))
+    B[:, list(body.sources)] = body.B
+    B[:, in_contact] = 0.0
     result = []
     for signal in load.signals:
         if signal.name in positions or signal.name not in read or signal.unit == "degC":
@@ -318,9 +318,8 @@ def _signals(
                 grown_power = np.zeros_like(power)
                 grown_power[:, sources] = _power_of(small, drive, own) - power[:, sources]
                 ratio = grown_power / np.where(power > 0.0, power, 1.0)
-                moving = list(load.contact_sources)
-                forcing = _without_contacts(study, grown_power) @ _all_sources(study).T
-                forcing = forcing + np.einsum("ts,tsp->tp", ratio[:, moving], run.drive.contact_heat) @ body.P.T
+                forcing = grown_power @ B.T
+                forcing = forcing + np.einsum("ts,tsp->tp", ratio[:, in_contact], run.drive.contact_heat) @ body.P.T
                 for i, f in enumerate(films):
                     grown = _convection(drive, i, own) - _convection(run.drive, f, own)
                     if np.any(grown):
@@ -344,19 +343,6 @@ def _evaluated(study: Study, k: int, signal: str, factor: float) -> tuple[list[i
     signals = {name: values * (factor if name == signal else 1.0) for name, values in run.signals.items()}
     dt = run.drive.time[1] - run.drive.time[0]
     return sources, films, evaluate(only, run.drive.time[:-1], signals, dt, run.drive.n_steps)
-
-
-def _without_contacts(study: Study, power: np.ndarray) -> np.ndarray:
-    result = power.copy()
-    result[:, list(study.probed.base.load_model.contact_sources)] = 0.0
-    return result
-
-
-def _all_sources(study: Study) -> np.ndarray:
-    (body,) = study.probed.base.bodies
-    B = np.zeros((body.n, len(study.probed.base.load_model.sources)))
-    B[:, list(body.sources)] = body.B
-    return B
 
 
 def _convection(drive: Drive, f: int, nominal: Nominal) -> np.ndarray:

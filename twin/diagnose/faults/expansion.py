@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, alone
+from twin.diagnose.faults.context import Context, alone, single
 from twin.diagnose.faults.fault import Curve, Family, Fault, as_found
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
@@ -37,12 +37,10 @@ FAULTS = (PART, GAIN)
 
 def batches(context: Context) -> list[Batch]:
     """Every part, every material."""
-    one = (alone(context, "always"),)
-    gains = [(p, [c]) for p, _, c in context.named("gain") if p.endswith(".expansion")]
-    parts = [(p, [c]) for p, _, c in context.named("expansion")]
+    gains = [(p, c) for p, c in context.rows(GAIN) if p.endswith(".expansion")]
     faces = any(p.surfaces for p in context.study.probed.places)
     part = PART if faces else replace(PART, prefix=NODES)
-    return [fault.batch(rows, one) for fault, rows in ((part, parts), (GAIN, gains)) if rows]
+    return [*single(context, part), *GAIN.batches(gains, (alone(context, "always"),))]
 
 
 def edit(cause: Cause, study: Study) -> Effect:

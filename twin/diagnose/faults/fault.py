@@ -13,7 +13,7 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.faults.elements import Elements
-from twin.diagnose.model.bank import Nominal
+from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.integration import INNER
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
@@ -59,6 +59,53 @@ class Unit:
 
 
 @dataclass(frozen=True)
+class Slot:
+    """Slot s of run k of the time integration, to be filled with a unit."""
+
+    slots: Slots
+    s: int
+    unit: Unit
+    k: int
+    study: Study
+    elements: Elements
+
+    @property
+    def shape(self) -> np.ndarray:
+        """(n_fine,) the unit's history in this run."""
+        return self.unit.shapes[self.k]
+
+    @property
+    def gate(self) -> np.ndarray:
+        """(n,) its mean in every coarse step."""
+        return np.asarray(self.shape.reshape(-1, INNER).mean(axis=1))
+
+    @property
+    def place(self) -> int:
+        """The number of its place."""
+        return [place.name for place in self.study.probed.places].index(self.unit.place)
+
+    @property
+    def column(self) -> Column:
+        return self.elements.columns[self.unit.column]
+
+    @property
+    def vector(self) -> np.ndarray:
+        """(r,) or (n_fine, r) of its column."""
+        return self.elements.vectors[self.k][self.column.vector]
+
+    def force(self, vector: np.ndarray, history: np.ndarray) -> None:
+        """With a vector (r,) or (n_fine, r) times a history (n_fine,)."""
+        flow = vector if vector.ndim == 2 else np.broadcast_to(vector, (len(history), len(vector)))
+        self.slots.forcing[:, :, self.s] = (flow * history[:, None]).reshape(len(self.slots.gate), INNER, -1)
+
+    def film(self, A: np.ndarray, M: np.ndarray, environment: int) -> None:
+        """With a film A (r, r), M (r,) to the air of an environment."""
+        air = self.study.runs[self.k].run.drive.environment[:, environment]
+        self.slots.A[self.s], self.slots.M[self.s], self.slots.gate[:, self.s] = A, M, self.gate
+        self.slots.rise[:, :, self.s] = (air - self.study.probed.base.reference_temperature).reshape(-1, INNER)
+
+
+@dataclass(frozen=True)
 class Fault:
     """One kind of cause of a family: how its size enters, its range, and what searches must know of it."""
 
@@ -86,6 +133,7 @@ class Fault:
     read: bool = False  # acts on what is read, not in the machine
     curved: bool = False  # on what is read, and not in proportion to its size
     sizes: tuple[float, ...] = ()  # at which such a one is scored beside its column's
+    called: str = ""  # what its history is called, where it is not that of its columns
     exchanges: bool = False  # two channels, exactly
     corrects: bool = False  # a logged signal, by an exact factor
     instant: bool = False  # of a reading: without edges that could be fitted
@@ -102,17 +150,22 @@ class Fault:
         """The name that its columns have, of a place of a hypothesis."""
         return name.removeprefix(self.prefix)
 
-    def batch(
+    def batches(
         self, rows: Sequence[tuple[str, Sequence[int]]], histories: Sequence[History],
         largest: float | Sequence[float] | None = None,
-    ) -> Batch:  # fmt: skip
-        """Its hypotheses at places (name, columns); largest: of each place, `self.largest` by default."""
+    ) -> list[Batch]:  # fmt: skip
+        """A batch of its hypotheses at places (name, columns), none without places or histories.
+
+        largest: of each place, `self.largest` by default.
+        """
+        if not rows or not histories:
+            return []
         bound = self.largest if largest is None else largest
         of_places = () if bound is None else tuple(np.broadcast_to(np.asarray(bound, dtype=float), len(rows)).tolist())
-        return Batch(
+        return [Batch(
             self.family, self.kind, self.unit, tuple(self.prefix + p for p, _ in rows),
             np.array([c for _, c in rows], dtype=int), tuple(histories), self.sign, self.fixed, self.least, of_places,
-        )  # fmt: skip
+        )]  # fmt: skip
 
     def log_change(self, amplitude: float) -> float:
         """An amplitude of a declared parameter as the logarithm of its factor."""
@@ -135,12 +188,11 @@ class Fault:
         leads = [int(columns[np.flatnonzero(row)[0]]) if row.any() else int(columns[0]) for row in weights]
         return tuple(Unit(self, self.bare(h.name), lead, shapes(i)) for i, lead in enumerate(leads))
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        """Slot s of run k with a unit: a forcing that the bank knows, the history of its column times its vector."""
-        column = elements.columns[unit.column]
-        history = column.histories[k]
+    def fill(self, slot: Slot) -> None:
+        """By default with a forcing that the bank knows, the history of its column times its vector."""
+        history = slot.column.histories[slot.k]
         if history is not None:
-            forced(slots, s, elements.vectors[k][column.vector], history)
+            slot.force(slot.vector, history)
 
     # what exact refits know beforehand
     def prior(self, q: int) -> tuple[np.ndarray, np.ndarray]:
@@ -186,22 +238,6 @@ class Fault:
     def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
         """A cause as reports and edits take it, of one at its place with the size of its first amplitude as told."""
         return d
-
-
-def forced(slots: Slots, s: int, vector: np.ndarray, history: np.ndarray) -> None:
-    """Slot s with a vector (r,) or (n_fine, r) times a history (n_fine,)."""
-    flow = vector if vector.ndim == 2 else np.broadcast_to(vector, (len(history), len(vector)))
-    n = slots.gate.shape[0]
-    slots.forcing[:, :, s] = (flow * history[:, None]).reshape(n, INNER, -1)
-
-
-def coarse(unit: Unit, k: int) -> np.ndarray:
-    """(n,) the mean of a unit's shape in every coarse step of run k."""
-    return np.asarray(unit.shapes[k].reshape(-1, INNER).mean(axis=1))
-
-
-def place_number(study: Study, name: str) -> int:
-    return [place.name for place in study.probed.places].index(name)
 
 
 def as_found(cause: Cause, study: Study) -> Effect:

@@ -9,11 +9,8 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import Batch, Hypothesis
 from twin.diagnose.faults.context import Context, alone
-from twin.diagnose.faults.elements import Elements
-from twin.diagnose.faults.fault import Curve, Family, Fault, Unit, coarse, place_number
+from twin.diagnose.faults.fault import Curve, Family, Fault, Slot
 from twin.diagnose.model.bank import Nominal
-from twin.diagnose.model.integration import INNER
-from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 
 
@@ -21,12 +18,9 @@ from twin.diagnose.model.study import Study
 class Film(Fault):
     """More film on a surface, or less, to the air that it is in."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        p, probed = place_number(study, unit.place), study.probed
-        run = study.runs[k].run
-        air = run.drive.environment[:, environment_at(study, p)] - probed.base.reference_temperature
-        slots.A[s], slots.M[s], slots.gate[:, s] = probed.A[p], probed.M[p], coarse(unit, k)
-        slots.rise[:, :, s] = air.reshape(-1, INNER)
+    def fill(self, slot: Slot) -> None:
+        p, probed = slot.place, slot.study.probed
+        slot.film(probed.A[p], probed.M[p], environment_at(slot.study, p))
 
     def lowest(self, study: Study, nominal: Sequence[Nominal], h: Hypothesis) -> np.ndarray:
         """Less than the described film cannot lack at a surface."""
@@ -42,9 +36,9 @@ class Film(Fault):
 class Group(Fault):
     """All of a described film."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        films = [f.name for f in study.probed.base.load_model.films]
-        slots.film[:, s, films.index(unit.place)] = coarse(unit, k)
+    def fill(self, slot: Slot) -> None:
+        films = [f.name for f in slot.study.probed.base.load_model.films]
+        slot.slots.film[:, slot.s, films.index(slot.unit.place)] = slot.gate
 
 
 def environment_at(study: Study, p: int) -> int:
@@ -66,11 +60,9 @@ FAULTS = (GROUP, SURFACE)
 
 def batches(context: Context) -> list[Batch]:
     """Films as a whole, and surfaces of their own."""
-    outer = {p.name for p in context.outer}
-    surfaces = [(p, [c]) for p, h, c in context.named("film") if h == "always" and p in outer]
-    one = (alone(context, "always"),)
-    groups = [(p, [c]) for p, h, c in context.named("group") if h == "always"]
-    return [fault.batch(rows, one) for fault, rows in ((GROUP, groups), (SURFACE, surfaces)) if rows]
+    outer, one = {p.name for p in context.outer}, (alone(context, "always"),)
+    surfaces = [(p, c) for p, c in context.rows(SURFACE) if p in outer]
+    return [*GROUP.batches(context.rows(GROUP), one), *SURFACE.batches(surfaces, one)]
 
 
 FAMILY = Family(

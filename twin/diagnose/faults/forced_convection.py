@@ -7,12 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, logged
-from twin.diagnose.faults.elements import Elements
-from twin.diagnose.faults.fault import Family, Fault, Unit, as_found, coarse
+from twin.diagnose.faults.context import Context, logs
+from twin.diagnose.faults.fault import Family, Fault, Slot, as_found
 from twin.diagnose.faults.film_gain import Film
-from twin.diagnose.model.integration import INNER
-from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.spot import Of, Spot
@@ -23,13 +20,10 @@ from twin.machine.effects.effect import Effect
 class GroupFilm(Fault):
     """More of a described film, on all of its surfaces."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        system, load = study.probed.system, study.probed.base.load_model
-        f = [film.name for film in load.films].index(unit.place)
-        air = study.runs[k].run.drive.environment[:, load.films[f].environment]
-        slots.A[s] = np.asarray(system.A[0])[f]
-        slots.M[s], slots.gate[:, s] = np.asarray(system.M)[:, f], coarse(unit, k)
-        slots.rise[:, :, s] = (air - study.probed.base.reference_temperature).reshape(-1, INNER)
+    def fill(self, slot: Slot) -> None:
+        system, films = slot.study.probed.system, slot.study.probed.base.load_model.films
+        f = [film.name for film in films].index(slot.unit.place)
+        slot.film(np.asarray(system.A[0])[f], np.asarray(system.M)[:, f], films[f].environment)
 
 
 FAULTS = (
@@ -43,15 +37,12 @@ FAULTS = (
 
 def batches(context: Context) -> list[Batch]:
     """Films and surfaces, with every speed."""
-    result, speeds = [], context.elements.histories.speeds
+    speeds = list(context.elements.histories.speeds)
+    histories, result = logs(context, speeds, len(speeds)), []
     for fault in FAULTS:
-        rows: dict[str, list[int]] = {}
-        for p, h, c in context.named(fault.kind):
-            if h in speeds:
-                rows.setdefault(p, []).append(c)
-        if rows and speeds:
-            histories = [logged(context, name, np.eye(len(speeds))[[i]]) for i, name in enumerate(speeds)]
-            result.append(fault.batch(list(rows.items()), histories))
+        places = dict.fromkeys(p for p, h, _ in context.named(fault.kind) if h in speeds)
+        rows = [(p, [context.index[fault.kind, p, speed] for speed in speeds]) for p in places]
+        result += fault.batches(rows, histories)
     return result
 
 

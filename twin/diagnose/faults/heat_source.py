@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from twin.diagnose.evidence.batch import Batch, History
-from twin.diagnose.faults.context import Context, logged, most_heat, stretches, wide
-from twin.diagnose.faults.elements import Elements
-from twin.diagnose.faults.fault import Family, Fault, Unit, forced, place_number
-from twin.diagnose.model.slots import Slots
-from twin.diagnose.model.study import Study
+from twin.diagnose.evidence.batch import Batch
+from twin.diagnose.faults.context import Context, logs, most_heat, of_stretches, stretches
+from twin.diagnose.faults.fault import Family, Fault, Slot
 
 
 @dataclass(frozen=True)
 class Heat(Fault):
     """Heat at a place."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        forced(slots, s, study.probed.B[place_number(study, unit.place)], unit.shapes[k])
+    def fill(self, slot: Slot) -> None:
+        slot.force(slot.study.probed.B[slot.place], slot.shape)
 
 
 HEAT = Heat("heat_source", "heat", "W", "", 1, 1.0)
@@ -28,17 +23,14 @@ FAULTS = (HEAT,)
 
 def batches(context: Context) -> list[Batch]:
     """Everywhere: always, with every load signal, and in every window."""
-    signals, blocks = context.elements.histories.signals, context.elements.heat_blocks
-    n = len(signals) + len(context.elements.histories.blocks)
-    histories = [logged(context, name, np.eye(n)[[i]]) for i, name in enumerate(signals)]
-    histories += [
-        History(name, wide(w, len(signals), n)[None], windows=windows) for name, w, windows in stretches(context)
-    ]
+    signals, blocks = list(context.elements.histories.signals), context.elements.heat_blocks
+    histories = logs(context, signals, len(signals) + len(context.elements.histories.blocks))
+    histories += of_stretches(stretches(context), before=len(signals))
     rows = [
         (p.name, [*(context.index["heat", p.name, s] for s in signals), *blocks[p.name]])
         for p in context.study.probed.places
     ]
-    return [HEAT.batch(rows, histories, most_heat(context))]
+    return HEAT.batches(rows, histories, most_heat(context))
 
 
 FAMILY = Family(

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, single
+from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
 
-START = Fault("initial_state", "start", "K", "runs.", 0, 0.2, 30.0, several=True)
-FAULTS = (START,)
-
-
-def batches(context: Context) -> list[Batch]:
-    """Every run and part."""
-    return single(context, START)
-
+FAULTS = (Fault("initial_state", "start", "K", "runs.", 0, 0.2, 30.0, several=True),)
 
 FAMILY = Family(
     15, "initial_state", "The run starts from another state than stated",
     "The machine, or a part, was warmer or colder than the run says: yesterday's heat.",
     "T(0)", "decays with the model's own time constants from the first minute on", "0.2 K", "either",
-    "the machine and every part, in every run", "reading", batches, what="another temperature at the start",
+    "the machine and every part, in every run", "reading", Singly(FAULTS), what="another temperature at the start",
 )  # fmt: skip

@@ -6,10 +6,7 @@ from dataclasses import dataclass
 
 from twin.diagnose.evidence.batch import Batch
 from twin.diagnose.faults.context import Context, always, lasting, of_stretches
-from twin.diagnose.faults.elements import Elements
-from twin.diagnose.faults.fault import Curve, Family, Fault, Unit, coarse
-from twin.diagnose.model.slots import Slots
-from twin.diagnose.model.study import Study
+from twin.diagnose.faults.fault import Curve, Family, Fault, Slot
 
 RANGE = 9.0  # conductances of joints scatter by a decade with pressure and roughness
 
@@ -18,17 +15,18 @@ RANGE = 9.0  # conductances of joints scatter by a decade with pressure and roug
 class Joint(Fault):
     """A joint between faces that do not move."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        joints = [j.name for j in study.probed.base.load_model.joints]
-        slots.joint[:, s, joints.index(unit.place)] = coarse(unit, k)
+    def fill(self, slot: Slot) -> None:
+        joints = [j.name for j in slot.study.probed.base.load_model.joints]
+        slot.slots.joint[:, slot.s, joints.index(slot.unit.place)] = slot.gate
 
 
 @dataclass(frozen=True)
 class Contact(Fault):
     """A contact that moves."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        slots.contact[:, s, study.probed.base.load_model.contacts.index(unit.place)] = coarse(unit, k)
+    def fill(self, slot: Slot) -> None:
+        contacts = slot.study.probed.base.load_model.contacts
+        slot.slots.contact[:, slot.s, contacts.index(slot.unit.place)] = slot.gate
 
 
 FAULTS = tuple(
@@ -43,12 +41,7 @@ FAULTS = tuple(
 def batches(context: Context) -> list[Batch]:
     """Every contact: always, and from every hour on."""
     histories = of_stretches([always(context), *lasting(context)])
-    blocks, result = context.elements.block_of, []
-    for fault in FAULTS:
-        rows = [(p, list(c)) for (k, p), c in blocks.items() if k == fault.kind]
-        if rows:
-            result.append(fault.batch(rows, histories))
-    return result
+    return [batch for fault in FAULTS for batch in fault.batches(context.blocks(fault), histories)]
 
 
 FAMILY = Family(

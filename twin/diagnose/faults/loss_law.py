@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, alone, most_heat
+from twin.diagnose.faults.context import Context, alone, most_heat, single
 from twin.diagnose.faults.fault import Curve, Family, Fault, as_found
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
@@ -24,13 +24,9 @@ FAULTS = (GAIN, SHAPE)
 
 def batches(context: Context) -> list[Batch]:
     """Gains of sources, and other shapes at their places."""
-    one = (alone(context, "always"),)
-    gains = [(path.removesuffix(".gain"), [c]) for path, _, c in context.named("gain") if path.startswith("sources.")]
-    result = [GAIN.batch(gains, one)] if gains else []
-    for name in dict.fromkeys(h for _, h, _ in context.named("source")):
-        rows = [(p, [c]) for p, h, c in context.named("source") if h == name]
-        result.append(SHAPE.batch(rows, (alone(context, name),), most_heat(context)))
-    return result
+    gains = [(path.removesuffix(".gain"), c) for path, c in context.rows(GAIN) if path.startswith("sources.")]
+    shapes = single(context, SHAPE, most_heat(context))
+    return [*GAIN.batches(gains, (alone(context, "always"),)), *shapes]
 
 
 def is_source(parameter: Parameter) -> bool:

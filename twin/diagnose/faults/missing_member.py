@@ -5,17 +5,11 @@ Looked for by `twin.diagnose.search.missing`, where nothing else explains what m
 
 from __future__ import annotations
 
-from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context
+from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
 from twin.diagnose.result.diagnosis import Cause
 
-FAULTS: tuple[Fault, ...] = ()
-
-
-def batches(context: Context) -> list[Batch]:
-    """None: it needs no model of heat, and is found by the evidence of displacements alone."""
-    return []
+FAULTS: tuple[Fault, ...] = ()  # it needs no model of heat, and is found by the evidence of displacements alone
 
 
 def written_elsewhere(cause: Cause) -> bool:
@@ -28,6 +22,6 @@ FAMILY = Family(
     "A probe holder, cover, column or foundation follows an air, a measured temperature or a heat, and moves the tool.",
     "w + sum_k a_k (tau_k-lag of a logged column)", "displacements that no heat in the machine explains",
     "3 in ln evidence", "either", "every logged temperature, speed and power, with lags of 1 min to 5.3 h", "machine",
-    batches, what="a body that follows it, and that the description lacks,", kind_told=True, weighed=True,
+    Singly(FAULTS), what="a body that follows it, and that the description lacks,", kind_told=True, weighed=True,
     editable=written_elsewhere,
 )  # fmt: skip

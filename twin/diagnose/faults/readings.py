@@ -57,27 +57,35 @@ def readings_of(
     if any(len(plan.measured.tcp) for plan in plans):
         _tcp(study, plans, nominal, add)
     for r, plan in enumerate(plans):
-        parts = [np.zeros(p.size) for p in plans]
+        parts = [_numbers(p) for p in plans]
         T, _ = plan.split(outputs[r])
-        parts[r] = np.concatenate([-_rate(plan, T).ravel(), -_tcp_rate(study, plan, nominal[r]).ravel()])
+        z, step = nominal[r].states, np.asarray(plan.rows.step)
+        w_rate = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), (z[step + 1] - z[step]) * nominal[r].rate)
+        parts[r] = -_numbers(plan, _rate(T, plan.measured.bin_time), w_rate)
         add(("clock", plan.run.name, "always"), parts)
     return np.stack(columns, axis=1), index
 
 
-def _rate(plan: Planned, T: np.ndarray) -> np.ndarray:
-    """dT/dt (b, s) K/s of bin means."""
-    return np.gradient(T, plan.measured.bin_time, axis=0) if len(T) > 1 else np.zeros_like(T)
+def _numbers(plan: Planned, T: np.ndarray | None = None, w: np.ndarray | None = None) -> np.ndarray:
+    """(size,) all that a run measures, of sensors T (b, s) and TCP rows w (k, 3), zero by default.
+
+    The TCP is counted from its first row where the run says so, as `Study.read` does.
+    """
+    T = np.zeros(plan.shapes[0]) if T is None else T
+    w = np.zeros(plan.shapes[1]) if w is None else w
+    return np.concatenate([T.ravel(), (w - w[0] if plan.measured.from_first and len(w) else w).ravel()])
 
 
-def _tcp_rate(study: Study, plan: Planned, nominal: Nominal) -> np.ndarray:
-    rows, z = np.asarray(plan.rows.row), nominal.states
-    step = np.asarray(plan.rows.step)
-    return _shown(plan, np.asarray(np.einsum("kcr,kr->kc", rows, (z[step + 1] - z[step]) * nominal.rate)))
+def _rate(T: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """dT/dt [K/s] of bin means (b, ...)."""
+    return np.asarray(np.gradient(T, time, axis=0)) if len(T) > 1 else np.zeros_like(T)
 
 
-def _shown(plan: Planned, w: np.ndarray) -> np.ndarray:
-    """(k, 3) of the TCP as a run tells it: counted from its first row where it says so, as `Study.read` does."""
-    return w - w[0] if plan.measured.from_first else w
+def _only(c: int, values: np.ndarray) -> np.ndarray:
+    """(k, 3) of the TCP where only a component moves, by values (k,)."""
+    w = np.zeros((len(values), 3))
+    w[:, c] = values
+    return w
 
 
 def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarray], add: Add, swaps: bool) -> None:
@@ -91,16 +99,17 @@ def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarra
             for name, values in of:
                 if name in plan.measured.sensors:
                     T[:, plan.measured.sensors.index(name)] = values[r]
-            parts.append(np.concatenate([T.ravel(), np.zeros(plan.shapes[1][0] * 3)]))
+            parts.append(_numbers(plan, T))
         return parts
 
-    read: dict[str, list[np.ndarray]] = {}
-    for name in names:
-        read[name] = [
+    read = {
+        name: [
             plan.split(y)[0][:, plan.measured.sensors.index(name)] if name in plan.measured.sensors
             else np.zeros(plan.shapes[0][0])
             for plan, y in zip(plans, outputs, strict=True)
-        ]  # fmt: skip
+        ]
+        for name in names
+    }  # fmt: skip
     time = [plan.measured.bin_time - plan.run.drive.time[0] for plan in plans]
     air = []
     for plan in plans:
@@ -109,8 +118,7 @@ def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarra
     for name in names:
         add(("offset", name, "always"), column([(name, [np.ones(len(t)) for t in time])]))
         add(("drift", name, "always"), column([(name, [t / DAY for t in time])]))
-        rates = [np.gradient(T, t) if len(t) > 1 else np.zeros_like(T) for T, t in zip(read[name], time, strict=True)]
-        add(("lag", name, "always"), column([(name, [-v for v in rates])]))
+        add(("lag", name, "always"), column([(name, [-_rate(T, t) for T, t in zip(read[name], time, strict=True)])]))
         add(("detached", name, "always"), column([(name, [a - T for a, T in zip(air, read[name], strict=True)])]))
     for a, first in enumerate(names if swaps else ()):
         for second in names[a + 1 :]:
@@ -124,32 +132,22 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
     times = [plan.measured.tcp_time - plan.run.drive.time[0] for plan in plans]
 
     def column(of: Sequence[np.ndarray]) -> list[np.ndarray]:
-        return [
-            np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), _shown(plan, w).ravel()])
-            for plan, w in zip(plans, of, strict=True)
-        ]
+        return [_numbers(plan, w=w) for plan, w in zip(plans, of, strict=True)]
 
     def component(c: int, values: Sequence[np.ndarray]) -> list[np.ndarray]:
-        made = []
-        for v in values:
-            w = np.zeros((len(v), 3))
-            w[:, c] = v
-            made.append(w)
-        return column(made)
+        return column([_only(c, v) for v in values])
 
     z = [_state(own.states, np.asarray(p.rows.step) + np.asarray(p.rows.share))
          for p, own in zip(plans, nominal, strict=True)]  # fmt: skip
     positions = [_positions(plan, t) for plan, t in zip(plans, times, strict=True)]
-    axes = probed.base.load_model.axes
+    axes = [(i, a) for i, a in enumerate(probed.base.load_model.axes)
+            if any(np.ptp(p[:, i]) > 1e-6 for p in positions if len(p))]  # fmt: skip
     for m, member in enumerate(body.members):
         row = member_mean(body, m)
         warm = [x @ row for x in z]
-        for i, axis in enumerate(axes):
-            if not any(np.ptp(p[:, i]) > 1e-6 for p in positions if len(p)):
-                continue
-            middle = 0.0
+        for i, axis in axes:
             along = np.asarray(axis.direction)
-            made = [-(t * (p[:, i] - middle))[:, None] * along for t, p in zip(warm, positions, strict=True)]
+            made = [-(t * p[:, i])[:, None] * along for t, p in zip(warm, positions, strict=True)]
             add(("scale", f"axes.{axis.name}<{member}", "always"), column(made))
         if {f"tcp.expansion.{member}.{c}" for c in "xyz"} <= {p.path for p in probed.parameters}:
             continue  # of a lumped machine: each of these numbers is calibrated by itself
@@ -167,9 +165,8 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
                 add(("step", name, f"{r}:{start:.0f}"), component(c, values))
         add(("probe", name, "always"), component(c, times))
         add(("heated", name, "always"), component(c, [_within_set(t) for t in times]))
-        for i, axis in enumerate(axes):
-            if any(np.ptp(p[:, i]) > 1e-6 for p in positions if len(p)):
-                add(("frame", f"{name}:{axis.name}", "always"), component(c, [p[:, i] for p in positions]))
+        for i, axis in axes:
+            add(("frame", f"{name}:{axis.name}", "always"), component(c, [p[:, i] for p in positions]))
         for signal in probed.base.load_model.signals:
             if signal.unit not in ("A", "W", "N", "1"):
                 continue
@@ -180,13 +177,9 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
 
 def play(study: Study, nominal: Sequence[Nominal], name: str, width: float) -> np.ndarray:
     """(m,) what a play of `width` [m] in a component of the TCP makes it read in the fitted runs, per metre of play."""
-    c, parts = COMPONENTS.index(name), []
-    for k in study.fitted:
-        plan = study.runs[k]
-        w = np.zeros((plan.shapes[1][0], 3))
-        w[:, c] = _play(plan, nominal[k], c, max(width, NARROW))
-        parts.append(np.concatenate([np.zeros(plan.shapes[0][0] * plan.shapes[0][1]), _shown(plan, w).ravel()]))
-    return np.concatenate(parts)
+    c, wide = COMPONENTS.index(name), max(width, NARROW)
+    runs = [(study.runs[k], nominal[k]) for k in study.fitted]
+    return np.concatenate([_numbers(plan, w=_only(c, _play(plan, own, c, wide))) for plan, own in runs])
 
 
 def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.ndarray:
@@ -199,14 +192,14 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
     parts = []
     for k in study.fitted:
         plan = study.runs[k]
-        T, w = np.zeros(plan.shapes[0]), np.zeros(plan.shapes[1])
+        T, w = None, None
         if k in states:
             z, steps = states[k], by / float(plan.run.drive.time[1] - plan.run.drive.time[0])
             read = z @ body.C.T[:, plan.measured.column]
             T = plan.measured.mean_of @ (_state(read, np.arange(len(z)) - steps) - read)
             at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
             w = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), _state(z, at - steps) - _state(z, at))
-        parts.append(np.concatenate([T.ravel(), _shown(plan, w).ravel()]) / by)
+        parts.append(_numbers(plan, T, w) / by)
     return np.concatenate(parts)
 
 
@@ -219,14 +212,14 @@ def lagged(study: Study, states: Mapping[int, np.ndarray], sensor: str, seconds:
     parts = []
     for k in study.fitted:
         plan = study.runs[k]
-        T, w = np.zeros(plan.shapes[0]), np.zeros(plan.shapes[1])
+        T = np.zeros(plan.shapes[0])
         if k in states and sensor in plan.measured.sensors:
             i = plan.measured.sensors.index(sensor)
             read = states[k] @ body.C[plan.measured.column[i]]
             keep = math.exp(-float(plan.run.drive.time[1] - plan.run.drive.time[0]) / seconds)
             followed, _ = lfilter([1.0 - keep], [1.0, -keep], read, zi=[keep * read[0]])
             T[:, i] = plan.measured.mean_of @ (followed - read)
-        parts.append(np.concatenate([T.ravel(), w.ravel()]) / seconds)
+        parts.append(_numbers(plan, T) / seconds)
     return np.concatenate(parts)
 
 

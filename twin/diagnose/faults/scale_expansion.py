@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, single
+from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Described, Family, Fault, as_found
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
@@ -24,16 +23,12 @@ class Scale(Fault):
         return replace(d, place=spot.owner, settings={"part": spot.partner})
 
 
-SCALE = Scale(
-    "scale_expansion", "scale", "1/K", least=3e-7, own=0.12, read=True, lasts=True,
-    largest=5e-5,  # 1/K: twice that of aluminium
+FAULTS = (
+    Scale(
+        "scale_expansion", "scale", "1/K", least=3e-7, own=0.12, read=True, lasts=True,
+        largest=5e-5,  # 1/K: twice that of aluminium
+    ),
 )  # fmt: skip
-FAULTS = (SCALE,)
-
-
-def batches(context: Context) -> list[Batch]:
-    """Every axis with every part."""
-    return single(context, SCALE)
 
 
 def edit(cause: Cause, study: Study) -> Effect:
@@ -49,6 +44,6 @@ FAMILY = Family(
     11, "scale_expansion", "Encoder scale grows, and the description does not know",
     "A scale or a screw as scale grows with its part: the error grows with the position.",
     "-a (T_scale - T_ref) position", "TCP error linear in an axis position, with a part's temperature",
-    "0.3 um/(m K)", "either", "every axis with every part", "machine", batches,
+    "0.3 um/(m K)", "either", "every axis with every part", "machine", Singly(FAULTS),
     what="growth of a scale that the description lacks", edit=edit,
 )  # fmt: skip

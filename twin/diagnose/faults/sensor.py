@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, called
+from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
 from twin.diagnose.faults.readings import lagged
 from twin.diagnose.model.bank import Nominal
@@ -27,24 +26,22 @@ class Lag(Fault):
 
 
 FAULTS = (
-    Fault("sensor", "offset", "K", "sensors.", 0, 0.15, 100.0, read=True),  # K: a converter at its rail
-    Fault("sensor", "drift", "K/day", "sensors.", 0, 0.1, 20.0, read=True),
-    Lag("sensor", "lag", "s", "sensors.", 1, 120.0, 7200.0, read=True, curved=True, sizes=(600.0, 1800.0, 5400.0)),
+    # K: a converter at its rail
+    Fault("sensor", "offset", "K", "sensors.", 0, 0.15, 100.0, read=True, called="offset"),
+    Fault("sensor", "drift", "K/day", "sensors.", 0, 0.1, 20.0, read=True, called="drift"),
+    Lag(
+        "sensor", "lag", "s", "sensors.", 1, 120.0, 7200.0, read=True, curved=True, sizes=(600.0, 1800.0, 5400.0),
+        called="lag",
+    ),
     # all of the reading is the air's; half as much again for the error of a fit
-    Fault("sensor", "detached", "1", "sensors.", 1, 0.05, 1.5, read=True),
-    Fault("sensor", "swapped", "1", "sensors.", 1, 0.0, fixed=True, read=True, exchanges=True),
-)
-
-
-def batches(context: Context) -> list[Batch]:
-    """Offset, drift, lag, lost contact of every sensor; every pair swapped."""
-    return [batch for fault in FAULTS for batch in called(context, fault, fault.kind)]
-
+    Fault("sensor", "detached", "1", "sensors.", 1, 0.05, 1.5, read=True, called="detached"),
+    Fault("sensor", "swapped", "1", "sensors.", 1, 0.0, fixed=True, read=True, exchanges=True, called="swapped"),
+)  # fmt: skip
 
 FAMILY = Family(
     9, "sensor", "A temperature sensor is at fault",
     "Offset, drift, lag, contact to the part lost, stuck, or two sensors swapped. The machine model is left alone.",
     "y + a;  a t;  filter;  (1 - w) y + w T_air", "one channel only: neighbours and TCP agree with the model",
-    "0.15 K, 0.1 K/day, 2 min, 5 %", "either", "every sensor; every pair", "sensor", batches,
+    "0.15 K, 0.1 K/day, 2 min, 5 %", "either", "every sensor; every pair", "sensor", Singly(FAULTS),
     what="a temperature sensor at fault", channel=True, kind_told=True,
 )  # fmt: skip

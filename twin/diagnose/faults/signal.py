@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, called
+from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Described, Family, Fault
 from twin.diagnose.faults.readings import late
 from twin.diagnose.model.bank import Nominal
@@ -41,18 +40,13 @@ class Clock(Fault):
         return size * late(study, {k: states(k) for k in own}, size)
 
 
-SIGNAL = Factor("signal", "signal", "1", "signals.", 1, 0.0, fixed=True, corrects=True)
+SIGNAL = Factor("signal", "signal", "1", "signals.", 1, 0.0, fixed=True, corrects=True, called="factor")
 CLOCK = Clock(
-    "signal", "clock", "s", "runs.", 0, 30.0, read=True, curved=True,
+    "signal", "clock", "s", "runs.", 0, 30.0, read=True, curved=True, called="clock",
     sizes=(-3600.0, -1200.0, -400.0, 400.0, 1200.0, 3600.0),
     largest=43200.0,  # s: half a day
 )  # fmt: skip
 FAULTS = (SIGNAL, CLOCK)
-
-
-def batches(context: Context) -> list[Batch]:
-    """Exact factors of load signals; the clock of each run."""
-    return [*called(context, SIGNAL, "factor"), *called(context, CLOCK, "clock")]
 
 
 def editable(cause: Cause) -> bool:
@@ -65,6 +59,6 @@ FAMILY = Family(
     "Peak logged as rms, line as phase current, 1/s as 1/min, or a clock that is off.",
     "u_k times an exact factor;  y(t - a)", "an exact factor in everything that reads the signal; a shift of all",
     "an exact factor; 0.5 min", "-", "every load signal with factors 2, sqrt 2, sqrt 3, 60; the clock of every run",
-    "signal", batches, what="a logged signal at fault", channel=True, kind_told=True,
+    "signal", Singly(FAULTS), what="a logged signal at fault", channel=True, kind_told=True,
     editable=editable,
 )  # fmt: skip

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, single
+from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
 from twin.diagnose.faults.readings import play
 from twin.diagnose.model.bank import Nominal
@@ -30,21 +29,16 @@ class Slip(Fault):
         return size * play(one, nominal, self.bare(name), abs(size))
 
 
-SLIP = Slip(
-    "slip", "slip", "m", "tcp.", 1, 1e-6, own=0.12, read=True, curved=True, lasts=True,
-    sizes=(1e-6, 2e-6, 6e-6, 9e-6, 13e-6, 20e-6), largest=1e-4,
+FAULTS = (
+    Slip(
+        "slip", "slip", "m", "tcp.", 1, 1e-6, own=0.12, read=True, curved=True, lasts=True,
+        sizes=(1e-6, 2e-6, 6e-6, 9e-6, 13e-6, 20e-6), largest=1e-4,
+    ),
 )  # fmt: skip
-FAULTS = (SLIP,)
-
-
-def batches(context: Context) -> list[Batch]:
-    """Every TCP component."""
-    return single(context, SLIP)
-
 
 FAMILY = Family(
     13, "slip", "A support or anchor slips",
     "Friction in a support holds the structure back until it slips: heating and cooling take different paths.",
     "play(w_thermal)", "displacement lags its own reversal by a fixed width; temperatures fit", "1 um", "positive",
-    "every TCP component", "reading", batches, what="a fixing that slips",
+    "every TCP component", "reading", Singly(FAULTS), what="a fixing that slips",
 )  # fmt: skip

@@ -59,8 +59,7 @@ def batches(context: Context) -> list[Batch]:
             if (np.abs(weights).sum(axis=1) > 0).all():
                 histories.append(History(bells.name(bell, runs), weights, windows=windows, bell=bell))
     rows = [(p.name, list(context.elements.heat_blocks[p.name])) for p in context.outer]
-    areas = [SOLAR * p.area for p in context.outer]
-    return [SUN.batch(rows, histories, areas)] if histories and rows else []
+    return SUN.batches(rows, histories, [SOLAR * p.area for p in context.outer])
 
 
 FAMILY = Family(

@@ -29,27 +29,9 @@ from twin.diagnose.faults.fault import Family, Fault
 from twin.rom.parameter import Parameter
 
 _FILES = (
-    film_gain,
-    forced_convection,
-    heat_source,
-    loss_law,
-    joint,
-    zone,
-    sun,
-    coolant,
-    sensor,
-    signal,
-    scale_expansion,
-    expansion,
-    slip,
-    capacity,
-    initial_state,
-    coarse_model,
-    measurement,
-    misplaced_source,
-    not_thermal,
-    missing_member,
-)
+    film_gain, forced_convection, heat_source, loss_law, joint, zone, sun, coolant, sensor, signal, scale_expansion,
+    expansion, slip, capacity, initial_state, coarse_model, measurement, misplaced_source, not_thermal, missing_member,
+)  # fmt: skip
 FAMILIES: tuple[Family, ...] = tuple(file.FAMILY for file in _FILES)
 FAULTS: dict[tuple[str, str], Fault] = {(f.family, f.kind): f for file in _FILES for f in file.FAULTS}
 OF_KIND: dict[str, Fault] = {f.kind: f for f in reversed(FAULTS.values())}  # the first of each

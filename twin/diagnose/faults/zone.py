@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, alone, always, of_stretches, stretches
-from twin.diagnose.faults.elements import Elements, pivot
-from twin.diagnose.faults.fault import Described, Family, Fault, Unit, forced
+from twin.diagnose.faults.context import Context, always, of_stretches, single, stretches
+from twin.diagnose.faults.elements import pivot
+from twin.diagnose.faults.fault import Described, Family, Fault, Slot
 from twin.diagnose.model.integration import INNER
-from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 
 WARMEST = 20.0  # K: a hall in winter with its door open
@@ -21,17 +20,17 @@ WARMEST = 20.0  # K: a hall in winter with its door open
 class Air(Fault):
     """All air of an environment."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        environments = [e.name for e in study.probed.base.load_model.environments]
-        slots.environment[:, :, s, environments.index(unit.place)] = unit.shapes[k].reshape(-1, INNER)
+    def fill(self, slot: Slot) -> None:
+        environments = [e.name for e in slot.study.probed.base.load_model.environments]
+        slot.slots.environment[:, :, slot.s, environments.index(slot.unit.place)] = slot.shape.reshape(-1, INNER)
 
 
 @dataclass(frozen=True)
 class Zone(Fault):
     """The air at one film."""
 
-    def fill(self, slots: Slots, s: int, unit: Unit, k: int, study: Study, elements: Elements) -> None:
-        forced(slots, s, elements.vectors[k][elements.columns[unit.column].vector], unit.shapes[k])
+    def fill(self, slot: Slot) -> None:
+        slot.force(slot.vector, slot.shape)
 
 
 @dataclass(frozen=True)
@@ -57,13 +56,8 @@ FAULTS = (*SWITCHED, GRADIENT)
 def batches(context: Context) -> list[Batch]:
     """Air of environments and films, draughts, gradients: always and in every window."""
     histories = of_stretches([always(context), *stretches(context)])
-    result = []
-    for fault in SWITCHED:
-        rows = [(p, list(c)) for (k, p), c in context.elements.block_of.items() if k == fault.kind]
-        if rows:
-            result.append(fault.batch(rows, histories))
-    gradients = [(p, [c]) for p, _, c in context.named("gradient")]
-    return [*result, GRADIENT.batch(gradients, (alone(context, "always"),))] if gradients else result
+    switched = [batch for fault in SWITCHED for batch in fault.batches(context.blocks(fault), histories)]
+    return [*switched, *single(context, GRADIENT)]
 
 
 FAMILY = Family(
