@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-import matplotlib
 import numpy as np
 
-from twin.diagnose.report.pictures import (
-    DELIVERED,
-    EXTENDED,
-    PAGE_RC,
-    RECALIBRATED,
-    RESIDUAL_MAP,
-    Picture,
-    short,
-    write_values,
-)
+from twin.diagnose.report import pictures
+from twin.diagnose.report.pictures import DELIVERED, EXTENDED, RECALIBRATED, Picture, drawing, short, without
 from twin.diagnose.report.text import history_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Rival
 from twin.diagnose.result.numbers import size_words
-from twin.pictures.style import INK, figure
+from twin.pictures.style import INK
 
 CANDIDATES = 15
 PULLS = 40
@@ -34,8 +25,7 @@ def nulls_picture(d: Diagnosis) -> Picture | None:
     seen = {f: d.observed[f] / _threshold(d, f) for f in families if np.isfinite(d.observed.get(f, np.nan))}
     families.sort(key=lambda f: -seen.get(f, 0.0))
     shown = [0.5, *seen.values()]
-    with matplotlib.rc_context(PAGE_RC):
-        fig = figure(11.0, 1.4 + 0.3 * len(families))
+    with drawing(1.4 + 0.3 * len(families)) as fig:
         axes = fig.subplots()
         for row, family in enumerate(families):
             values = np.asarray(d.nulls.get(family, []), dtype=float)
@@ -79,8 +69,7 @@ def candidates_picture(d: Diagnosis) -> Picture | None:
     if not these:
         return None
     largest = max(max(r.statistic for r in these), 1e-9)
-    with matplotlib.rc_context(PAGE_RC):
-        fig = figure(11.0, 1.0 + 0.36 * len(these))
+    with drawing(1.0 + 0.36 * len(these)) as fig:
         axes = fig.subplots()
         for row, r in enumerate(these):
             above = r.statistic > _threshold(d, r.family)
@@ -117,11 +106,10 @@ def cosine_picture(d: Diagnosis) -> Picture | None:
     if n < 2:
         return None
     cosine = cosine[:n, :n]
-    with matplotlib.rc_context(PAGE_RC | {"axes.grid": False}):
-        fig = figure(11.0, 1.0 + 0.36 * n)
+    with drawing(1.0 + 0.36 * n, grid=False) as fig:
         axes = fig.subplots()
-        image = axes.imshow(cosine, cmap=RESIDUAL_MAP, vmin=-1, vmax=1, aspect="auto")
-        write_values(axes, cosine, 1.0, ".2f")
+        image = axes.imshow(cosine, cmap=pictures.RESIDUAL_MAP, vmin=-1, vmax=1, aspect="auto")
+        pictures.write_values(axes, cosine, 1.0, ".2f")
         axes.set_xticks(range(n), [str(k + 1) for k in range(n)])
         axes.set_yticks(range(n), [labelled(k, r) for k, r in enumerate(d.ranked[:n])], fontsize=8)
         fig.colorbar(image, ax=axes, label="cosine", pad=0.01)
@@ -138,8 +126,7 @@ def pulls_picture(d: Diagnosis) -> Picture | None:
     these = sorted((p for p in d.pulls if np.isfinite(p.pull)), key=lambda p: -abs(p.pull))[:PULLS]
     if not these:
         return None
-    with matplotlib.rc_context(PAGE_RC):
-        fig = figure(11.0, 1.0 + 0.2 * len(these))
+    with drawing(1.0 + 0.2 * len(these)) as fig:
         axes = fig.subplots()
         colours = [EXTENDED if abs(p.pull) > 3 else "#e69f00" if abs(p.pull) > 2 else RECALIBRATED for p in these]
         axes.barh(range(len(these)), [p.pull for p in these], color=colours, height=0.65)
@@ -156,11 +143,9 @@ def pulls_picture(d: Diagnosis) -> Picture | None:
         axes.set_xlabel(
             "pull: distance from what was declared, in its standard deviations (thin line: posterior ±1 sigma)"
         )
-    left_out = len(d.pulls) - len(these)
     return Picture(
         "Pulls of the declared parameters",
         "A bar beyond the dashed lines (±2) deserves a look, beyond the solid ones (±3) the declared value or its "
-        "tolerance is wrong, or the fit hides an effect in it"
-        + (f" ({left_out} smaller ones are left out)." if left_out else "."),
+        "tolerance is wrong, or the fit hides an effect in it" + without(len(d.pulls) - len(these), "smaller ones"),
         fig,
     )

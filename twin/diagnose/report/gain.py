@@ -1,4 +1,4 @@
-"""Pictures of what the extended model brings on the sealed run, and of heat that nothing explains."""
+"""Pictures of what was measured beside the models: gain on the sealed run, every channel, unexplained heat."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import matplotlib
 import numpy as np
 
-from twin.diagnose.report.pictures import DELIVERED, EXTENDED, PAGE_RC, STAGES, Picture, short
+from twin.diagnose.report.pictures import DELIVERED, EXTENDED, PAGE_RC, STAGES, Picture, drawing, short, without
 from twin.diagnose.report.residuals import loudest
 from twin.diagnose.result.diagnosis import Diagnosis, Gain, Series
-from twin.pictures.style import INK, figure
+from twin.pictures.channels import CAPTION, channel_figure
+from twin.pictures.style import INK
 
 CHANNELS = 30
 
@@ -28,8 +29,7 @@ def gain_picture(d: Diagnosis, run: str) -> Picture | None:
     if not groups:
         return None
     rows = max(len(gains) for _, _, gains in groups)
-    with matplotlib.rc_context(PAGE_RC):
-        fig = figure(11.0, 1.4 + 0.22 * rows)
+    with drawing(1.4 + 0.22 * rows) as fig:
         panels = fig.subplots(1, len(groups), squeeze=False)[0]
         for axes, (label, scale, gains) in zip(panels, groups, strict=True):
             y = np.arange(len(gains))
@@ -48,7 +48,7 @@ def gain_picture(d: Diagnosis, run: str) -> Picture | None:
     return Picture(
         f"Gain per channel on the sealed run {run}",
         "What each model leaves of a channel, noise included, further left is better; * marks the channels that the "
-        "causes move" + (f" ({left_out} quieter channels are left out)." if left_out else "."),
+        "causes move" + without(left_out, "quieter channels"),
         fig,
     )
 
@@ -107,8 +107,7 @@ def overlay_picture(d: Diagnosis, s: Series) -> Picture | None:
         return None
     columns = 2 if len(channels) > 1 else 1
     rows = -(-len(channels) // columns)
-    with matplotlib.rc_context(PAGE_RC):
-        fig = figure(11.0, 0.6 + 2.0 * rows)
+    with drawing(0.6 + 2.0 * rows) as fig:
         panels = fig.subplots(rows, columns, squeeze=False).ravel()
         for axes, channel in zip(panels, channels, strict=False):
             for (stage, colour), residual, style in zip(STAGES, channel.residuals, ("-", "--", "-"), strict=True):
@@ -134,6 +133,14 @@ def overlay_picture(d: Diagnosis, s: Series) -> Picture | None:
     )
 
 
+def channels_picture(d: Diagnosis) -> Picture | None:
+    """Every measured channel beside the extended model, a panel each; sealed runs come last."""
+    if not d.traces:
+        return None
+    with matplotlib.rc_context(PAGE_RC):
+        return Picture("Channels: measured and computed", CAPTION, channel_figure(d.traces))
+
+
 def unknown_picture(d: Diagnosis) -> Picture | None:
     """The unexplained heat over time with its 95 % band, a panel per run."""
     if d.unknown is None:
@@ -141,8 +148,7 @@ def unknown_picture(d: Diagnosis) -> Picture | None:
     runs = [(name, np.array(h, dtype=float)) for name, h in d.unknown.history.items() if len(h[0])]
     if not runs:
         return None
-    with matplotlib.rc_context(PAGE_RC):
-        fig = figure(11.0, 0.5 + 2.1 * len(runs))
+    with drawing(0.5 + 2.1 * len(runs)) as fig:
         panels = fig.subplots(len(runs), 1, squeeze=False, sharey=True)[:, 0]
         for axes, (name, (time, heat, sigma)) in zip(panels, runs, strict=True):
             hours = time / 3600.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Iterable, Mapping
@@ -13,23 +14,14 @@ from typing import Any
 import numpy as np
 
 from twin.atomic import atomic_path, check_folder
-from twin.diagnose.report.channels import channels_picture, channels_table
+from twin.diagnose.report import tables
 from twin.diagnose.report.evidence import candidates_picture, cosine_picture, nulls_picture, pulls_picture
-from twin.diagnose.report.gain import gain_picture, overlay_picture, unknown_picture
+from twin.diagnose.report.gain import channels_picture, gain_picture, overlay_picture, unknown_picture
 from twin.diagnose.report.pictures import Picture, inline_svg, rms
 from twin.diagnose.report.place import place_picture
 from twin.diagnose.report.plan import plan_section
 from twin.diagnose.report.residuals import RUNS, by_load_state, residual_map, whiteness_picture
 from twin.diagnose.report.style import STYLE
-from twin.diagnose.report.tables import (
-    causes_table,
-    families_table,
-    gain_table,
-    limits_table,
-    pulls_table,
-    rivals_table,
-    table,
-)
 from twin.diagnose.report.text import (
     beyond,
     cause_evidence,
@@ -128,17 +120,10 @@ class Section:
 
 def page(d: Diagnosis) -> str:
     """The whole page."""
-    count = 0
+    numbers = itertools.count(1)
 
     def show(*pictures: Picture | None) -> str:
-        nonlocal count
-        shown = []
-        for picture in pictures:
-            if picture is None:
-                continue
-            count += 1
-            shown.append(_figure(picture, f"p{count}"))
-        return "\n".join(shown)
+        return "\n".join(_figure(picture, f"p{next(numbers)}") for picture in pictures if picture is not None)
 
     place = show(place_picture(d))
     sections = [
@@ -146,7 +131,7 @@ def page(d: Diagnosis) -> str:
         Section("plan", "The next experiment", plan_section(d.plan)),
         Section("gain", "Gain on the sealed run", *_gain(d, show)),
         Section("residuals", "Residuals", folded=_residuals(d, show)),
-        Section("channels", "Channels", folded=channels_table(d) + show(channels_picture(d))),
+        Section("channels", "Channels", folded=tables.channels_table(d) + show(channels_picture(d))),
         Section("decision", "How it was decided", folded=_decision(d, show)),
         Section("pulls", "Pulls", folded=_pulls(d, show)),
         Section("unknown", "Heat that nothing explains", *_unknown(d, show)),
@@ -191,25 +176,20 @@ def _items(texts: Iterable[str]) -> str:
 def _evidence(d: Diagnosis) -> str:
     parts = []
     if d.causes:
-        parts.append(causes_table(d.causes))
-        parts.append(_items(f"{place_words(c.place)}, {what(c.family)}: {cause_evidence(d, c)}" for c in d.causes))
+        told = _items(f"{place_words(c.place)}, {what(c.family)}: {cause_evidence(d, c)}" for c in d.causes)
+        parts += [tables.causes_table(d.causes), told]
     if d.unknown:
         parts.append(_items([evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold)]))
     if d.verdict == "out_of_tolerance":
         parts.append(_items(_pull_sentences(d)))
     if not parts:
-        best = max((k for k in d.observed if d.thresholds.get(k, 0) > 0), default=None,
-                   key=lambda k: d.observed[k] / d.thresholds[k])  # fmt: skip
-        withdrawn = d.verdict == "unknown"
-        parts.append(
-            "<p>The sealed run refuted what was named.</p>" if withdrawn
-            else "<p>No family of causes passes its threshold.</p>"
-        )  # fmt: skip
-        if best:
+        withdrawn, none = "The sealed run refuted what was named.", "No family of causes passes its threshold."
+        parts.append(f"<p>{withdrawn if d.verdict == 'unknown' else none}</p>")
+        shares = {k: v / d.thresholds[k] for k, v in d.observed.items() if d.thresholds.get(k, 0) > 0}
+        if best := max(shares, key=lambda k: shares[k], default=None):
             text = evidence_sentence(d, best, d.observed[best], d.thresholds[best])
             parts.append(f"<p>{escape(f'The nearest is {what(best)}. {text}')}</p>")
-    parts += [_rivals(d)]
-    return "\n".join(parts)
+    return "\n".join([*parts, _rivals(d)])
 
 
 def _pull_sentences(d: Diagnosis) -> list[str]:
@@ -232,7 +212,7 @@ def _rivals(d: Diagnosis) -> str:
     for c in d.causes:
         if c.rivals:
             parts.append(f"<h3>{escape(f'Rivals of {what(c.family)} at {place_words(c.place)}')}</h3>")
-            parts.append(rivals_table(c.rivals, False, d))
+            parts.append(tables.rivals_table(c.rivals, False, d))
     if remedies(d):
         parts.append("<h3>What would tell them apart</h3>" + _items(remedies(d)))
     elif d.verdict == "ambiguous":
@@ -250,7 +230,7 @@ def _gain(d: Diagnosis, show: Any) -> tuple[str, str]:
     runs = sealed_runs(d)
     told = f"Run {runs[0]} was" if len(runs) == 1 else f"Runs {', '.join(runs)} were"
     head = f"<p>{escape(f'{told} opened once, after everything was decided.')}</p>"
-    return head + _items(gain_sentences(d)), pictures + gain_table(d)
+    return head + _items(gain_sentences(d)), pictures + tables.gain_table(d)
 
 
 def _residuals(d: Diagnosis, show: Any) -> str:
@@ -267,12 +247,11 @@ def _residuals(d: Diagnosis, show: Any) -> str:
 def _decision(d: Diagnosis, show: Any) -> str:
     if not (d.observed or d.thresholds or d.ranked):
         return "<p>No candidate was tried.</p>"
-    parts = [show(nulls_picture(d)), families_table(d) if d.observed or d.thresholds else ""]
-    parts.append(show(candidates_picture(d)))
+    families = tables.families_table(d) if d.observed or d.thresholds else ""
+    parts = [show(nulls_picture(d)), families, show(candidates_picture(d))]
     if d.ranked:
-        parts.append(rivals_table(d.ranked, True, d))
-    parts.append(show(cosine_picture(d)))
-    return "\n".join(parts)
+        parts.append(tables.rivals_table(d.ranked, True, d))
+    return "\n".join([*parts, show(cosine_picture(d))])
 
 
 def _pulls(d: Diagnosis, show: Any) -> str:
@@ -280,14 +259,14 @@ def _pulls(d: Diagnosis, show: Any) -> str:
         return "<p>No declared parameter was fitted.</p>"
     if not beyond(d.pulls, 2.0) and not any(p.freed for p in d.pulls):
         return "<p>No declared parameter was pulled by more than 2 standard deviations.</p>" + show(pulls_picture(d))
-    return show(pulls_picture(d)) + pulls_table(d)
+    return show(pulls_picture(d)) + tables.pulls_table(d)
 
 
 def _unknown(d: Diagnosis, show: Any) -> tuple[str, str]:
     if d.unknown is None:
         return "", "<p>No heat remained that the catalogue does not explain.</p>"
     rows = [[name, f"{correlation:+.2f}"] for name, correlation in d.unknown.correlated_signals]
-    follows = table(["logged signal", "correlation with this heat"], rows, (1,)) if rows else ""
+    follows = tables.table(["logged signal", "correlation with this heat"], rows, (1,)) if rows else ""
     return show(unknown_picture(d)) + follows, ""
 
 
@@ -298,7 +277,7 @@ def _limits(d: Diagnosis) -> tuple[str, str]:
     text = (
         "The smallest size of each effect that would have been named in these data; smaller ones may be there unseen."
     )
-    every = f"<p>{text}</p>{limits_table(d)}"
+    every = f"<p>{text}</p>{tables.limits_table(d)}"
     if d.verdict not in ("nothing", "too_poor"):
         return "", every
     sizes = _items(map(limit_words, d.detection_limits))
@@ -309,7 +288,7 @@ def _limits(d: Diagnosis) -> tuple[str, str]:
 def _notes(d: Diagnosis) -> str:
     facts = [[str(key), _fact(value)] for key, value in d.provenance.items()]
     facts += [["catalogue", d.catalogue], ["seed", str(d.seed)]]
-    return (_items(d.notes) or "<p>Nothing was excluded or held.</p>") + table(["", ""], facts)
+    return (_items(d.notes) or "<p>Nothing was excluded or held.</p>") + tables.table(["", ""], facts)
 
 
 def _fact(value: Any) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from twin.pictures.style import INK, MUTED, RC
+from twin.pictures.style import INK, MUTED, RC, figure
 
 # The stages of a diagnosis, distinguished by every eye (Okabe-Ito), and by lightness in print.
 DELIVERED, RECALIBRATED, EXTENDED = "#8a9099", "#0072b2", "#d55e00"
@@ -47,12 +48,24 @@ class Picture:
     figure: Figure
 
 
-def inline_svg(figure: Figure, name: str) -> str:
+@contextmanager
+def drawing(height: float, grid: bool = True) -> Iterator[Figure]:
+    """A figure as wide as the page and of a height [inches], to be drawn on within the page's style."""
+    with matplotlib.rc_context(PAGE_RC | {"axes.grid": grid}):
+        yield figure(11.0, height)
+
+
+def without(count: int, what: str) -> str:
+    """The end of a caption: how many of what are left out."""
+    return f" ({count} {what} are left out)." if count else "."
+
+
+def inline_svg(drawn: Figure, name: str) -> str:
     """The figure as an <svg> for a page: ids of its own, colours of the page (light or dark), nothing from outside."""
     text = io.StringIO()
     with matplotlib.rc_context(PAGE_RC), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # the reader's browser has its own fonts
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+        drawn.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>|<style[^>]*>.*?</style>|<!--.*?-->", "", svg, flags=re.DOTALL)
@@ -95,13 +108,6 @@ def short(name: str, length: int = 28) -> str:
     return f"{name[: length // 2]}…{name[-(length - length // 2 - 1) :]}"
 
 
-def finite_max(values: np.ndarray, default: float = 0.0) -> float:
-    """Largest size of the finite values."""
-    values = np.abs(np.asarray(values, dtype=float))
-    values = values[np.isfinite(values)]
-    return float(values.max()) if values.size else default
-
-
 def rms(values: np.ndarray, axis: int = 0) -> np.ndarray:
     """Root mean square along an axis of what is finite; NaN where nothing is."""
     values = np.asarray(values, dtype=float)
@@ -118,11 +124,11 @@ def mean(values: np.ndarray, axis: int = 0) -> np.ndarray:
     return np.where(count > 0, np.where(there, values, 0.0).sum(axis=axis) / np.maximum(count, 1), np.nan)
 
 
-def colour_range(arrays: Iterable[np.ndarray], share: float = 99.0) -> float:
+def colour_range(arrays: Iterable[np.ndarray]) -> float:
     """A symmetric colour range that the few largest values may exceed."""
     values = np.concatenate([np.abs(np.asarray(a, dtype=float)).ravel() for a in arrays])
     values = values[np.isfinite(values)]
-    return max(float(np.percentile(values, share)), 1e-9) if values.size else 1.0
+    return max(float(np.percentile(values, 99.0)), 1e-9) if values.size else 1.0
 
 
 def write_values(axes: Axes, values: np.ndarray, largest: float, form: str, size: float = 7.5) -> None:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 
-from twin.diagnose.report.pictures import DELIVERED, EXTENDED, PAGE_RC, RECALIBRATED, Picture, rms, short
+from twin.diagnose.report.pictures import DELIVERED, EXTENDED, RECALIBRATED, Picture, drawing, rms, short
 from twin.diagnose.report.text import place_words
 from twin.diagnose.result.diagnosis import Diagnosis
 from twin.diagnose.result.place import Network, Scene, Shell
 from twin.diagnose.result.spot import Of, Spot
 from twin.pictures.marked import marked_view
 from twin.pictures.network import layout
-from twin.pictures.style import INK, MUTED, figure
+from twin.pictures.style import INK, MUTED
 from twin.pictures.surface import SurfaceMesh
 
 WIDTH = 620  # pixels of the machine: as wide as a column of the page shows
@@ -24,6 +23,7 @@ LEAST, MOST = 18.0, 420.0  # points^2 of a marker of no share and of all of it
 LINE = 22.0  # pixels of a line of names
 BESIDE = 0.17  # of the machine's width, for names at either side
 METRE = 1e6  # um
+COMPONENTS = ("dx", "dy", "dz")
 
 
 def place_picture(d: Diagnosis) -> Picture | None:
@@ -32,8 +32,7 @@ def place_picture(d: Diagnosis) -> Picture | None:
         return None
     shares = dict(d.support.shares) if d.support else {}
     rows = _channels(d, shares)
-    with matplotlib.rc_context(PAGE_RC | {"axes.grid": False}):
-        fig = figure(11.0, 5.2)
+    with drawing(5.2, grid=False) as fig:
         left, right = fig.subplots(1, 2, gridspec_kw={"width_ratios": [1.75, 1.0]})
         left.set_axis_off()
         if isinstance(d.scene.machine, Shell):
@@ -56,7 +55,7 @@ def _channels(d: Diagnosis, shares: dict[str, float]) -> list[tuple[str, float, 
     told = []
     for name, share in list(shares.items())[:CHANNELS]:
         before, after = _left(d, name)
-        unit, factor = ("µm", METRE) if name in ("dx", "dy", "dz") else ("K", 1.0)
+        unit, factor = ("µm", METRE) if name in COMPONENTS else ("K", 1.0)
         words = f"{factor * before:.2g} → {factor * after:.2g} {unit}" if np.isfinite(before + after) else ""
         told.append((f"TCP {name}" if unit == "µm" else name, share, words))
     return told
@@ -64,20 +63,16 @@ def _channels(d: Diagnosis, shares: dict[str, float]) -> list[tuple[str, float, 
 
 def _left(d: Diagnosis, channel: str) -> tuple[float, float]:
     """rms of a channel over all diagnosed runs, recalibrated and extended."""
-    before, after = [], []
-    for s in d.series:
-        if s.sealed:
-            continue
+    before, after = [np.zeros(0)], [np.zeros(0)]
+    for s in (s for s in d.series if not s.sealed):
         if channel in s.sensors:
             k = s.sensors.index(channel)
             before.append(s.recalibrated[:, k])
             after.append(s.extended[:, k])
-        elif channel in ("dx", "dy", "dz"):
-            k = ("dx", "dy", "dz").index(channel)
+        elif channel in COMPONENTS:
+            k = COMPONENTS.index(channel)
             before.append(s.tcp_recalibrated[:, k])
             after.append(s.tcp_extended[:, k])
-    if not before:
-        return float("nan"), float("nan")
     return float(rms(np.concatenate(before))), float(rms(np.concatenate(after)))
 
 

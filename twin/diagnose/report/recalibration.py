@@ -15,29 +15,27 @@ WHITE = 0.2  # correlation from bin to bin: two standard deviations of that of 1
 
 def moved_words(d: Diagnosis) -> str:
     """How far calibration moved the channels that it moved most, and by which parameter; empty below KELVIN, METRES."""
-    T, w = 0.0, 0.0
-    sensor, axis, run_T, run_w = "", "", "", ""
-    for s in d.series:
-        if s.sealed:
-            continue
-        of_sensors, of_tcp = (
-            np.sqrt(np.nanmean(np.square(np.where(np.isfinite(v), v, 0.0)), axis=0)) if len(v) else np.zeros(v.shape[1])
-            for v in (s.recalibrated - s.delivered, s.tcp_recalibrated - s.tcp_delivered)
-        )
-        if of_sensors.max(initial=0.0) > T:
-            T, sensor, run_T = float(of_sensors.max()), s.sensors[int(of_sensors.argmax())], s.run
-        if of_tcp.max(initial=0.0) > w:
-            w, axis, run_w = float(of_tcp.max()), f"d{'xyz'[int(of_tcp.argmax())]}", s.run
+    of_sensors, of_tcp = [(0.0, "", "")], [(0.0, "", "")]
+    for s in (s for s in d.series if not s.sealed):
+        T, w = _rms(s.recalibrated - s.delivered), _rms(s.tcp_recalibrated - s.tcp_delivered)
+        of_sensors += [(v, f"sensors.{name}", s.run) for v, name in zip(T, s.sensors, strict=True)]
+        of_tcp += [(v, f"d{axis}", s.run) for v, axis in zip(w, "xyz", strict=True)]
     said = []
-    if T > KELVIN:
-        said.append(f"sensors.{sensor} by {number(T)} K in {run_T}")
-    if w > METRES:
-        said.append(f"{axis} by {number(1e6 * w)} um in {run_w}")
+    for moved, least, factor, unit in ((of_sensors, KELVIN, 1.0, "K"), (of_tcp, METRES, 1e6, "um")):
+        size, channel, run = max(moved, key=lambda m: m[0])
+        if size > least:
+            said.append(f"{channel} by {number(factor * size)} {unit} in {run}")
     if not said:
         return ""
     most = max(d.pulls, key=_weight, default=None)
     by = f", most of it by {_value(most)}" if most is not None and _weight(most) > 0.0 else ""
     return f"first of all, the description as delivered is not right: calibration moved {' and '.join(said)} (rms){by}"
+
+
+def _rms(change: np.ndarray) -> list[float]:
+    """Of each column, what is not finite taken as no change."""
+    known = np.where(np.isfinite(change), change, 0.0)
+    return [float(v) for v in np.sqrt(np.mean(np.square(known), axis=0))] if len(change) else [0.0] * change.shape[1]
 
 
 def left_words(d: Diagnosis) -> str:

@@ -4,32 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import matplotlib
 import numpy as np
 
-from twin.diagnose.report.pictures import (
-    LOAD_MAP,
-    PAGE_RC,
-    RESIDUAL_MAP,
-    STAGES,
-    Picture,
-    colour_range,
-    finite_max,
-    mean,
-    rms,
-    short,
-    write_values,
-)
+from twin.diagnose.report import pictures
+from twin.diagnose.report.pictures import RESIDUAL_MAP, STAGES, Picture, drawing, rms, short, without
 from twin.diagnose.result.diagnosis import Diagnosis, Series
-from twin.pictures.style import INK, figure
+from twin.pictures.style import INK
 
 ROWS = 40  # sensors that a picture shows at most, those with the largest residuals
 LOADS = 10  # signals in the load strip at most
 RUNS = 6  # runs with a map of their own at most
-
-
-def _stages(series: Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return series.delivered, series.recalibrated, series.extended
+STATE_ROWS, STATES = 16, 7  # sensors and load states at most
 
 
 def loudest(series: Series, rows: int = ROWS) -> list[int]:
@@ -74,13 +59,13 @@ def residual_map(series: Series) -> Picture | None:
     chosen = loudest(series)
     hours = np.asarray(series.time, dtype=float) / 3600.0
     names, loads = load_rows(series.loads)
-    largest = colour_range(a[:, chosen] for a in _stages(series))
-    with matplotlib.rc_context(PAGE_RC | {"axes.grid": False}):
-        heights = [max(1.6, 0.17 * len(chosen)), max(0.35, 0.17 * len(names))]
-        fig = figure(11.0, sum(heights) + 1.1)
+    stages = (series.delivered, series.recalibrated, series.extended)
+    largest = pictures.colour_range(a[:, chosen] for a in stages)
+    heights = [max(1.6, 0.17 * len(chosen)), max(0.35, 0.17 * len(names))]
+    with drawing(sum(heights) + 1.1, grid=False) as fig:
         panels = fig.subplots(2 if names else 1, 3, squeeze=False, sharex=True, sharey="row",
                               gridspec_kw={"height_ratios": heights if names else heights[:1]})  # fmt: skip
-        for k, ((stage, _), residual) in enumerate(zip(STAGES, _stages(series), strict=True)):
+        for k, ((stage, _), residual) in enumerate(zip(STAGES, stages, strict=True)):
             axes = panels[0, k]
             edges, rows = with_gaps(hours, np.asarray(residual, dtype=float)[:, chosen])
             image = axes.pcolormesh(
@@ -92,7 +77,7 @@ def residual_map(series: Series) -> Picture | None:
             if names and k == 0:  # one strip for all stages: their loads are the same
                 edges, rows = with_gaps(hours, loads.T)
                 panels[1, k].pcolormesh(
-                    edges, np.arange(len(names) + 1), rows.T, cmap=LOAD_MAP, vmin=0, vmax=1, rasterized=True
+                    edges, np.arange(len(names) + 1), rows.T, cmap=pictures.LOAD_MAP, vmin=0, vmax=1, rasterized=True
                 )
             elif names:
                 panels[1, k].set_axis_off()
@@ -104,12 +89,11 @@ def residual_map(series: Series) -> Picture | None:
             panels[1, 0].set_yticks(np.arange(len(names)) + 0.5, [short(name) for name in names], fontsize=7.5)
             panels[1, 0].set_ylim(len(names), 0)
         fig.colorbar(image, ax=panels[0, :].tolist(), label="measured - simulated in K", aspect=15, pad=0.01)
-    left_out = len(series.sensors) - len(chosen)
     return Picture(
         f"Residuals of {series.run}" + (" (sealed: no value was fitted to it)" if series.sealed else ""),
         "Orange: the machine is warmer than the simulation, blue: colder, grey: no data; what switches with a "
         "row of the strip at the left (dark: large) follows that load, and a good model leaves a pale map"
-        + (f" ({left_out} sensors with smaller residuals are left out)." if left_out else "."),
+        + without(len(series.sensors) - len(chosen), "sensors with smaller residuals"),
         fig,
     )
 
@@ -141,7 +125,7 @@ def on_masks(loads: Mapping[str, np.ndarray], bins: int) -> dict[str, np.ndarray
     return result
 
 
-def by_load_state(series: Sequence[Series], rows: int = 16, states: int = 7) -> Picture | None:
+def by_load_state(series: Sequence[Series]) -> Picture | None:
     """Mean residual per sensor and load state of the longest run that has several, as delivered and extended."""
     best, masks = None, dict[str, np.ndarray]()
     for s in series:
@@ -150,16 +134,16 @@ def by_load_state(series: Sequence[Series], rows: int = 16, states: int = 7) -> 
             best, masks = s, found
     if best is None:
         return None
-    chosen = loudest(best, rows)
-    names = list(masks)[:states]
-    shown = [np.stack([mean(a[masks[n]][:, chosen]) for n in names], axis=1) for a in (best.delivered, best.extended)]
-    largest = max(finite_max(a) for a in shown) or 1.0
-    with matplotlib.rc_context(PAGE_RC | {"axes.grid": False}):
-        fig = figure(11.0, 1.9 + 0.23 * len(chosen))
+    chosen = loudest(best, STATE_ROWS)
+    names = list(masks)[:STATES]
+    stages = (best.delivered, best.extended)
+    shown = [np.stack([pictures.mean(a[masks[n]][:, chosen]) for n in names], axis=1) for a in stages]
+    largest = max(float(np.nanmax(np.abs(a), initial=0.0)) for a in shown) or 1.0
+    with drawing(1.9 + 0.23 * len(chosen), grid=False) as fig:
         panels = fig.subplots(1, 2, sharey=True)
         for axes, title, values in zip(panels, ("as delivered", "extended"), shown, strict=True):
             image = axes.imshow(values, cmap=RESIDUAL_MAP, vmin=-largest, vmax=largest, aspect="auto")
-            write_values(axes, values, largest, "+.2f", 7.0)
+            pictures.write_values(axes, values, largest, "+.2f", 7.0)
             labels = [short(n, 26) for n in names]
             axes.set_xticks(range(len(names)), labels, rotation=25, ha="right", rotation_mode="anchor", fontsize=8)
             axes.set_title(title)
@@ -173,17 +157,16 @@ def by_load_state(series: Sequence[Series], rows: int = 16, states: int = 7) -> 
     )
 
 
-def whiteness_picture(d: Diagnosis, rows: int = ROWS) -> Picture | None:
+def whiteness_picture(d: Diagnosis) -> Picture | None:
     """Lag-1 correlation per channel before and after; None without a channel."""
     channels = [(c, b, a) for c, b, a in d.whiteness if np.isfinite(b) or np.isfinite(a)]
-    channels = sorted(channels, key=lambda w: -np.nan_to_num(w[1], nan=-2.0))[:rows]
+    channels = sorted(channels, key=lambda w: -np.nan_to_num(w[1], nan=-2.0))[:ROWS]
     if not channels:
         return None
     bins = max((len(s.time) for s in d.series), default=0)
     y = np.arange(len(channels))
     before, after = (np.array([w[k] for w in channels], dtype=float) for k in (1, 2))
-    with matplotlib.rc_context(PAGE_RC):
-        fig = figure(11.0, 1.3 + 0.19 * len(channels))
+    with drawing(1.3 + 0.19 * len(channels)) as fig:
         axes = fig.subplots()
         if bins > 4:
             axes.axvspan(-2 / bins**0.5, 2 / bins**0.5, color=STAGES[0][1], alpha=0.25, lw=0, label="white noise")
@@ -197,10 +180,9 @@ def whiteness_picture(d: Diagnosis, rows: int = ROWS) -> Picture | None:
         axes.set_xlabel("correlation of the residual with itself one bin later")
         axes.set_title("Is what is left only noise?")
         fig.legend(loc="outside right upper")
-    left_out = len(d.whiteness) - len(channels)
     return Picture(
         "Whiteness before and after",
         "Near 1 the residual has a shape that a model could still explain, within the grey band it is noise; the "
-        "causes should move the dots to the left" + (f" ({left_out} more channels are left out)." if left_out else "."),
+        "causes should move the dots to the left" + without(len(d.whiteness) - len(channels), "more channels"),
         fig,
     )

@@ -49,6 +49,17 @@ def when(cause: Cause) -> str:
     return "; ".join([history_words(cause.history) or "always", *parts])
 
 
+def channels_table(d: Diagnosis) -> str:
+    """How every channel is met and what of it counted: those with something wrong first, then those met worst."""
+    order = sorted(d.channels, key=lambda r: (not (r["wrong"] or r["leaps"]), r["kept"] >= 0.9, -(r["rms"] or 0.0)))
+    rows = []
+    for r in order:
+        rms = "-" if r["rms"] is None else f"{r['rms']:.3f} K" if r["unit"] == "K" else f"{1e6 * r['rms']:.2f} um"
+        rows.append([r["channel"], r["run"], rms, f"{100 * r['kept']:.0f} %", str(r["leaps"]), r["wrong"]])
+    head = ["channel", "run", "rms that is left", "kept", "leaps", "what is wrong"]
+    return table(head, rows, (2, 3, 4)) if rows else ""
+
+
 def causes_table(causes: Sequence[Cause]) -> str:
     rows = []
     for k, c in enumerate(causes):
@@ -69,18 +80,9 @@ def rivals_table(rivals: Sequence[Rival], thresholds: bool, d: Diagnosis) -> str
         row = [str(k + 1), what(r.family), place_words(r.place), history_words(r.history) or "always", size, interval]
         row += [number(r.statistic)] + ([number(d.thresholds.get(r.family, math.nan))] if thresholds else [])
         rows.append([*row, f"{r.cosine:.2f}" if math.isfinite(r.cosine) else "-"])
-    head = [
-        "",
-        "what",
-        "where",
-        "when",
-        "size",
-        "95 % interval",
-        "statistic",
-        *(["needed"] if thresholds else []),
-        "cosine",
-    ]
-    return table(head, rows, (4, 5, 6, 7, 8) if thresholds else (4, 5, 6, 7))
+    needed = ["needed"] if thresholds else []
+    head = ["", "what", "where", "when", "size", "95 % interval", "statistic", *needed, "cosine"]
+    return table(head, rows, range(4, len(head)))
 
 
 def limits_table(d: Diagnosis) -> str:
@@ -109,17 +111,9 @@ def gain_table(d: Diagnosis) -> str:
         sizes = [quantity(v, g.unit) for v in (g.delivered, g.recalibrated, g.extended)]
         run = [g.run] if several else []
         rows.append([*run, g.channel, *sizes, interval, sure, "yes" if g.affected else "no"])
-    head = [
-        *(["sealed run"] if several else []),
-        "channel",
-        "as delivered",
-        "recalibrated",
-        "extended",
-        "gain over recalibrated (95 %)",
-        "",
-        "causes move it",
-    ]
-    return table(head, rows, tuple(k + several for k in (1, 2, 3, 4)))
+    run, gain = ["sealed run"] if several else [], "gain over recalibrated (95 %)"
+    head = [*run, "channel", "as delivered", "recalibrated", "extended", gain, "", "causes move it"]
+    return table(head, rows, range(1 + several, 5 + several))
 
 
 def pulls_table(d: Diagnosis) -> str:
