@@ -18,8 +18,7 @@ from twin.build.places import beside
 from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.model.integration import INNER
 from twin.diagnose.model.slots import Slots
-from twin.diagnose.model.sources import heated_places, own_place
-from twin.diagnose.model.study import Study
+from twin.diagnose.model.study import Study, heated_places, own_place
 from twin.diagnose.result.spot import Spot
 from twin.machine.description import Machine
 from twin.run.system import Array

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from twin.diagnose.evidence import bells
-from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.batch import History, Hypothesis
 from twin.diagnose.faults.elements import Elements
 from twin.diagnose.faults.fault import Slot, Unit
 from twin.diagnose.faults.table import fault_of
@@ -23,49 +23,38 @@ def units_of(study: Study, h: Hypothesis) -> tuple[Unit, ...]:
 
     Histories of logged signals and the sun go on in the sealed run; windows are there only where the hypothesis lasts.
     """
-    return fault_of(h).units(h, lambda which: _shapes(study, h, which))
+    runs = range(len(study.runs))
+    return fault_of(h).units(h, lambda which: tuple(_shape(study, h.when, which, k) for k in runs))
 
 
-def _shapes(study: Study, h: Hypothesis, which: int) -> tuple[np.ndarray, ...]:
-    """Of the amplitude `which`."""
-    when = h.when
-    result = []
-    for k, planned in enumerate(study.runs):
-        run = planned.run
-        n = run.drive.n_steps
-        if when.windows:
-            shape, t = np.zeros(n), np.asarray(run.drive.time)
-            if when.bell is not None:  # an amplitude per run, the mean of them in others
-                middle = (t[:-1] + t[1:]) / 2 - t[0]
-                if k == study.fitted[which]:
-                    shape = when.bell.level(middle, which)
-                elif k not in study.fitted:
-                    shape = bells.level(middle, when.bell.middle, when.bell.length) / len(study.fitted)
-            else:
-                for w in when.windows:
-                    if w.run == run.name:
-                        within = np.clip(np.minimum(t[1:], w.end) - np.maximum(t[:-1], w.start), 0.0, None)
-                        shape += w.level * within / (t[1] - t[0])
-            if when.bell is None and k not in study.fitted and _lasts(study, when.windows):
-                shape[:] = 1.0
-        elif when.signal:
-            values = run.signals.get(when.signal)
-            shape = np.zeros(n) if values is None else np.abs(values / when.reference) ** when.exponent
-        else:
-            shape = np.ones(n)
-        result.append(shape)
-    return tuple(result)
+def _shape(study: Study, when: History, which: int, k: int) -> np.ndarray:
+    """(n_fine,) of the amplitude `which` in run k."""
+    run = study.runs[k].run
+    n, t, fitted = run.drive.n_steps, np.asarray(run.drive.time), k in study.fitted
+    if when.bell is not None:  # an amplitude per run, the mean of them in others
+        middle = (t[:-1] + t[1:]) / 2 - t[0]
+        if not fitted:
+            return np.asarray(bells.level(middle, when.bell.middle, when.bell.length) / len(study.fitted))
+        return when.bell.level(middle, which) if k == study.fitted[which] else np.zeros(n)
+    if when.signal:
+        values = run.signals.get(when.signal)
+        return np.zeros(n) if values is None else np.asarray(np.abs(values / when.reference) ** when.exponent)
+    if not when.windows or (not fitted and _lasts(study, when.windows)):
+        return np.ones(n)
+    shape = np.zeros(n)
+    for w in when.windows:
+        if w.run == run.name:
+            within = np.clip(np.minimum(t[1:], w.end) - np.maximum(t[:-1], w.start), 0.0, None)
+            shape += w.level * within / (t[1] - t[0])
+    return shape
 
 
 def _lasts(study: Study, windows: Sequence[Window]) -> bool:
     """Whether windows end with the last fitted run: the cause has come to stay."""
     last = study.runs[study.fitted[-1]].run
     end = last.drive.time[-1] - last.drive.time[0]
-    return (
-        any(w.run == last.name and w.end >= end - 1.0 for w in windows)
-        and len(windows) > 0
-        and all(w.level == 1.0 for w in windows)
-    )
+    to_the_end = any(w.run == last.name and w.end >= end - 1.0 for w in windows)
+    return to_the_end and all(w.level == 1.0 for w in windows)
 
 
 def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) -> Slots:

@@ -7,6 +7,7 @@ entries of their own: a Python file with `FAMILIES = (Family(...), ...)`, given 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,13 +19,13 @@ from twin.nearest import did_you_mean
 VERSION = "1"
 
 
-def family(name: str, families: tuple[Family, ...] = FAMILIES) -> Family:
-    """The entry of a name. Raises TwinError with the nearest one."""
+def family(name: str, families: Sequence[Family] = FAMILIES, option: str = "--explain") -> Family:
+    """The entry of a name that an option gives. Raises TwinError with the nearest one."""
     for entry in families:
         if entry.name == name:
             return entry
     remedy = did_you_mean(name, [f.name for f in families], "families")
-    raise TwinError(f"'{name}' is not in the catalogue", "--explain", remedy)
+    raise TwinError(f"'{name}' is not in the catalogue", option, remedy)
 
 
 def with_own(path: Path) -> tuple[Family, ...]:

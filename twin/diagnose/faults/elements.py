@@ -26,8 +26,7 @@ import numpy as np
 from twin.build.places import beside
 from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.integration import INNER, gammas
-from twin.diagnose.model.sources import own_place
-from twin.diagnose.model.study import Study
+from twin.diagnose.model.study import Study, own_place
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place
 from twin.run.system import System
@@ -35,6 +34,8 @@ from twin.run.system import System
 BLOCK = 3600.0  # s
 FACTORS = (0.5, 2.0, 2.0**0.5, 0.5**0.5, 3.0**0.5, 3.0**-0.5, 60.0, 1 / 60.0)
 EXPONENT = 0.6  # of speeds in forced convection
+SPEEDS = ("m/s", "1/s")  # units
+HEATING = {"A": (2.0,), "m/s": (1.0,), "1/s": (1.0, 5.0 / 3.0), "W": (1.0,), "1": (1.0,)}  # exponents by unit, of heat
 LAWS = (1.0, 5.0 / 3.0, 2.0, 8.0 / 3.0)  # exponents of speeds in losses
 
 Key = tuple[str, str, str]  # kind, place, history
@@ -113,15 +114,10 @@ def histories_of(study: Study) -> Histories:
         if same[signal] != signal:
             continue  # motor speed and axis speed are one history
         seen[signal] = shape
-        if units[signal] == "A":
-            add(signals, f"{signal}^2", signal, 2.0, top)
-        elif units[signal] in ("m/s", "1/s"):
-            exponents = (1.0, 5.0 / 3.0) if units[signal] == "1/s" else (1.0,)
-            for e in exponents:
-                add(signals, f"{signal}^{e:.2f}" if e != 1.0 else signal, signal, e, top)
+        for e in HEATING.get(units[signal], ()):
+            add(signals, signal if e == 1.0 else f"{signal}^{e:.3g}", signal, e, top)
+        if units[signal] in SPEEDS:
             add(speeds, f"{signal}^{EXPONENT:g}", signal, EXPONENT, top)
-        elif units[signal] in ("W", "1"):
-            add(signals, signal, signal, 1.0, top)
     blocks = []
     for i, run in enumerate(runs[: len(study.fitted)]):
         per = max(INNER, round(BLOCK / (run.drive.time[1] - run.drive.time[0])))
@@ -274,7 +270,7 @@ def _law_histories(study: Study, j: int, histories: Histories) -> dict[str, tupl
     units = {s.name: s.unit for s in load.signals}
     result: dict[str, tuple[np.ndarray, ...]] = {}
     for signal in load.sources[j].use.signals.values():
-        if units.get(signal) not in ("m/s", "1/s") or any(signal not in run.signals for run in runs):
+        if units.get(signal) not in SPEEDS or any(signal not in run.signals for run in runs):
             continue
         top = max(float(np.abs(run.signals[signal]).max()) for run in runs)
         if top <= 0.0:

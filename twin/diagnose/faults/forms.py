@@ -9,8 +9,7 @@ from twin.diagnose.evidence.nulls import Form, lump_of, typical
 from twin.diagnose.faults.elements import EXPONENT, Elements, Key
 from twin.diagnose.faults.signal import CLOCK
 from twin.diagnose.model.bank import Nominal
-from twin.diagnose.model.sources import heated_places
-from twin.diagnose.model.study import Study
+from twin.diagnose.model.study import Study, heated_places
 
 LITTLE = 0.5  # K, of a surface above the air: convection of the room's own draught is left below it
 FREE = 25.0  # W/(m^2 K), the most that free convection in a gas is (Incropera, DeWitt, 6th ed. 2007, table 1.1)

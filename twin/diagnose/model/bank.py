@@ -111,19 +111,15 @@ def _integrated(
     place = {v: j for j, v in enumerate(used)}
     which = np.array([place[c.vector] for c in columns])
     S = np.stack([np.asarray(c.histories[k], dtype=np.float32) for c in columns], axis=1)  # (fine, n)
-    constant = [vectors[v] if vectors[v].ndim == 1 else None for v in used]
     X = np.zeros((r, len(columns)), dtype=np.float32)
     T = np.zeros((fine + 1, len(C), len(columns)), dtype=np.float32)
     step, share = planned.rows.step, planned.rows.share
     needed = {int(s) for s in step} | {int(s) + 1 for s in step}
-    kept: dict[int, np.ndarray] = {}
-    if 0 in needed:
-        kept[0] = X.copy()
+    kept = {0: X}
     V = np.empty((r, len(used)), dtype=np.float32)
-    for j, c in enumerate(constant):
-        if c is not None:
-            V[:, j] = c
-    changing = [(j, vectors[v]) for j, v in enumerate(used) if constant[j] is None]
+    for j, v in enumerate(used):
+        V[:, j] = vectors[v] if vectors[v].ndim == 1 else 0.0
+    changing = [(j, vectors[v]) for j, v in enumerate(used) if vectors[v].ndim == 2]
     rate = np.float32(nominal.rate / SDIRK2.diagonal)
 
     def solve(t: int, right: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

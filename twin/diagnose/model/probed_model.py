@@ -171,12 +171,11 @@ def _assembled(
     base = pruned(replace(whole, bodies=(replace(body, C=body.C[real], sensors=tuple(range(len(real)))),)))
     base = replace(base, sensors=tuple(whole.sensors[k] for k in real))
     prepared = prepare(base)
-    made = []
-    for run, name, drive, start in zip(runs, names, drives, starts, strict=True):
-        made.append(
-            ProbedRun(name, drive, _means(base, run, drive), start,
-                      run.steady_start or run.initial_temperature is not None, loads_for(base, drive), run.steady_start)
-        )  # fmt: skip
+    made = [
+        ProbedRun(name, drive, _means(base, run, drive), start,
+                  run.steady_start or run.initial_temperature is not None, loads_for(base, drive), run.steady_start)
+        for run, name, drive, start in zip(runs, names, drives, starts, strict=True)
+    ]  # fmt: skip
     return ProbedModel(
         base, prepared.layout, prepared.system, ContactPlaces.of(load), tuple(parameters), rich.places,
         B=body.B[:, n_sources:].T.copy(), A=np.array(body.A[n_films : n_films + n_places]),

@@ -73,11 +73,11 @@ def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
     H = np.zeros((len(y0), n, n), dtype=np.float32)
     for i, x, jac in zip(strong, points, made, strict=True):
         H[:, :, i] = (jac / bare.rate(x) - J) / bare.t(x)[i]
-    weak = np.setdiff1d(np.arange(n), strong)
-    for i in weak:  # what a strong parameter does to it is known; two weak ones bend nothing that counts
+    # what a strong parameter does to a weak one is known; two weak ones bend nothing that counts
+    for i in np.setdiff1d(np.arange(n), strong):
         H[:, strong, i] = H[:, i, strong]
-    H[np.ix_(np.arange(len(y0)), strong, strong)] += H[np.ix_(np.arange(len(y0)), strong, strong)].transpose(0, 2, 1)
-    H[np.ix_(np.arange(len(y0)), strong, strong)] /= 2
+    both = np.ix_(np.arange(len(y0)), strong, strong)
+    H[both] = (H[both] + H[both].transpose(0, 2, 1)) / 2
     return Surrogate(study.scale, form, y0, J, H)
 
 

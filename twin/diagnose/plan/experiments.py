@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -56,31 +57,28 @@ def experiments_of(
     time = np.arange(0.0, end + 0.5 * SAMPLING, SAMPLING)
     share = time / end
     level = {a.name: np.zeros(len(time)) for a in actuators}
+    loaded = partial(_loaded, load, run, sensors, actuators, time)
     made = [Experiment(AGAIN, "the longest run again", _planned(run, sensors, (), AGAIN))]
     for a in actuators:
         if a.axis is not None:
             alone = {**level, a.name: np.where(share < MOVING, SPEED * a.top, 0.0)}
-            words = (
-                f"{a.name} to and fro over its stroke for {MOVING * hours:.1f} h at {_told(load, a, SPEED)}, then rest"
-            )
-            name = f"{a.name} to and fro"
+            name, speed = f"{a.name} to and fro", _told(load, a, SPEED)
+            words = f"{name} over its stroke for {MOVING * hours:.1f} h at {speed}, then rest"
         else:
             block = np.minimum((share * len(STEPS)).astype(int), len(STEPS) - 1)
             alone = {**level, a.name: a.top * np.array(STEPS)[block]}
             top, each = _told(load, a, 1.0), hours / len(STEPS)
             words = f"{a.name} at 25, 50 and 100 % of {top}, {each:.1f} h each, with rests as long after them"
             name = f"{a.name} in steps"
-        made.append(Experiment(name, words, _loaded(load, run, sensors, actuators, time, alone, name)))
+        made.append(Experiment(name, words, loaded(alone, name)))
     if actuators:
         full = {a.name: np.where(share < LOADED, SPEED * a.top, 0.0) for a in actuators}
-        name = "long rest"
-        loaded, rested = LOADED * hours, (1.0 - LOADED) * hours
-        words = f"everything at {100 * SPEED:.0f} % of its top for {loaded:.1f} h, then {rested:.1f} h of rest"
-        made.append(Experiment(name, words, _loaded(load, run, sensors, actuators, time, full, name)))
-    name = "warm start"
-    rest = _loaded(load, run, sensors, actuators, time, level, name)
+        first, rested = LOADED * hours, (1.0 - LOADED) * hours
+        words = f"everything at {100 * SPEED:.0f} % of its top for {first:.1f} h, then {rested:.1f} h of rest"
+        made.append(Experiment("long rest", words, loaded(full, "long rest")))
+    rest = replace(loaded(level, "warm start"), initial_temperature=_air(load, run) + WARM)
     words = f"the machine evenly {WARM:g} K warmer than the air at the start, then {hours:.1f} h of rest"
-    made.append(Experiment(name, words, replace(rest, initial_temperature=_air(load, run) + WARM)))
+    made.append(Experiment("warm start", words, rest))
     if places:
         run_with = _planned(run, sensors, [SENSOR + p for p in places], "again_with_sensors")
         made.append(Experiment("sensor", "the longest run again", run_with, tuple(places)))
@@ -105,17 +103,12 @@ def _air(load: LoadModel, run: Run) -> float:
 
 def _planned(run: Run, sensors: Sequence[str], more: Sequence[str], name: str) -> Run:
     """A run with the instruments of another one, and more sensors; what they read is left at 20 degC and zero."""
-    temperatures, tcp = None, None
-    if run.temperatures is not None:
-        time = run.temperatures.time
-        columns = {s: np.full(len(time), 20.0) for s in (*sensors, *more)}
-        temperatures = Table(time, columns, dict.fromkeys(columns, "degC"))
-    elif more:
-        time = np.arange(run.loads.time[0], run.loads.time[-1], 6.0 * SAMPLING)
-        columns = {s: np.full(len(time), 20.0) for s in more}
-        temperatures = Table(time, columns, dict.fromkeys(columns, "degC"))
-    if run.tcp is not None:
-        tcp = replace(run.tcp, displacement=np.zeros_like(run.tcp.displacement))
+    given, loads = run.temperatures, run.loads
+    time = np.arange(loads.time[0], loads.time[-1], 6.0 * SAMPLING) if given is None else given.time
+    columns = {s: np.full(len(time), 20.0) for s in (more if given is None else (*sensors, *more))}
+    none = given is None and not more
+    temperatures = None if none else Table(time, columns, dict.fromkeys(columns, "degC"))
+    tcp = None if run.tcp is None else replace(run.tcp, displacement=np.zeros_like(run.tcp.displacement))
     return replace(run, temperatures=temperatures, tcp=tcp, folder=Path(name), segments=())
 
 
@@ -126,18 +119,17 @@ def _loaded(
     """The instruments of a run over other loads: actuators at levels (n,) [SI], all else as it was."""
     told = {s.name: s for s in load.signals}
     start = float(run.loads.time[0])
-    values: dict[str, np.ndarray] = {}
-    for s in load.signals:
-        if s.column in run.loads.columns:
-            values[s.column] = _held(run.loads.time - start, np.asarray(run.loads.columns[s.column]), time)
+    logged = run.loads.columns
+    columns = [s.column for s in load.signals if s.column in logged]
+    values = {column: _held(run.loads.time - start, np.asarray(logged[column]), time) for column in columns}
     for a in actuators:
-        for signal, own in a.at(level[a.name]).items():
-            values[told[signal].column] = _as_logged(told[signal], own)
+        for signal, commanded in a.at(level[a.name]).items():
+            values[told[signal].column] = _as_logged(told[signal], commanded)
         if a.axis is not None:
             axis = load.axes[a.axis]
             position = told[axis.position]
-            logged = run.loads.columns.get(position.column)  # none where it has a default
-            where = (axis.low + axis.high) / 2 if logged is None else float(np.nanmedian(logged)) * position.factor
+            own = logged.get(position.column)  # none where it has a default
+            where = (axis.low + axis.high) / 2 if own is None else float(np.nanmedian(own)) * position.factor
             swept = axis.low + (axis.high - axis.low) * ((GOLDEN * np.arange(len(time))) % 1.0)
             values[position.column] = _as_logged(position, np.where(level[a.name] > 0.0, swept, where))
     units = {**run.loads.units, **{s.column: s.unit for s in load.signals}}

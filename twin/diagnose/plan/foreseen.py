@@ -36,6 +36,8 @@ from twin.machine.description import Machine
 from twin.progress import Progress, silent
 from twin.run.system import prepare
 
+AT = "sensor at "  # and its place: the name of what adds a sensor
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -55,6 +57,14 @@ class Foreseen:
     # which it acts in today's (zero for what does not switch: its first column goes on)
     before: np.ndarray
     after: np.ndarray
+
+    @property
+    def name(self) -> str:
+        return f"{AT}{self.place}" if self.place else self.experiment.name
+
+    @property
+    def words(self) -> str:
+        return self.experiment.words + (f", with a temperature sensor at {self.place}" if self.place else "")
 
 
 @dataclass(frozen=True)

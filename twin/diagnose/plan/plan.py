@@ -20,8 +20,8 @@ from twin.diagnose.faults.elements import Key
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.plan.actuators import actuators_of
 from twin.diagnose.plan.experiments import AGAIN, experiments_of, longest_of
-from twin.diagnose.plan.foreseen import Asked, Foreseen, foreseen
-from twin.diagnose.plan.suspicion import Suspicion, coefficients
+from twin.diagnose.plan.foreseen import AT, Asked, Foreseen, foreseen
+from twin.diagnose.plan.suspicion import Suspicion
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
@@ -30,7 +30,6 @@ from twin.machine.description import Machine
 from twin.progress import Progress, silent
 
 LEAST = 0.05  # of the information without learned modes that today's has with them; less is rounding of what is blind
-AT = "sensor at "
 SENSORS = 8  # places of another sensor that a plan lists for a suspicion: their gains differ little then
 ASSUMPTIONS = (
     "one more run, as long as the longest of these, with its instruments (noise, bins, TCP rows) and in the same air",
@@ -116,14 +115,6 @@ def _needed(
     return sorted(found)
 
 
-def _name(f: Foreseen) -> str:
-    return f"{AT}{f.place}" if f.place else f.experiment.name
-
-
-def _words(f: Foreseen) -> str:
-    return f"{f.experiment.words}, with a temperature sensor at {f.place}" if f.place else f.experiment.words
-
-
 def _listed(ordered: Sequence[_P]) -> list[_P]:
     """All loads, and of sensors the best."""
     sensors = [p for p in ordered if p.experiment.startswith(AT)]
@@ -139,15 +130,15 @@ def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made:
         chosen = s.histories(batch)
         information = now.ready[k].information[p, chosen]
         today = min(today, _limit(information, threshold, batch, detector.policy.power))
-        W = np.stack([basis.spread(_rows(batch, p, h, basis.columns)) for h in chosen])  # (h, q, 2 u)
+        rows = [_among(basis.columns, batch.columns[p], batch.histories[h].weights) for h in chosen]
+        W = np.stack([basis.spread(of_history) for of_history in rows])  # (h, q, 2 u)
         for e, f in enumerate(made):
             without, then = (_information(F, W) for F in (f.before, f.after))
             share = np.clip(information / np.maximum(without, 1e-30), LEAST, 1.0)
             more = information + share * np.maximum(then - without, 0.0)
             best[e] = min(best[e], _limit(more, threshold, batch, detector.policy.power))
     proposals = [
-        Proposal(_name(f), _words(f), told(float(size)), float(today / size))
-        for f, size in zip(made, best, strict=True)
+        Proposal(f.name, f.words, told(float(size)), float(today / size)) for f, size in zip(made, best, strict=True)
     ]
     proposals.sort(key=lambda one: -one.gain)
     again = next(p.limit for p in proposals if p.experiment == AGAIN)
@@ -171,14 +162,19 @@ def _hour(detector: Detector, key: Key) -> tuple[str, str, int] | None:
     return kind, place, detector.elements.histories.blocks[int(history.removeprefix("block "))][1]
 
 
-def _rows(batch: Batch, p: int, h: int, columns: Sequence[int]) -> np.ndarray:
-    """(q, u) weights of a history at a place, among columns (u,) of the detector."""
+def _among(columns: Sequence[int], own: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(q, u) weights (q, L) of columns own (L,), among columns (u,) of the detector."""
     place = {c: i for i, c in enumerate(columns)}
-    weights = batch.histories[h].weights
     result = np.zeros((len(weights), len(columns)))
     for c in np.flatnonzero(np.any(weights, axis=0)):
-        result[:, place[int(batch.columns[p][c])]] = weights[:, c]
+        result[:, place[int(own[c])]] += weights[:, c]
     return result
+
+
+def _coefficients(columns: Sequence[int], h: Hypothesis) -> np.ndarray:
+    """(1, u) of a hypothesis at its amplitudes."""
+    own, weights = h.combination()
+    return _among(columns, own, (np.asarray(h.amplitude) @ weights)[None])
 
 
 def _information(F: np.ndarray, W: np.ndarray) -> np.ndarray:
@@ -191,7 +187,7 @@ def _information(F: np.ndarray, W: np.ndarray) -> np.ndarray:
 
 def _apart(a: Hypothesis, b: Hypothesis, basis: Basis, made: Sequence[Foreseen], apart: float) -> Apart:
     """What each experiment makes of LR (1 - cos^2), with the first one true at its fitted size."""
-    one, two = (basis.spread(coefficients(h, basis.columns)[None])[0] for h in (a, b))
+    one, two = (basis.spread(_coefficients(basis.columns, h))[0] for h in (a, b))
 
     def explained(F: np.ndarray) -> tuple[float, float]:
         aa, bb, ab = float(one @ F @ one), float(two @ F @ two), float(one @ F @ two)
@@ -202,6 +198,6 @@ def _apart(a: Hypothesis, b: Hypothesis, basis: Basis, made: Sequence[Foreseen],
         aa, before = explained(f.before)
         share = float(np.clip(a.statistic / max(aa, 1e-30), LEAST, 1.0))
         found.append((f, share * before, share * explained(f.after)[1]))
-    separations = sorted((Separation(_name(f), _words(f), then) for f, _, then in found), key=lambda s: -s.expected)
+    separations = sorted((Separation(f.name, f.words, then) for f, _, then in found), key=lambda s: -s.expected)
     today = float(np.median([before for _, before, _ in found])) if found else 0.0
     return Apart(f"{a.family} {a.name}", f"{b.family} {b.name}", today, apart, tuple(_listed(separations)))

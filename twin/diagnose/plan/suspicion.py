@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from twin.diagnose.evidence.batch import Batch, Hypothesis
-from twin.diagnose.faults.catalogue import Family
+from twin.diagnose.faults.catalogue import Family, family
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.verdict import limits_at
@@ -51,9 +49,7 @@ def known_suspicions(detector: Detector) -> dict[Suspicion, float]:
 
 def known_family(text: str, families: Sequence[Family]) -> None:
     """Raises TwinError with the nearest name where a text begins with no family of the catalogue."""
-    name, names = text.strip().partition(" ")[0], [f.name for f in families]
-    if name not in names:
-        raise TwinError(f"'{name}' is not in the catalogue", OPTION, did_you_mean(name, names, "families"))
+    family(text.strip().partition(" ")[0], families, OPTION)
 
 
 def named(text: str, detector: Detector) -> list[Suspicion]:
@@ -62,17 +58,17 @@ def named(text: str, detector: Detector) -> list[Suspicion]:
     Raises TwinError with the nearest name for a family or a place that there is not.
     """
     every = known_suspicions(detector)
-    family, _, place = (part.strip() for part in text.strip().partition(" "))
+    name, _, place = (part.strip() for part in text.strip().partition(" "))
     families = list(dict.fromkeys(s.family for s in every))
-    if family not in families:
-        what = f"'{family}' has no detection limit in these runs"
-        raise TwinError(what, OPTION, did_you_mean(family, families, "families"))
-    own = {s: size for s, size in every.items() if s.family == family}
+    if name not in families:
+        what = f"'{name}' has no detection limit in these runs"
+        raise TwinError(what, OPTION, did_you_mean(name, families, "families"))
+    own = {s: size for s, size in every.items() if s.family == name}
     if not place:
         return worst(own)
     places = list(dict.fromkeys(s.place for s in own))
     if place not in places:
-        what = f"'{place}' is no place of {family} in these runs"
+        what = f"'{place}' is no place of {name} in these runs"
         raise TwinError(what, OPTION, did_you_mean(place, places, "places"))
     return [s for s in own if s.place == place]
 
@@ -108,14 +104,3 @@ def suspicions_in(hypotheses: Sequence[Hypothesis], detector: Detector) -> list[
     """The suspicions that hypotheses are; none of exact factors, which have no size."""
     wanted = [(h.family, h.name, h.batch.unit) for h in hypotheses]
     return [s for s in known_suspicions(detector) if (s.family, s.place, s.unit) in wanted]
-
-
-def coefficients(h: Hypothesis, columns: Sequence[int]) -> np.ndarray:
-    """(u,) of a hypothesis at its amplitudes, among columns (u,) of the detector."""
-    place = {c: i for i, c in enumerate(columns)}
-    own, weights = h.combination()
-    result = np.zeros(len(columns))
-    for c, w in zip(own, np.asarray(h.amplitude) @ weights, strict=True):
-        if w != 0.0:
-            result[place[int(c)]] += w
-    return result

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from twin.diagnose.result.place import Support
 from twin.diagnose.result.spot import Spot
 
 LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
+MEASURED = (("K", "temperature"), ("m", "TCP direction"))  # units of channels, and what these are
 SEEN = ("stuck", "leap", "broken")  # histories of sensors at fault that are seen before anything is fitted
 
 
@@ -162,13 +164,13 @@ def _unknown_words(d: Diagnosis) -> str:
         return "the residuals hold an effect that nothing in the catalogue explains"
     part, surface = d.unknown.part, d.unknown.surface
     text = f"heat enters part {part}, mostly at {surface}, and nothing in the catalogue explains it"
-    largest, sigma, at, run = 0.0, math.nan, math.nan, ""
-    for name, (time, heat, spread) in d.unknown.history.items():
-        for t, q, s in zip(time, heat, spread, strict=False):
-            if abs(q) > abs(largest):
-                largest, sigma, at, run = q, s, t, name
-    if not run:
+    hours = [
+        (t, q, sigma, run) for run, (time, heat, spread) in d.unknown.history.items()
+        for t, q, sigma in zip(time, heat, spread, strict=False) if abs(q) > 0.0
+    ]  # fmt: skip
+    if not hours:
         return text
+    at, largest, sigma, run = max(hours, key=lambda hour: abs(hour[1]))
     middle, low, high, unit = interval_and_unit(largest, largest - 1.96 * sigma, largest + 1.96 * sigma, "W")
     return f"{text}; its peak is {middle} {unit} (95 % interval {low} to {high} {unit}), {at / 3600:.1f} h into {run}"
 
@@ -211,16 +213,11 @@ def chance(nulls: np.ndarray | None, threshold: float) -> str:
     n, above = len(values), int((values > threshold).sum())
     if not n or not math.isfinite(threshold):
         return ""
-    most = f"the largest of them gave {number(float(values.max()))}"
-    if above:
-        return (
-            f"Data of a machine without this effect give more than {number(threshold)} once in {round(n / above)} "
-            f"({above} of {n} simulated data sets; {most})."
-        )
     # none of n: with 95 % confidence the rate is below 3 / n
+    often = f"once in {round(n / above)}" if above else f"at most once in {max(1, round(n / 3))}"
     return (
-        f"Data of a machine without this effect give more than {number(threshold)} at most once in "
-        f"{max(1, round(n / 3))} (none of {n} simulated data sets; {most})."
+        f"Data of a machine without this effect give more than {number(threshold)} {often} ({above or 'none'} of {n} "
+        f"simulated data sets; the largest of them gave {number(float(values.max()))})."
     )
 
 
@@ -280,25 +277,20 @@ def rms_of(gains: Sequence[Gain]) -> tuple[float, float, float]:
 
 def gain_sentences(d: Diagnosis) -> list[str]:
     """What the extended model brings on each sealed run: the channels that the causes move, then the others."""
-    return [text for run in sealed_runs(d) for text in _gain_sentences(d, run)]
-
-
-def _gain_sentences(d: Diagnosis, run: str) -> list[str]:
-    result = []
-    head = f"{run}: " if len(sealed_runs(d)) > 1 else ""
-    for affected, which in ((True, "that the causes move"), (False, "that they do not move")):
-        for unit, name in (("K", "temperature"), ("m", "TCP direction")):
-            these = [g for g in d.gain if g.run == run and g.affected == affected and g.unit == unit]
-            a, b, c = (quantity(v, unit) for v in rms_of(these))
-            if not these:
-                continue
-            counted = f"{len(these)} {name}{'s' if len(these) > 1 else ''}"
-            better = sum(g.ci95[0] > 0 for g in these)
-            worse = sum(g.ci95[1] < 0 for g in these)
-            result.append(
-                f"{head}{counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
-                f"noise included); better beyond chance in {better}, worse in {worse}."
-            )
+    result, runs = [], sealed_runs(d)
+    groups = product(runs, ((True, "that the causes move"), (False, "that they do not move")), MEASURED)
+    for run, (affected, which), (unit, name) in groups:
+        these = [g for g in d.gain if g.run == run and g.affected == affected and g.unit == unit]
+        if not these:
+            continue
+        a, b, c = (quantity(v, unit) for v in rms_of(these))
+        head = f"{run}: " if len(runs) > 1 else ""
+        counted = f"{len(these)} {name}{'s' if len(these) > 1 else ''}"
+        better, worse = sum(g.ci95[0] > 0 for g in these), sum(g.ci95[1] < 0 for g in these)
+        result.append(
+            f"{head}{counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
+            f"noise included); better beyond chance in {better}, worse in {worse}."
+        )
     return result
 
 

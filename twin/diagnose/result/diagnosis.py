@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -16,9 +16,7 @@ from twin.logs.trace import Trace
 from twin.machine.effects.effect import Window
 
 Verdict = Literal["named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing", "too_poor"]
-VERDICTS: tuple[Verdict, ...] = (
-    "named", "ambiguous", "unknown", "out_of_tolerance", "sensor", "signal", "nothing", "too_poor",
-)  # fmt: skip
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 @dataclass(frozen=True)
