@@ -18,7 +18,7 @@ Kinds by what they do to the model x' = A(theta) x + B(theta) u, y = C x:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -141,24 +141,27 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     index: dict[Key, int] = {}
     block_of: dict[tuple[str, str], np.ndarray] = {}
 
-    def vector(of: Sequence[np.ndarray]) -> int:
-        for own, v in zip(vectors, of, strict=True):
-            own.append(np.asarray(v))
-        return len(vectors[0]) - 1
-
-    def column(key: Key, v: int, history: Sequence[np.ndarray | None]) -> None:
-        index[key] = len(columns)
-        columns.append(Column(v, tuple(history)))
-
-    def blocks(kind: str, place: str, v: int) -> None:
-        first = len(columns)
+    def add(
+        kind: str, name: str, of: Sequence[np.ndarray], acting: Mapping[str, Sequence[np.ndarray | None]],
+        in_blocks: bool = False,
+    ) -> None:  # fmt: skip
+        """A vector per run, as a column for each history, and for each block."""
+        v = len(vectors[0])
+        for own, vector in zip(vectors, of, strict=True):
+            own.append(np.asarray(vector))
+        for history, values in acting.items():
+            index[kind, name, history] = len(columns)
+            columns.append(Column(v, tuple(values)))
+        if not in_blocks:
+            return
+        block_of[kind, name] = len(columns) + np.arange(len(histories.blocks))
         for b, (i, start, end) in enumerate(histories.blocks):
             gate = np.zeros(n[i])
             gate[start:end] = 1.0
-            column((kind, place, f"block {b}"), v, [gate if j == i else None for j in range(len(runs))])
-        block_of[kind, place] = np.arange(first, len(columns))
+            index[kind, name, f"block {b}"] = len(columns)
+            columns.append(Column(v, tuple(gate if j == i else None for j in range(len(runs)))))
 
-    always = histories.signals["always"]
+    always = {"always": histories.signals["always"]}
     z = [own.middle for own in nominal]
     films = [f.name for f in load.films]
     air = [run.drive.environment - probed.base.reference_temperature for run in runs]
@@ -166,66 +169,48 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     A, M = np.asarray(system.A[0]), np.asarray(system.M)
     # heat and film at places
     for p, place in enumerate(probed.places):
-        v = vector([probed.B[p]] * len(runs))
-        for name, history in histories.signals.items():
-            column(("heat", place.name, name), v, history)
-        blocks("heat", place.name, v)
-        e = film_env[films.index(place.film)] if place.film else load.surroundings
-        v = vector([-x @ probed.A[p].T + a[:, [e]] * probed.M[p] for x, a in zip(z, air, strict=True)])
-        column(("film", place.name, "always"), v, always)
-        for name, history in histories.speeds.items():
-            column(("film", place.name, name), v, history)
-        blocks("film", place.name, v)
         b = probed.B[p]
-        v = vector([-np.outer(np.diff(own.states @ b, axis=0) * own.rate, b) for own in nominal])
-        column(("capacity", place.name, "always"), v, always)
+        add("heat", place.name, [b] * len(runs), histories.signals, True)
+        e = film_env[films.index(place.film)] if place.film else load.surroundings
+        flow = [-x @ probed.A[p].T + a[:, [e]] * probed.M[p] for x, a in zip(z, air, strict=True)]
+        add("film", place.name, flow, {**always, **histories.speeds}, True)
+        stored = [-np.outer(np.diff(own.states @ b, axis=0) * own.rate, b) for own in nominal]
+        add("capacity", place.name, stored, always)
     for f, name in enumerate(films):
         flow = [-x @ A[f].T + own.outer[:, [f]] * M[:, f] for x, own in zip(z, nominal, strict=True)]
-        v = vector([own.convection[:, [f]] * q for own, q in zip(nominal, flow, strict=True)])
-        column(("group", name, "always"), v, always)
-        blocks("group", name, v)
-        v = vector(flow)
-        for speed, history in histories.speeds.items():
-            column(("group_film", name, speed), v, history)
-        v = vector([own.total[:, [f]] * M[:, f] for own in nominal])
-        column(("zone", name, "always"), v, always)
-        blocks("zone", name, v)
+        add("group", name, [own.convection[:, [f]] * q for own, q in zip(nominal, flow, strict=True)], always, True)
+        add("group_film", name, flow, histories.speeds)
+        add("zone", name, [own.total[:, [f]] * M[:, f] for own in nominal], always, True)
     for e, environment in enumerate(load.environments):
         own_films = [f for f in range(len(films)) if film_env[f] == e]
-        v = vector([own.total[:, own_films] @ M[:, own_films].T for own in nominal])
-        blocks("air", environment.name, v)
+        add("air", environment.name, [own.total[:, own_films] @ M[:, own_films].T for own in nominal], {}, True)
         lifted = probed.H[:, own_films] - pivot(study, e) * M[:, own_films]
         if np.abs(probed.H[:, own_films]).max(initial=0.0) > 0.0:
-            v = vector([own.convection[:, own_films] @ lifted.T for own in nominal])
-            column(("gradient", environment.name, "always"), v, always)
+            add("gradient", environment.name, [own.convection[:, own_films] @ lifted.T for own in nominal], always)
     for j, joint in enumerate(load.joints):
         term = A[len(films) + j]
         conductance = [np.asarray(run.drive.theta)[:, [len(films) + j]] for run in runs]
-        v = vector([-k * (x @ term.T) for k, x in zip(conductance, z, strict=True)])
-        blocks("joint", joint.name, v)
-    for c, name in enumerate(probed.base.load_model.contacts):
-        v = vector([_contact_flow(study, k, c, x) for k, x in enumerate(z)])
-        blocks("contact", name, v)
+        add("joint", joint.name, [-k * (x @ term.T) for k, x in zip(conductance, z, strict=True)], {}, True)
+    for c, name in enumerate(load.contacts):
+        add("contact", name, [_contact_flow(study, k, c, x) for k, x in enumerate(z)], {}, True)
     powers = [_power_of(system, run.drive, own) for run, own in zip(runs, nominal, strict=True)]
     for j, source in enumerate(load.sources):
         if source.contact:
             continue
         B = body.B[:, body.sources.index(j)]
-        v = vector([B] * len(runs))
-        for name, history in _law_histories(study, j, histories).items():
-            column(("source", source.name, name), v, history)
+        add("source", source.name, [B] * len(runs), _law_histories(study, j, histories))
         own_at = own_place(study, j)
         for p in beside(probed.places, own_at) if own_at is not None else ():
-            v = vector([probed.B[p] - B] * len(runs))
-            column(("moved", f"{source.name}>{probed.places[p].name}", "always"), v, [q[:, j] for q in powers])
+            moved, power = [probed.B[p] - B] * len(runs), [q[:, j] for q in powers]
+            add("moved", f"{source.name}>{probed.places[p].name}", moved, {"always": power})
     for name, factor, of in _signals(study, nominal, powers):
-        column(("signal", f"{name}*{factor:.6g}", "always"), vector(of), always)
+        add("signal", f"{name}*{factor:.6g}", of, always)
     for i in range(len(study.fitted)):
         for m, field in _fields(study):
             pulse = np.zeros(n[i])
             pulse[0] = nominal[i].rate
             only_here = [pulse if j == i else None for j in range(len(runs))]
-            column(("start", f"{runs[i].name}.{m}", "always"), vector([field] * len(runs)), only_here)
+            add("start", f"{runs[i].name}.{m}", [field] * len(runs), {"always": only_here})
     return Elements(histories, tuple(tuple(v) for v in vectors), tuple(columns), index, block_of)
 
 

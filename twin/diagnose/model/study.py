@@ -15,7 +15,9 @@ from twin.diagnose.model.integration import INNER, by_amplitudes, jacobian, outp
 from twin.diagnose.model.probed_model import ProbedModel, ProbedRun
 from twin.diagnose.model.slots import Slots, first_slots, no_slots
 from twin.errors import TwinError
+from twin.rom.contact_matrix import ContactPlaces
 from twin.run.replay import at_rest
+from twin.run.system import Layout
 
 K = 4  # amplitudes that may be active at once
 NEARLY_NONE = 1e-6  # cosine of two heats in a reduced basis that have no place in common: rounding
@@ -77,35 +79,25 @@ class Study:
 
     def outputs(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """(size,) of run k at x (n,) in prior standard deviations, with hypotheses of amplitudes a."""
-        planned = self.runs[k]
-        return np.asarray(
-            outputs(self.probed.layout, self.probed.contacts, False, planned.measured.from_first,
-                    *self._arguments(k, slots), self._v(x, a))
-        )  # fmt: skip
+        layout, contacts, from_first = self._fixed(k)
+        return np.asarray(outputs(layout, contacts, False, from_first, *self._arguments(k, slots), self._v(x, a)))
 
     def jacobian(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """(size, n + K) derivatives by x and the amplitudes."""
-        planned = self.runs[k]
-        J = jacobian(self.probed.layout, self.probed.contacts, planned.measured.from_first,
-                     *self._arguments(k, slots), self._v(x, a))  # fmt: skip
+        J = jacobian(*self._fixed(k), *self._arguments(k, slots), self._v(x, a))
         return np.asarray(J) * np.concatenate([self.scale, np.ones(K)])
 
     def by_amplitudes(self, k: int, x: np.ndarray, slots: Slots, a: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Outputs (size,) of run k and their derivatives (size, len(a)) by the amplitudes of the first len(a) slots."""
-        planned = self.runs[k]
-        D, y = by_amplitudes(self.probed.layout, self.probed.contacts, planned.measured.from_first,
-                             *self._arguments(k, first_slots(slots, len(a))), self._v(x, ())[:-K],
-                             np.array(a, dtype=float))  # fmt: skip
+        arguments = self._arguments(k, first_slots(slots, len(a)))
+        D, y = by_amplitudes(*self._fixed(k), *arguments, self._v(x, ())[:-K], np.array(a, dtype=float))
         return np.asarray(y), np.asarray(D)
 
     def states(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """z (n_fine + 1, r) of run k."""
         system, effects, loads, filled, _, _, z0 = self._arguments(k, slots)
-        return np.asarray(
-            states_of(
-                self.probed.layout, self.probed.contacts, False, system, effects, loads, filled, z0, self._v(x, a)
-            )
-        )
+        layout, contacts, _ = self._fixed(k)
+        return np.asarray(states_of(layout, contacts, False, system, effects, loads, filled, z0, self._v(x, a)))
 
     def read(self, k: int, states: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What sensors (b, s) [degC] and the TCP (k, 3) [m] show of states of run k, as `outputs` reads them."""
@@ -120,6 +112,10 @@ class Study:
         amplitudes = np.zeros(K)
         amplitudes[: len(a)] = a
         return np.concatenate([np.asarray(x) * self.scale, amplitudes])
+
+    def _fixed(self, k: int) -> tuple[Layout, ContactPlaces, bool]:
+        """What the integration of run k is compiled for."""
+        return self.probed.layout, self.probed.contacts, self.runs[k].measured.from_first
 
     def _arguments(self, k: int, slots: Slots | None) -> tuple:
         planned = self.runs[k]
