@@ -102,12 +102,10 @@ def windows_of(context: Context) -> list[Stretch]:
                 name = f"from {window.start / 3600:.1f} h to {window.end / 3600:.1f} h of {window.run}"
                 result.append((name, weights, (window,)))
             if r + 1 < len(own):  # on for good
-                weights, window = part(r, first, n - 1)
-                windows = [window]
-                for later in range(r + 1, len(own)):
-                    more, rest = part(later, 0, len(own[later]) - 1)
-                    weights, windows = weights + more, [*windows, rest]
-                result.append((f"from {window.start / 3600:.1f} h of {window.run} on", weights, tuple(windows)))
+                parts = [part(r, first, n - 1), *(part(k, 0, len(own[k]) - 1) for k in range(r + 1, len(own)))]
+                windows = tuple(window for _, window in parts)
+                name = f"from {windows[0].start / 3600:.1f} h of {windows[0].run} on"
+                result.append((name, np.sum([weights for weights, _ in parts], axis=0), windows))
     return result
 
 
