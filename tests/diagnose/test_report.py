@@ -19,7 +19,7 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.pipeline import Result
 from twin.diagnose.report.evidence import candidates_picture, cosine_picture, nulls_picture
 from twin.diagnose.report.gain import broken
-from twin.diagnose.report.page import page, plain, summary_lines, write_report
+from twin.diagnose.report.page import page, plain, write_report
 from twin.diagnose.report.residuals import load_rows, loudest, on_masks, residual_map, with_gaps
 from twin.diagnose.report.tables import gain_table, table, when
 from twin.diagnose.report.text import (
@@ -29,6 +29,7 @@ from twin.diagnose.report.text import (
     evidence_sentence,
     gain_sentences,
     pull_of,
+    summary_lines,
     verdict_sentence,
 )
 from twin.diagnose.result.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Limit, Pull, Rival, Window

@@ -15,6 +15,7 @@ import numpy as np
 
 from twin.atomic import atomic_path, check_folder
 from twin.diagnose.report import tables
+from twin.diagnose.report import text as words
 from twin.diagnose.report.evidence import candidates_picture, cosine_picture, nulls_picture, pulls_picture
 from twin.diagnose.report.gain import channels_picture, gain_picture, overlay_picture, unknown_picture
 from twin.diagnose.report.pictures import Picture, inline_svg, rms
@@ -22,24 +23,7 @@ from twin.diagnose.report.place import place_picture
 from twin.diagnose.report.plan import plan_section
 from twin.diagnose.report.residuals import RUNS, by_load_state, residual_map, whiteness_picture
 from twin.diagnose.report.style import STYLE
-from twin.diagnose.report.text import (
-    beyond,
-    cause_evidence,
-    evidence_sentence,
-    gain_sentences,
-    limit_words,
-    place_words,
-    pull_of,
-    remedies,
-    sealed_runs,
-    summary_lines,
-    support_words,
-    verdict_sentence,
-    what,
-)
 from twin.diagnose.result.diagnosis import Diagnosis
-
-__all__ = ["page", "summary_lines", "write_report"]
 
 _LABELS = {
     "named": "cause named",
@@ -144,9 +128,9 @@ def page(d: Diagnosis) -> str:
     contents = " ".join(f'<a href="#{s.name}">{s.title}</a>' for s in sections)
     body = "\n".join(s.html() for s in sections)
     title = escape(f"{d.machine}: diagnosis")
-    sentence = verdict_sentence(d)
+    sentence = words.verdict_sentence(d)
     said = "".join(f"<p>{escape(text)}</p>" for text in d.summary if text.lower() not in sentence.lower())
-    carried = f"<p>{escape(support_words(d.support))}</p>" if d.support else ""
+    carried = f"<p>{escape(words.support_words(d.support))}</p>" if d.support else ""
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title><style>{STYLE}</style></head><body>
@@ -176,10 +160,11 @@ def _items(texts: Iterable[str]) -> str:
 def _evidence(d: Diagnosis) -> str:
     parts = []
     if d.causes:
-        told = _items(f"{place_words(c.place)}, {what(c.family)}: {cause_evidence(d, c)}" for c in d.causes)
+        heads = [f"{words.place_words(c.place)}, {words.what(c.family)}" for c in d.causes]
+        told = _items(f"{head}: {words.cause_evidence(d, c)}" for head, c in zip(heads, d.causes, strict=True))
         parts += [tables.causes_table(d.causes), told]
     if d.unknown:
-        parts.append(_items([evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold)]))
+        parts.append(_items([words.evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold)]))
     if d.verdict == "out_of_tolerance":
         parts.append(_items(_pull_sentences(d)))
     if not parts:
@@ -187,18 +172,18 @@ def _evidence(d: Diagnosis) -> str:
         parts.append(f"<p>{withdrawn if d.verdict == 'unknown' else none}</p>")
         shares = {k: v / d.thresholds[k] for k, v in d.observed.items() if d.thresholds.get(k, 0) > 0}
         if best := max(shares, key=lambda k: shares[k], default=None):
-            text = evidence_sentence(d, best, d.observed[best], d.thresholds[best])
-            parts.append(f"<p>{escape(f'The nearest is {what(best)}. {text}')}</p>")
+            text = words.evidence_sentence(d, best, d.observed[best], d.thresholds[best])
+            parts.append(f"<p>{escape(f'The nearest is {words.what(best)}. {text}')}</p>")
     return "\n".join([*parts, _rivals(d)])
 
 
 def _pull_sentences(d: Diagnosis) -> list[str]:
     """What is out of tolerance first, whatever else is pulled farther."""
-    causes = [p for p in (pull_of(d, c) for c in d.causes) if p]
+    causes = [p for p in (words.pull_of(d, c) for c in d.causes) if p]
     return [
         f"{p.path} lies {p.pull:+.1f} standard deviations from what was declared; a right declaration does so "
         f"once in {_once(abs(p.pull))}."
-        for p in [*causes, *(p for p in beyond(d.pulls, 2.0) if p not in causes)][:5]
+        for p in [*causes, *(p for p in words.beyond(d.pulls, 2.0) if p not in causes)][:5]
     ]
 
 
@@ -211,10 +196,10 @@ def _rivals(d: Diagnosis) -> str:
     parts = []
     for c in d.causes:
         if c.rivals:
-            parts.append(f"<h3>{escape(f'Rivals of {what(c.family)} at {place_words(c.place)}')}</h3>")
+            parts.append(f"<h3>{escape(f'Rivals of {words.what(c.family)} at {words.place_words(c.place)}')}</h3>")
             parts.append(tables.rivals_table(c.rivals, False, d))
-    if remedies(d):
-        parts.append("<h3>What would tell them apart</h3>" + _items(remedies(d)))
+    if words.remedies(d):
+        parts.append("<h3>What would tell them apart</h3>" + _items(words.remedies(d)))
     elif d.verdict == "ambiguous":
         parts.append("<p>No single measurement is known that would tell them apart.</p>")
     return "\n".join(parts)
@@ -227,10 +212,10 @@ def _gain(d: Diagnosis, show: Any) -> tuple[str, str]:
         sealed = any(s.sealed for s in d.series)
         why = "nothing was measured in the run kept aside" if sealed else "no run was kept aside"
         return f"<p>There is no gain to report: {why}.</p>", pictures
-    runs = sealed_runs(d)
+    runs = words.sealed_runs(d)
     told = f"Run {runs[0]} was" if len(runs) == 1 else f"Runs {', '.join(runs)} were"
     head = f"<p>{escape(f'{told} opened once, after everything was decided.')}</p>"
-    return head + _items(gain_sentences(d)), pictures + tables.gain_table(d)
+    return head + _items(words.gain_sentences(d)), pictures + tables.gain_table(d)
 
 
 def _residuals(d: Diagnosis, show: Any) -> str:
@@ -257,7 +242,7 @@ def _decision(d: Diagnosis, show: Any) -> str:
 def _pulls(d: Diagnosis, show: Any) -> str:
     if not d.pulls:
         return "<p>No declared parameter was fitted.</p>"
-    if not beyond(d.pulls, 2.0) and not any(p.freed for p in d.pulls):
+    if not words.beyond(d.pulls, 2.0) and not any(p.freed for p in d.pulls):
         return "<p>No declared parameter was pulled by more than 2 standard deviations.</p>" + show(pulls_picture(d))
     return show(pulls_picture(d)) + tables.pulls_table(d)
 
@@ -280,7 +265,7 @@ def _limits(d: Diagnosis) -> tuple[str, str]:
     every = f"<p>{text}</p>{tables.limits_table(d)}"
     if d.verdict not in ("nothing", "too_poor"):
         return "", every
-    sizes = _items(map(limit_words, d.detection_limits))
+    sizes = _items(map(words.limit_words, d.detection_limits))
     lead = "At half of all places these data would have shown, in 95 of 100 cases:"
     return f"<p><strong>{lead}</strong></p>{sizes}", every
 
