@@ -280,14 +280,15 @@ def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     ]
     stuck += broken_sensors(usable, study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
     own = emptied(detector, plans)
-    found, left = searched(own, measured_of(with_measured(study, plans)))
+    y = measured_of(with_measured(study, plans))
+    found, left = searched(own, y)
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
-    opened = on_sealed(found, verdict, causes, FAMILIES, plans[2:], 1)
+    opened = on_sealed(found, y, verdict, causes, FAMILIES, plans[2:], 1)
     verdict, causes = opened.verdict, opened.causes
     return {
         "hidden": hidden,
         "verdict": verdict,
-        "note": opened.note,
+        "note": opened.note or opened.size,
         "causes": [(c.family, c.place, round(c.amplitude, 4), c.history, c.ci95) for c in causes],
         "gains": [(g.channel, g.unit, g.recalibrated, g.extended, g.ci95) for g in opened.gains if g.affected],
         "rivals": [(r.family, r.place) for c in causes for r in c.rivals],

@@ -5,30 +5,53 @@ from __future__ import annotations
 import twin.run.jax_setup  # noqa: F401  isort: skip
 
 import sys
+from dataclasses import replace
+
+import numpy as np
 
 from tests.diagnose import small_case
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.forward import search
-from twin.diagnose.search.sealed import judged
+from twin.diagnose.search.look import Search
+from twin.diagnose.search.sealed import judged, smaller
 from twin.diagnose.search.verdict import verdict_of
 
 
 def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     detector = small_case.made_detector()
-    found = search(detector, small_case.source_off(4.5)[1])
+    y = small_case.source_off(4.5)[1]
+    found = search(detector, y)
     verdict, causes = verdict_of(found, FAMILIES)
     assert verdict == "out_of_tolerance"
     (cause,) = causes
 
-    def opened(gain: float) -> tuple[str, int, str]:
-        """gain: share of a sensor's error that the cause takes from it in the sealed run."""
-        table = (Gain("sealed", "housing", "K", 1.0, 1.0, 1.0 - gain, (gain - 0.1, gain + 0.1), True),)
-        monkeypatch.setattr(sys.modules[judged.__module__], "gains", lambda *_: table)
-        told = judged(found, verdict, causes, FAMILIES, [detector.study.runs[2].measured], 1)
-        return told.verdict, len(told.extension), told.note
+    def opened(gain: float, smaller: float | None = None) -> tuple[str, int, str]:
+        """gain: share of a sensor's error that the cause takes from it in the sealed run; smaller: a smaller one."""
+
+        def table(of: Search, *_: object) -> tuple[Gain, ...]:
+            own = gain if of is found or smaller is None else smaller
+            return (Gain("sealed", "housing", "K", 1.0, 1.0, 1.0 - own, (own - 0.1, own + 0.1), True),)
+
+        monkeypatch.setattr(sys.modules[judged.__module__], "gains", table)
+        told = judged(found, y, verdict, causes, FAMILIES, [detector.study.runs[2].measured], 1)
+        return told.verdict, len(told.extension), told.note or told.size
 
     assert opened(0.5)[:2] == ("out_of_tolerance", 1)
     refuted, extension, note = opened(-0.5)
     assert (refuted, extension) == ("unknown", 0)
     assert cause.place in note
+    kept, extension, note = opened(-0.5, smaller=0.2)  # the cause predicts the sealed run, and its size does not
+    assert (kept, extension) == (verdict, 0)
+    assert note.startswith("not written")
+
+
+def test_the_smallest_size_of_an_interval_is_calibrated_beside():
+    detector = small_case.made_detector()
+    _, y = small_case.source_off(4.5)
+    found = search(detector, y)
+    (one,) = found.accepted
+    less = smaller(one, 1.96)
+    sigma = np.sqrt(one.covariance[0, 0])
+    assert one.amplitude[0] - 2.5 * sigma < less.amplitude[0] < one.amplitude[0] - 1.9 * sigma
+    assert smaller(replace(one, covariance=1e6 * one.covariance), 1.96).amplitude[0] == 0.0

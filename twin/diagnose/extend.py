@@ -126,7 +126,7 @@ def _write_description(
         (new / DESCRIPTION).write_text(with_files(result.description, machine, new), encoding="utf-8")
         return parameters, [f"description with the members that it lacked: {target / DESCRIPTION}"]
     if not result.causes:
-        told = [n for n in diagnosis.notes if n.startswith("withdrawn")] or ["no extension is written"]
+        told = [n for n in diagnosis.notes if n.startswith(("withdrawn", "not written"))] or ["no extension is written"]
         return parameters, told
     study, entries = result.search.detector.study, {f.name: f for f in result.families}
     said: list[str] = []

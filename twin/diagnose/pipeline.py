@@ -180,7 +180,8 @@ def diagnose(
         known_family(settings.plan, settings.families)  # now, not after minutes
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     asked = named(settings.plan, detector) if settings.plan else []
-    found, dispersion = searched(detector, measured_of(study))
+    y = measured_of(study)
+    found, dispersion = searched(detector, y)
     detector = raised(detector, dispersion)  # what was searched with in the end
     poor = dispersion.share > settings.policy.dispersed
     verdict, causes = verdict_of(found, settings.families)
@@ -196,8 +197,9 @@ def diagnose(
     notes += [
         f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED and not c.rivals
     ]
-    opened = judged(shown, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
+    opened = judged(shown, y, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
     verdict, causes, extension = opened.verdict, opened.causes, opened.extension
+    notes += [opened.size] if opened.size else []
     if opened.note:  # what is shown is then the calibration beside faulty channels, as of any unknown
         notes.insert(0, opened.note)
         shown, beside = _beside_sensors(found, groups), ()

@@ -2,22 +2,26 @@
 
 It never makes a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But a cause
 of the machine that makes more of the channels that it moves worse than better, beyond chance, has explained the runs
-that were looked at and not the machine, and its name is withdrawn.
+that were looked at and not the machine, and its name is withdrawn. Where only its size does that, and the smallest one
+of its 95 % interval does not, the name stays, and nothing is written into the description.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.faults.fault import Family
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
+from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.gain import gains
 from twin.diagnose.search.look import Search
+from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.verdict import CALIBRATED
 
 
@@ -30,33 +34,61 @@ class Judged:
     extension: tuple[Cause, ...]  # what belongs into the description
     gains: tuple[Gain, ...]
     note: str = ""  # why a name was withdrawn
+    size: str = ""  # why its size was
 
 
 def judged(
-    found: Search, verdict: Verdict, causes: Sequence[Cause], families: Sequence[Family], opened: Sequence[Measured],
-    seed: int,
+    found: Search, y: np.ndarray, verdict: Verdict, causes: Sequence[Cause], families: Sequence[Family],
+    opened: Sequence[Measured], seed: int,
 ) -> Judged:  # fmt: skip
-    """The headline of a search, held against the measurements of the sealed runs, the last ones of its study."""
+    """The headline of a search in y (m,), held against the measurements of the sealed runs, the last of its study."""
     entries = {f.name: f for f in families}
     named = verdict in ("named", "out_of_tolerance", "ambiguous", "signal")
     extension = tuple(
         c for c in causes
         if named and c.history != CALIBRATED and c.family in entries and entries[c.family].changes(c)
     )  # fmt: skip
-    first = len(found.detector.study.runs) - len(opened)
-    table = tuple(
-        g for k, m in enumerate(opened, start=first) for g in gains(found, k, m, seed, _noise(found.detector, m))
-    )  # fmt: skip
-    moved = [g for g in table if g.affected]
-    worse = [g for g in moved if g.ci95[1] < 0.0]
-    if not extension or len(worse) <= sum(g.ci95[0] > 0.0 for g in moved):
+    table = _gains(found, opened, seed)
+    if not extension or not _refute(table):
         return Judged(verdict, tuple(causes), extension, table)
     names = " and ".join(dict.fromkeys(f"{c.family.replace('_', ' ')} at {c.place}" for c in extension))
+    least = tuple(smaller(a, found.detector.policy.sure) for a in found.accepted)
+    x, _ = settled(found.detector, y, least)
+    if not _refute(_gains(replace(found, accepted=least, x=x), opened, seed)):
+        note = (
+            f"not written: {names}, since the sealed run speaks for less than that size; the least of its interval fits"
+        )
+        return Judged(verdict, tuple(causes), (), table, size=note)
+    moved = [g for g in table if g.affected]
+    worse = sum(g.ci95[1] < 0.0 for g in moved)
     note = (
-        f"withdrawn: {names}. It explains the runs that were looked at, and on the sealed run it makes {len(worse)} of "
+        f"withdrawn: {names}. It explains the runs that were looked at, and on the sealed run it makes {worse} of "
         f"the {len(moved)} channels that it moves worse beyond chance"
     )
     return Judged("unknown", tuple(c for c in causes if c not in extension), (), table, note)
+
+
+def _gains(found: Search, opened: Sequence[Measured], seed: int) -> tuple[Gain, ...]:
+    """Per channel of the sealed runs."""
+    first = len(found.detector.study.runs) - len(opened)
+    return tuple(
+        g for k, m in enumerate(opened, start=first) for g in gains(found, k, m, seed, _noise(found.detector, m))
+    )  # fmt: skip
+
+
+def _refute(table: Sequence[Gain]) -> bool:
+    """Whether more of the channels that are moved become worse than better, beyond chance."""
+    moved = [g for g in table if g.affected]
+    return sum(g.ci95[1] < 0.0 for g in moved) > sum(g.ci95[0] > 0.0 for g in moved)
+
+
+def smaller(a: Accepted, sure: float) -> Accepted:
+    """A cause at the end of its 95 % interval that is nearer to nothing; an exact factor as it is."""
+    value = abs(float(a.amplitude[0]))
+    if a.hypothesis.batch.fixed or value == 0.0:
+        return a
+    sigma = np.hypot(np.sqrt(max(float(a.covariance[0, 0]), 0.0)), fault_of(a.hypothesis).uncertain(value))
+    return replace(a, amplitude=max(1.0 - sure * sigma / value, 0.0) * a.amplitude)
 
 
 def _noise(detector: Detector, m: Measured) -> tuple[np.ndarray, np.ndarray]:
