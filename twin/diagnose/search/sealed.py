@@ -2,8 +2,9 @@
 
 It never makes a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But a cause
 of the machine that makes more of the channels that it moves worse than better, beyond chance, has explained the runs
-that were looked at and not the machine, and its name is withdrawn. Where only its size does that, and the smallest one
-of its 95 % interval does not, the name stays, and nothing is written into the description.
+that were looked at and not the machine, and its name is withdrawn. Where the smallest size of
+its 95 % interval makes more of them better, the run refutes the size alone: the name stays, and nothing is written into
+the description.
 """
 
 from __future__ import annotations
@@ -49,15 +50,13 @@ def judged(
         if named and c.history != CALIBRATED and c.family in entries and entries[c.family].changes(c)
     )  # fmt: skip
     table = _gains(found, opened, seed)
-    if not extension or not _refute(table):
+    if not extension or _worth(table) >= 0:
         return Judged(verdict, tuple(causes), extension, table)
     names = " and ".join(dict.fromkeys(f"{c.family.replace('_', ' ')} at {c.place}" for c in extension))
     least = tuple(smaller(a, found.detector.policy.sure) for a in found.accepted)
     x, _ = settled(found.detector, y, least)
-    if not _refute(_gains(replace(found, accepted=least, x=x), opened, seed)):
-        note = (
-            f"not written: {names}, since the sealed run speaks for less than that size; the least of its interval fits"
-        )
+    if _worth(_gains(replace(found, accepted=least, x=x), opened, seed)) > 0:
+        note = f"not written: {names}, since the sealed run speaks for a smaller size"
         return Judged(verdict, tuple(causes), (), table, size=note)
     moved = [g for g in table if g.affected]
     worse = sum(g.ci95[1] < 0.0 for g in moved)
@@ -76,10 +75,10 @@ def _gains(found: Search, opened: Sequence[Measured], seed: int) -> tuple[Gain, 
     )  # fmt: skip
 
 
-def _refute(table: Sequence[Gain]) -> bool:
-    """Whether more of the channels that are moved become worse than better, beyond chance."""
+def _worth(table: Sequence[Gain]) -> int:
+    """How many more of the channels that are moved become better than worse, beyond chance."""
     moved = [g for g in table if g.affected]
-    return sum(g.ci95[1] < 0.0 for g in moved) > sum(g.ci95[0] > 0.0 for g in moved)
+    return sum(g.ci95[0] > 0.0 for g in moved) - sum(g.ci95[1] < 0.0 for g in moved)
 
 
 def smaller(a: Accepted, sure: float) -> Accepted:
