@@ -32,7 +32,14 @@ from twin.rom.following import read_table, temperature_place
 from twin.run.system import System
 
 BLOCK = 3600.0  # s
-FACTORS = (0.5, 2.0, 2.0**0.5, 0.5**0.5, 3.0**0.5, 3.0**-0.5, 60.0, 1 / 60.0)
+# by which a signal of a unit may be misread: peak for rms and line for phase (currents, powers), two of a kind for one,
+# minutes for seconds. A speed has no peak, and a switch is on or off
+MISREAD = {
+    "A": (0.5, 2.0, 2.0**0.5, 0.5**0.5, 3.0**0.5, 3.0**-0.5),
+    "W": (0.5, 2.0, 3.0**0.5, 3.0**-0.5),
+    "m/s": (0.5, 2.0, 60.0, 1 / 60.0),
+    "1/s": (0.5, 2.0, 60.0, 1 / 60.0),
+}
 EXPONENT = 0.6  # of speeds in forced convection
 SPEEDS = ("m/s", "1/s")  # units
 HEATING = {"A": (2.0,), "m/s": (1.0,), "1/s": (1.0, 5.0 / 3.0), "W": (1.0,), "1": (1.0,)}  # exponents by unit, of heat
@@ -283,9 +290,9 @@ def _signals(
     B[:, in_contact] = 0.0
     result = []
     for signal in load.signals:
-        if signal.name in positions or signal.name not in read or signal.unit == "degC":
+        if signal.name in positions or signal.name not in read:
             continue
-        for factor in FACTORS:
+        for factor in MISREAD.get(signal.unit, ()):
             per_run, moves = [], False
             for k, (own, power) in enumerate(zip(nominal, powers, strict=True)):
                 run = study.runs[k].run

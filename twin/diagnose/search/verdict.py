@@ -124,7 +124,9 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         same = other.family == lead.family and _part(other.name) == _part(chosen.hypothesis.name)
         if same and chosen.hypothesis.when.signal and other.when.name != chosen.hypothesis.when.name:
             same = False
-        if near and not apart and not same and other.statistic > thresholds[other.family]:
+        # a number that its tolerance tells has passed no threshold, nor need what does all that it does
+        least = min(thresholds[other.family], chosen.statistic) if relaxed else thresholds[other.family]
+        if near and not apart and not same and other.statistic >= least:
             return "ambiguous", causes
     # a sensor at fault does not keep what is beside it out of the description
     others = [c for c in causes if groups.get(c.family) != "sensor"]
