@@ -132,6 +132,7 @@ def test_a_contact_that_never_was_takes_its_parameter_along():
     [
         ("nut", 2.0, "ambiguous", ("signals.x_speed", 2.0)),  # friction: in proportion to the speed
         ("motor", 3.0, "ambiguous", ("signals.spindle_current", 1.73205)),  # copper: to the current squared
+        ("motor", 0.3, "ambiguous", ("signals.spindle_current", 0.57735)),
         ("front", 3.0, "out_of_tolerance", ()),  # three sources read that speed: it would have warmed all
     ],
 )

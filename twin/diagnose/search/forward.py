@@ -115,6 +115,9 @@ def _start(described: Detector, y: np.ndarray) -> _Start:
         exact = {
             h.name: h for h in [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
         }
+        # an exact fit ends where it cannot reach half a threshold: of what promises less to first order it says nothing
+        told = {h.name: h for h in declared if h.statistic < 0.5 * detector.thresholds[h.family]}
+        exact |= {name: told[name] for name, h in exact.items() if name in told and h.statistic <= 0.0}
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
         glance = look(detector, fitted, declared, known)
     return _Start(detector, fitted, x0, covariance, declared, glance, loose, relaxed)
