@@ -8,13 +8,14 @@ import sys
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.sealed import judged, smaller
+from twin.diagnose.search.sealed import judged, other_sizes
 from twin.diagnose.search.verdict import verdict_of
 
 
@@ -46,12 +47,14 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     assert note.startswith("not written")
 
 
-def test_the_smallest_size_of_an_interval_is_calibrated_beside():
+def test_other_sizes_are_the_smallest_and_that_of_the_settled_calibration():
     detector = small_case.made_detector()
     _, y = small_case.source_off(4.5)
     found = search(detector, y)
     (one,) = found.accepted
-    less = smaller(one, 1.96)
+    (least,), (settled,) = other_sizes(found, y)
     sigma = np.sqrt(one.covariance[0, 0])
-    assert one.amplitude[0] - 2.5 * sigma < less.amplitude[0] < one.amplitude[0] - 1.9 * sigma
-    assert smaller(replace(one, covariance=1e6 * one.covariance), 1.96).amplitude[0] == 0.0
+    assert one.amplitude[0] - 2.5 * sigma < least.amplitude[0] < one.amplitude[0] - 1.9 * sigma
+    assert settled.amplitude[0] == pytest.approx(4.5 * detector.study.scale[small_case.source_off(4.5)[0]], rel=0.05)
+    unsure = replace(found, accepted=(replace(one, covariance=1e6 * one.covariance),))
+    assert next(other_sizes(unsure, y))[0].amplitude[0] == 0.0

@@ -2,23 +2,25 @@
 
 It never makes a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But a cause
 of the machine that makes more of the channels that it moves worse than better, beyond chance, has explained the runs
-that were looked at and not the machine, and its name is withdrawn. Where the smallest size of
-its 95 % interval makes more of them better, the run refutes the size alone: the name stays, and nothing is written into
-the description.
+that were looked at and not the machine, and its name is withdrawn. Where another size that the runs that were looked
+at allow makes more of them better than worse, the run refutes the size alone: the name stays, and nothing is written
+into the description. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
+calibration makes of it without its tolerance.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
+from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
-from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.accepted import Accepted, freed
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.gain import gains
 from twin.diagnose.search.look import Search
@@ -53,11 +55,13 @@ def judged(
     if not extension or _worth(table) >= 0:
         return Judged(verdict, tuple(causes), extension, table)
     names = " and ".join(dict.fromkeys(f"{c.family.replace('_', ' ')} at {c.place}" for c in extension))
-    least = tuple(smaller(a, found.detector.policy.sure) for a in found.accepted)
-    x, _ = settled(found.detector, y, least)
-    if _worth(_gains(replace(found, accepted=least, x=x), opened, seed)) > 0:
-        note = f"not written: {names}, since the sealed run speaks for a smaller size"
-        return Judged(verdict, tuple(causes), (), table, size=note)
+    for accepted in other_sizes(found, y):
+        x, _ = settled(found.detector, y, accepted)
+        if _worth(_gains(replace(found, accepted=accepted, x=x), opened, seed)) > 0:
+            lead = next(a for a in accepted if a.hypothesis.family == extension[0].family)
+            told = f"{fault_of(lead.hypothesis).curve.told(float(lead.amplitude[0])):.3g} {lead.hypothesis.batch.unit}"
+            note = f"not written: {names}, since the sealed run speaks for another size, such as {told}"
+            return Judged(verdict, tuple(causes), (), table, size=note)
     moved = [g for g in table if g.affected]
     worse = sum(g.ci95[1] < 0.0 for g in moved)
     note = (
@@ -81,7 +85,19 @@ def _worth(table: Sequence[Gain]) -> int:
     return sum(g.ci95[0] > 0.0 for g in moved) - sum(g.ci95[1] < 0.0 for g in moved)
 
 
-def smaller(a: Accepted, sure: float) -> Accepted:
+def other_sizes(found: Search, y: np.ndarray) -> Iterator[tuple[Accepted, ...]]:
+    """The causes with sizes that the runs that were looked at allow besides the told ones."""
+    detector = found.detector
+    yield tuple(_smallest(a, detector.policy.sure) for a in found.accepted)
+    numbers = freed(detector.study, found.accepted[0].hypothesis)
+    if len(found.accepted) == 1 and numbers:
+        x, _ = settled_alone(detector.fitter, y, numbers)
+        change = float(x[numbers[0]] * detector.study.scale[numbers[0]])
+        size = np.expm1(change) if fault_of(found.accepted[0].hypothesis).conducts else change
+        yield (replace(found.accepted[0], amplitude=np.array([size])),)
+
+
+def _smallest(a: Accepted, sure: float) -> Accepted:
     """A cause at the end of its 95 % interval that is nearer to nothing; an exact factor as it is."""
     value = abs(float(a.amplitude[0]))
     if a.hypothesis.batch.fixed or value == 0.0:
