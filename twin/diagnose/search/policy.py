@@ -36,8 +36,9 @@ class SearchPolicy:
     )
     excess: float = _rule(0.25, LUMPED, "of what is left beyond them, which a cause must explain")
     dispersed: float = _rule(
-        3.0, LUMPED, "of what is left per measured number, above which a cause must explain more than all that is left"
+        3.0, LUMPED, "of what is left per measured number, above which it becomes slow errors of single channels"
     )
+    beside: float = _rule(0.5, LUMPED, "of what is left beside these, which a cause must explain")
     halves: float = _rule(
         0.5,
         JUDGED,
