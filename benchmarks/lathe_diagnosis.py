@@ -189,7 +189,7 @@ def _row(
     found, dispersion = searched(own, measured_of(with_measured(detector.study, plans)))
     verdict, causes = with_faults(*verdict_of(found, CATALOGUE), set_aside)
     told = None if hidden is None else (hidden.family, hidden.place, hidden.amplitude, hidden.history)
-    row = {"days": list(days), "hidden": told, "verdict": verdict, "set aside": [c.place for c in set_aside]}
+    row: Row = {"days": list(days), "hidden": told, "verdict": verdict, "set aside": [c.place for c in set_aside]}
     row["causes"] = [(c.family, c.place, c.amplitude, c.unit) for c in causes[len(set_aside) :]]
     row["rivals"] = [(r.family, r.place) for c in causes[len(set_aside) :][:1] for r in c.rivals]
     grown = raised(own, dispersion)
