@@ -1,10 +1,11 @@
-"""A real lathe with a twin that misses by 1 K, through all of `twin diagnose`: false alarms, and faults of the machine.
+"""A real lathe with a twin that misses by 1 K, judged as `twin diagnose` does: false alarms, and faults of the machine.
 
 Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. The twin is models/lathe, calibrated as
 its README does. Every pair of days is looked at as measured; then faults are planted into it: what the twin's full
 model computes with the fault less what it computes without is added to the readings, so that what the twin leaves of
-the real days stays as noise. Sizes are twice the limit that the diagnosis of the pair as measured states for that
-place.
+the real days stays as noise. They are heat at a node, always, with a signal or in a window, of twice the limit that the
+diagnosis of the pair as measured has for that place and history, where that is a size that physics has. Missing members
+are not looked for, and one detector serves a pair: neither takes a fault for another one.
 
 `python -m benchmarks.lathe_diagnosis HALF PAIRS FAULTS`: pairs of days 1, 3, 5 ... (0) or 2, 4, 6 ... (1), and faults
 in each. A row per diagnosis goes to out/lathe_diagnosis/HALF_PAIR.jsonl; those that are there are not made again.

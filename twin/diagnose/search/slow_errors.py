@@ -22,10 +22,7 @@ import numpy as np
 
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.search.detector import Detector
-
-ROWS = 12  # of a channel in a run, for an estimate
-LONGEST = 0.98  # rho: four hours of 5 min; what lasts longer is known from no run of a day
-LEAST = 1.0  # variance of a mode, in that of noise: what has less changes nothing
+from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
 def slow_errors(detector: Detector, fitted: Fitted) -> np.ndarray:
@@ -39,7 +36,7 @@ def slow_errors(detector: Detector, fitted: Fitted) -> np.ndarray:
             for c in range(channels):
                 at = start + np.arange(n) * channels + c
                 at = at[measured[at]]
-                modes = modes_of(left[at])
+                modes = modes_of(left[at], detector.policy)
                 block = np.zeros((len(left), modes.shape[1]))
                 block[at] = modes
                 blocks.append(block)
@@ -47,15 +44,15 @@ def slow_errors(detector: Detector, fitted: Fitted) -> np.ndarray:
     return np.hstack(blocks)
 
 
-def modes_of(left: np.ndarray) -> np.ndarray:
+def modes_of(left: np.ndarray, policy: SearchPolicy = POLICY) -> np.ndarray:
     """(n, q) of the white numbers (n,) that are left of a channel in a run."""
     n = len(left)
     more = float(left @ left) / max(n, 1) - 1.0
-    if n < ROWS or more <= 0.0:
+    if n < policy.slow_rows or more <= 0.0:
         return np.zeros((n, 0))
-    rho = float(np.clip(left[1:] @ left[:-1] / ((n - 1) * more), 0.0, LONGEST))
+    rho = float(np.clip(left[1:] @ left[:-1] / ((n - 1) * more), 0.0, policy.slow_longest))
     variance, modes = np.linalg.eigh(more * rho ** np.abs(np.subtract.outer(np.arange(n), np.arange(n))))
-    kept = variance > LEAST
+    kept = variance > policy.slow_least
     return np.asarray(modes[:, kept] * np.sqrt(variance[kept]))
 
 
