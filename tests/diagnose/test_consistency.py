@@ -42,6 +42,12 @@ def test_the_form_of_the_model_may_bend_a_size():
     assert not differs(found, own=0.1)
 
 
+def test_what_is_no_evidence_in_a_poor_model_makes_no_size_differ():
+    found = (Size(10.0, 0.1), Size(11.0, 0.1))  # Q = 50
+    assert differs(found, own=0.0, least=49.0)
+    assert not differs(found, own=0.0, least=51.0)
+
+
 def test_a_run_in_which_a_cause_does_not_act_tells_nothing():
     rng = np.random.default_rng(1)
     N, D, white = rng.standard_normal((400, 5)), rng.standard_normal((400, 1)), rng.standard_normal(400)

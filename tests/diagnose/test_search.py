@@ -149,10 +149,25 @@ def test_nothing_is_named_in_a_model_that_is_wrong_in_its_form():
     found, own = searched(detector, y)
     assert own.share > POLICY.dispersed
     assert verdict_of(found, FAMILIES) == ("too_poor", ())
-    assert all(threshold >= own.left for threshold in found.detector.thresholds.values())
-    before, after = limits_at(detector), limits_at(raised(detector, own))
+    grown = raised(detector, own)
+    assert grown.least == 0.5 * own.beside > 36.0
+    assert all(threshold >= grown.least for threshold in grown.thresholds.values())
+    before, after = limits_at(detector), limits_at(grown)
     assert all(after[place] >= size for place, size in before.items())
     assert np.median([after[p] / before[p] for p in before]) > 3.0
+
+
+def test_slow_errors_of_channels_are_not_held_against_a_cause():
+    """Heat at twice its limit is named, which is far from enough to explain more than all that such a model leaves."""
+    detector, form = small_case.made_detector(), slow_discrepancy(0.3)
+    _, own = searched(detector, measured(seed=4) + form)
+    place = ("heat_source", "W", "housing", False)
+    limit = limits_at(raised(detector, own))[place]
+    assert limit < 0.6 * limits_at(replace(detector, thresholds=dict.fromkeys(detector.thresholds, own.left)))[place]
+    found, own = searched(detector, measured("heat", "housing", 2.0 * limit, seed=4) + form)
+    assert own.share > POLICY.dispersed
+    assert [(a.hypothesis.family, a.hypothesis.name) for a in found.accepted] == [("heat_source", "housing")]
+    assert verdict_of(found, FAMILIES)[0] == "named"
 
 
 def test_what_is_left_beyond_noise_must_be_explained_by_less_than_a_cause():

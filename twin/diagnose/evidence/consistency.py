@@ -55,8 +55,9 @@ def sizes(
     return tuple(tuple(of_cause) for of_cause in zip(*made, strict=True))
 
 
-def differs(found: Sequence[Size], own: float) -> bool:
-    """Whether sizes of one cause are not the same beyond CHANCE; own: see above, a share of the mean."""
+def differs(found: Sequence[Size], own: float, least: float = 0.0) -> bool:
+    """Whether sizes of one cause are not the same beyond CHANCE; own: see above, a share of the mean; least: of Q, what
+    is no evidence in a poor model."""
     told = [s for s in found if np.isfinite(s.sigma) and s.sigma > 0.0]
     if len(told) < 2:
         return False
@@ -67,7 +68,7 @@ def differs(found: Sequence[Size], own: float) -> bool:
     a, variance = a[kept], variance[kept]
     variance = variance + (own * _mean(a, variance)) ** 2
     Q = float(((a - _mean(a, variance)) ** 2 / variance).sum())
-    return bool(scipy.stats.chi2.sf(Q, len(a) - 1) < CHANCE)
+    return bool(scipy.stats.chi2.sf(Q, len(a) - 1) < CHANCE and least < Q)
 
 
 def _mean(a: np.ndarray, variance: np.ndarray) -> float:

@@ -68,6 +68,12 @@ class Detector:
     pulls: Pulls
     policy: SearchPolicy  # that it is searched with: no number of its own depends on it
     least: float = 0.0  # statistic that any cause needs, where the model is wrong in its form (`dispersion`)
+    poor: bool = False  # its model discrepancy holds what the model leaves of these very runs (`slow_errors`)
+
+    @property
+    def no_evidence(self) -> float:
+        """Statistic up to which nothing speaks for a cause in a poor model, nor against one that has passed."""
+        return self.least if self.poor else 0.0
 
     @property
     def whiten(self) -> Whitener:

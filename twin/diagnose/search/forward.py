@@ -154,7 +154,7 @@ def _covering(detector: Detector, standing: Sequence[Hypothesis], parts: dict[st
     return [
         h for h in standing
         if free <= detector.thresholds["unknown"] or (
-            (h.statistic > policy.covers * free or fault_of(h).several)
+            (h.statistic > min(policy.covers * free, free - detector.no_evidence) or fault_of(h).several)
             and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
         )
     ]  # fmt: skip
@@ -228,14 +228,18 @@ def _leaking(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, 
     return [
         a for a in accepted
         if a.hypothesis.when.windows and a.hypothesis.when.bell is None and a.units and fault_of(a.hypothesis).grows
-        and left > max(detector.policy.left * detector.thresholds["unknown"], _misfit(a))
+        and left > max(detector.policy.left * detector.thresholds["unknown"], _misfit(a), detector.no_evidence)
     ]  # fmt: skip
 
 
 def _uneven(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
     """Causes in the machine of another size in every run: what acts on readings may be set up anew for each."""
     faults = [fault_of(a.hypothesis) for a in accepted]
-    return [a for a, f in zip(accepted, faults, strict=True) if (a.units or f.parameter) and differs(a.by_run, f.own)]
+    return [
+        a
+        for a, f in zip(accepted, faults, strict=True)
+        if (a.units or f.parameter) and differs(a.by_run, f.own, detector.no_evidence)
+    ]
 
 
 def _misfit(a: Accepted) -> float:

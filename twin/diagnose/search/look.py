@@ -47,7 +47,7 @@ class Search:
     @property
     def poor(self) -> bool:
         """Whether the model is wrong in its form: what is left has many times the variance that it should have."""
-        return self.dispersion() > self.detector.policy.dispersed
+        return self.detector.poor or self.dispersion() > self.detector.policy.dispersed
 
     def dispersion(self, among: np.ndarray | None = None) -> float:
         """Of what is left, per measured number; among (m,) bool: of these alone, 0 where none of them is measured."""

@@ -36,7 +36,13 @@ class SearchPolicy:
     )
     excess: float = _rule(0.25, LUMPED, "of what is left beyond them, which a cause must explain")
     dispersed: float = _rule(
-        3.0, LUMPED, "of what is left per measured number, above which a cause must explain more than all that is left"
+        3.0, LUMPED, "of what is left per measured number, above which it becomes slow errors of single channels"
+    )
+    beside: float = _rule(0.5, LUMPED, "of what is left beside these, which a cause must explain")
+    slow_rows: int = _rule(12, JUDGED, "of a channel in a run, from which a slow error is learned")
+    slow_longest: float = _rule(0.98, JUDGED, "of neighbours: four hours of 5 min, of runs of a day", "correlation")
+    slow_least: float = _rule(
+        1.0, DERIVED, "of a mode of slow errors: what has less than noise changes nothing", "variances of noise"
     )
     halves: float = _rule(
         0.5,

@@ -44,7 +44,10 @@ def poor_note(
     policy = found.detector.policy
     variance = f"{dispersion.share:.2g} times the variance that noise and model discrepancy have"
     if dispersion.share > policy.dispersed:
-        told = f"the model is too poor to name a cause that explains less than all that is left, {variance}"
+        told = (
+            f"the model is too poor: even the best explanation leaves {variance}, and a cause must explain "
+            f"{policy.beside:.0%} of what is left beside slow errors of single channels"
+        )
     else:
         told = f"even the best explanation leaves {variance}: a cause must explain {policy.excess:.0%} of the excess"
     sensors = plans[0].sensors

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.batch import Batch, Hypothesis
 from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.evidence.sight import sight
 from twin.diagnose.evidence.unknown import history
@@ -237,21 +237,21 @@ def with_faults(
     return "sensor" if faults and verdict in ("nothing", "too_poor") else verdict, (*faults, *causes)
 
 
-def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
-    """(family, unit, place, whether it switches) -> the size that would have been named in 95 of 100 cases.
-
-    The median over histories, as amplitudes are: relative changes, logarithms of factors.
-    """
-    result: dict[tuple[str, str, str, bool], float] = {}
+def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
+    """Of every batch whose size is free (p, h): the size that would have been named in 95 of 100 cases, as amplitudes
+    are (relative changes, logarithms of factors), at each place with each history."""
     _, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
     for own in sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J))).ready:
-        batch = own.batch
-        if batch.fixed:
-            continue
-        sizes = (np.sqrt(detector.thresholds[batch.family]) + detector.policy.power) / np.sqrt(
-            np.maximum(own.information, 1e-30)
-        )
-        sizes = np.maximum(sizes, batch.smallest)
+        if not own.batch.fixed:
+            sigmas = np.sqrt(detector.thresholds[own.batch.family]) + detector.policy.power
+            sizes = sigmas / np.sqrt(np.maximum(own.information, 1e-30))
+            yield own.batch, np.maximum(sizes, own.batch.smallest)
+
+
+def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
+    """(family, unit, place, whether it switches) -> the median of `limits_in` over histories, the least of batches."""
+    result: dict[tuple[str, str, str, bool], float] = {}
+    for batch, sizes in limits_in(detector):
         for windowed in (False, True):
             chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
             for p, name in enumerate(batch.places if chosen else ()):

@@ -1,0 +1,56 @@
+"""What is left of a channel, as a slow error of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.search.slow_errors import modes_of, with_errors
+
+ROWS = 400
+
+
+def test_noise_has_no_slow_error():
+    kept = [modes_of(np.random.default_rng(seed).standard_normal(ROWS)).shape[1] for seed in range(20)]
+    assert np.mean(kept) < 1.0
+
+
+@pytest.mark.parametrize(("size", "rho"), [(2.0, 0.9), (4.0, 0.95)])
+def test_a_slow_error_has_the_variance_and_the_memory_of_what_is_left(size, rho):
+    found = []
+    for seed in range(20):
+        rng, slow = np.random.default_rng(seed), np.zeros(ROWS)
+        for i in range(1, ROWS):
+            slow[i] = rho * slow[i - 1] + np.sqrt(1.0 - rho**2) * rng.standard_normal()
+        modes = modes_of(size * slow + rng.standard_normal(ROWS))
+        own = modes @ modes.T
+        found.append([np.diag(own).mean(), np.diag(own, 10).mean()])
+    variance, later = np.mean(found, axis=0)
+    assert variance == pytest.approx(size**2, rel=0.25)
+    assert later / variance == pytest.approx(rho**10, abs=0.1)
+
+
+def test_few_rows_say_nothing():
+    assert modes_of(np.full(11, 10.0)).shape == (11, 0)
+    assert modes_of(np.zeros(0)).shape == (0, 0)
+
+
+def test_a_slow_error_is_no_evidence_any_more():
+    """Of an error in one channel that it holds, a detector leaves hardly anything."""
+    detector = small_case.made_detector()
+    study = detector.study
+    error = np.zeros(len(measured_of(study)))
+    (bins, sensors), _ = study.runs[0].shapes
+    error[np.arange(bins) * sensors] = 3.0 * np.sin(np.linspace(0.0, 6.0, bins))
+    y = detector.fitter.surrogate.y0 + error
+
+    def left(own):
+        fitted = own.fitter(y)
+        return float(own.whiten(fitted.residual) @ fitted.projector(own.whiten(fitted.residual)))
+
+    wide = with_errors(detector, detector.whiten(error)[:, None])
+    assert left(wide) < 0.2 * left(detector)
+    assert wide.poor
+    assert not detector.poor
