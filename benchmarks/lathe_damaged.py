@@ -43,8 +43,8 @@ PAIRS = 10  # per half: 60 trials
 FORM, NULLS = 16, 20  # synthetic measurements: what the twin leaves decides anyway
 DAMAGES = {name: draw for name, draw in KINDS.items() if name != ALWAYS}
 # what a diagnosis calls each kind of damage, as the beginning of the history of its first cause
-SAID = {"noise": "noise", "rail": "rail", "leap": ("leap", "a leap"), "offset": "an offset", "drift": "a drift",
-        "stuck": "stuck", "swapped": "names"}  # fmt: skip
+SAID = {"noise": ("noise",), "rail": ("rail",), "leap": ("leap", "a leap"), "offset": ("an offset",),
+        "drift": ("a drift",), "stuck": ("stuck",), "swapped": ("names",)}  # fmt: skip
 
 Row = dict[str, Any]
 FIGURES = ("sensor", "channel", "kind", "size", "alone", "unmoved")

@@ -7,7 +7,7 @@ import pytest
 
 from tests.logs.faults.test_usable import made
 from twin.calibrate.channels.filled import filled
-from twin.calibrate.channels.judge import KNOWN, judge, set_aside
+from twin.calibrate.channels.judge import judge, set_aside
 from twin.inject.damage.channels import Damage, with_load
 from twin.inject.damage.kinds import damaged
 from twin.logs.run import Run
@@ -62,7 +62,7 @@ def test_readings_that_others_know_stand_in_for_lost_ones():
     bad = [damaged(runs[0], Damage("sensor", f"sensors.{AIR}", -200.0, "rail", start=3 * HOUR)), runs[1]]
     sound = set_aside(bad, judge(bad).findings)
     lost = np.isnan(sound[0].temperatures.columns[AIR])
-    first, second = filled(bad, sound, KNOWN)
+    first, second = filled(bad, sound, 0.5)
     error = first.temperatures.columns[AIR] - runs[0].temperatures.columns[AIR]
     assert lost.mean() > 0.5
     assert np.isfinite(error).all()
@@ -78,5 +78,5 @@ def test_what_was_never_logged_stays_missing():
     gap = np.array(run.temperatures.columns[AIR])
     gap[100:200] = np.nan
     run = replace(run, temperatures=replace(run.temperatures, columns={**run.temperatures.columns, AIR: gap}))
-    (after,) = filled([run], [run], KNOWN)
+    (after,) = filled([run], [run], 0.5)
     np.testing.assert_array_equal(after.temperatures.columns[AIR], gap)

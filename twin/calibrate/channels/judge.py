@@ -43,20 +43,27 @@ def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[st
     frozen = _frozen([run for run, _ in parts])
     plain = [_without(run, k, [f for f in frozen if k in f.runs]) for k, (run, _) in enumerate(parts)]
     faults = [(k, f) for k, (_, found) in enumerate(parts) for f in found]
-    own = [_own(k, f, channel) for k, f in faults if f.kind in EMPTIED for channel in f.channels] + frozen
-    splices = tuple((k, f) for k, f in faults if f.kind == "splice")
-    leaps = [(k, channel, f) for k, f in faults if f.kind == "leap" for channel in f.channels]
-    alone = [(k, channel, f.first_time) for k, channel, f in leaps if len(f.channels) == 1]
+    leaps = [(k, f) for k, f in faults if f.kind == "leap"]
     table = readings(plain)
-    found = [*own, *(refuted(table, alone) if table is not None else [])]
-    found = [f for f in found if within is None or any(c in within for c in f.channels)]
-    return Judgement(tuple(found), splices, tuple((k, channel) for k, channel, _ in leaps))
+    found = [*_own(faults), *frozen]
+    if table is not None:
+        found += refuted(table, [(k, f.channels[0], f.first_time) for k, f in leaps if len(f.channels) == 1])
+    return Judgement(
+        tuple(f for f in found if within is None or set(f.channels) & set(within)),
+        tuple((k, f) for k, f in faults if f.kind == "splice"),
+        tuple((k, channel) for k, f in leaps for channel in f.channels),
+    )
 
 
-def _own(run: int, f: Fault, channel: str) -> Finding:
-    what: What = "noise" if f.kind == "noise" else "rail" if f.kind == "rail" else "stuck"
-    size = f.size / _DEPARTS if what == "noise" else f.size if what == "rail" else f.last_time - f.first_time
-    return Finding(what, (channel,), (run,), f.first_time, f.last_time, size, (size, size), np.inf)
+def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:
+    """What rows of a run itself show of each channel that is noise, rests at a limit or stands still."""
+    found = []
+    for run, f in faults:
+        what: What = "noise" if f.kind == "noise" else "rail" if f.kind == "rail" else "stuck"
+        size = f.size / _DEPARTS if what == "noise" else f.size if what == "rail" else f.last_time - f.first_time
+        for channel in f.channels if f.kind in EMPTIED else ():
+            found.append(Finding(what, (channel,), (run,), f.first_time, f.last_time, size, (size, size), np.inf))
+    return found
 
 
 def _frozen(runs: Sequence[Run]) -> list[Finding]:
