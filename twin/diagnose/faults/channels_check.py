@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 
 from twin.calibrate.channels.finding import UNITS, Finding
@@ -18,19 +19,18 @@ def channels_at_fault(
     runs: Sequence[Run], judgement: Judgement, sensors: Sequence[str], names: Sequence[str]
 ) -> tuple[list[Run], list[Cause]]:
     """Runs without the readings that a judgement is about, which a fit would be dragged along by, and a cause for each
-    finding: first what rows of the run itself show, then what all other channels refute, then leaps of sensors of the
-    machine that leave no other trace.
+    finding in its order, then for leaps of sensors of the machine that leave no other trace.
 
     names: of the runs.
     """
     sound = set_aside(runs, judgement.findings)
-    causes = [_cause(f, runs, names) for f in sorted(judgement.findings, key=lambda f: (f.runs, f.start))]
     told = {(k, channel) for f in judgement.findings for k in f.runs for channel in f.channels}
-    return sound, sorted(causes, key=lambda c: -c.statistic) + _leaps(sound, sensors, names, told)
+    causes = [_cause(f, runs, names) for f in judgement.findings]
+    return sound, causes + _leaps(sound, sensors, names, told)
 
 
 def _cause(f: Finding, runs: Sequence[Run], names: Sequence[str]) -> Cause:
-    shown = f.statistic == float("inf")  # by rows of the run itself
+    shown = f.statistic == math.inf  # by rows of the run itself
     whole = [k for k in f.runs if f.what in ("offset", "drift") or k != f.runs[0]]
     ends = {k: f.end if shown else _end(runs[k]) for k in f.runs}
     windows = tuple(Window(names[k], 0.0 if k in whole else f.start, ends[k]) for k in f.runs)
@@ -53,7 +53,7 @@ def _leaps(
                 known.add(channel)
                 window = Window(name, f.first_time, f.last_time)
                 causes.append(
-                    Cause("sensor", f"sensors.{channel}", "", f.size, (f.size, f.size), f.unit, float("inf"), 0.0,
+                    Cause("sensor", f"sensors.{channel}", "", f.size, (f.size, f.size), f.unit, math.inf, 0.0,
                           history=f.kind, windows=(window,))
                 )  # fmt: skip
     return causes
