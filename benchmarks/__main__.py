@@ -21,7 +21,7 @@ NAMES = (
     "window", "live", "serve",
 )  # fmt: skip
 # by name alone: a day, hours, or a package index
-ASKED = ("sensitivity", "lathe_diagnosis", "lathe_calibration", "install")
+ASKED = ("sensitivity", "lathe_diagnosis", "lathe_damaged", "lathe_calibration", "install")
 
 
 def main() -> None:

@@ -1,25 +1,21 @@
-"""A rough twin of a real lathe calibrated: what weights are worth, and how far a damaged channel moves parameters.
+"""A rough twin of a real lathe calibrated: what weights are worth.
 
-Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. First the six days of
-models/lathe/README.md are fitted with and without weights (docs/calibration.md), as measured and with a channel that
-is wrong by less than the judgement of channels sees; eight other days are predicted. Then pairs of days are fitted as
-measured and with one sensor of the twin damaged as in `benchmarks.lathe_channels`; told is by how many standard
-deviations of its own the parameter moves that moves farthest. `python -m benchmarks.lathe_calibration TRIALS`; 12 by
-default.
+Needs the measured data (TWIN_MEASURED_DATA) and says so where there are none. The six days of models/lathe/README.md
+are fitted with and without weights (docs/calibration.md), as measured and with a channel that is wrong by less than the
+judgement of channels sees; eight other days are predicted. How far a damaged channel moves parameters
+`benchmarks.lathe_damaged` tells.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.lathe_channels import ALWAYS, KINDS
 from benchmarks.lathe_diagnosis import MODEL, TRAINING
 from models.measured import VARIABLE, measured_data
 from models.recordings import lathe_days
@@ -39,7 +35,7 @@ from twin.rom.artefact import Artefact, read_artefact
 from twin.run.replay import replay
 
 OUT = Path(__file__).parents[1] / "out" / "lathe_calibration"
-TRIALS, SEALED, SEED = 12, 8, 11
+SEALED = 8
 HIDDEN = Damage("sensor", "sensors.PT08", 1.4, "offset")  # K: a channel is refuted from 1.5 K on
 
 
@@ -48,19 +44,12 @@ def main() -> None:
     if data is None:
         print(f"   not run: no measured data; set {VARIABLE} to the folder that holds lathe")
         return
-    given = [int(a) for a in sys.argv if a.isdigit()]
     OUT.mkdir(parents=True, exist_ok=True)
     with contextlib.redirect_stdout(io.StringIO()):
         load_script(MODEL / "runs", "make_runs.py").write_runs(data, OUT / "runs")
         if not (OUT / "rough.h5").exists():
             build_artefact(MODEL / "machine.toml", OUT / "rough.h5")
     artefact = read_artefact(OUT / "rough.h5")
-    weights(artefact)
-    moves(artefact, given[0] if given else TRIALS)
-
-
-def weights(artefact: Artefact) -> None:
-    """What is left of sealed days, with weights of hours and without."""
     training = [_run(day) for day in TRAINING]
     others = [p.stem for p in lathe_days() if p.stem not in TRAINING and p.stem != "20200706"]
     sealed = [_run(day) for day in others[: 2 * SEALED : 2]]
@@ -80,28 +69,6 @@ def weights(artefact: Artefact) -> None:
                 f"   {name + (', weights' if weighted else ', no weights'):58}{T:8.3f}{1e6 * x:14.2f}{1e6 * z:8.2f}",
                 flush=True,
             )
-
-
-def moves(artefact: Artefact, trials: int) -> None:
-    """By how many of its standard deviations the farthest parameter moves."""
-    kinds = {name: draw for name, draw in KINDS.items() if name != ALWAYS}
-    runs = [_run(p.stem) for p in lathe_days() if p.stem != "20200706"]
-    rng, found, sensors = np.random.default_rng(SEED), list[float](), set(artefact.model.sensors)
-    while len(found) < trials:
-        name = list(kinds)[len(found) % len(kinds)]
-        trial = kinds[name](rng, runs)
-        if trial is None or not set(trial.channels) <= sensors:  # a witness of which the twin knows nothing
-            continue
-        plain = [next(r for r in runs if r.folder == own.folder) for own in trial.runs]
-        before, after = (fitted(artefact, these, True) for these in (plain, trial.runs))
-        moved = np.abs(after.x - before.x) / before.sigma
-        n = len(before.problem.parameters)
-        worst = int(np.argmax(moved[:n]))
-        found.append(float(moved[worst]))
-        what = f"{' '.join(trial.channels)} {trial.size:.3g}"
-        print(f"      {name:40}{what:28}{found[-1]:6.2f} {before.problem.names[worst]}", flush=True)
-    good = sum(m < 1.0 for m in found)
-    print(f"   moved by less than one standard deviation, the farthest parameter: {good} of {len(found)} trials")
 
 
 def fitted(artefact: Artefact, runs: Sequence[Run], weighted: bool) -> Fit:

@@ -125,7 +125,7 @@ def words(f: Finding) -> str:
 
 def _chosen(rng: np.random.Generator, runs: Sequence[Run]) -> tuple[list[Run], int, str, float]:
     """Two or three runs, which of them is damaged, in which channel, and from when on [s]."""
-    picked = [runs[int(k)] for k in rng.choice(len(runs), int(rng.integers(2, 4)), replace=False)]
+    picked = [runs[int(k)] for k in rng.choice(len(runs), min(int(rng.integers(2, 4)), len(runs)), replace=False)]
     k = int(rng.integers(len(picked)))
     table = picked[k].temperatures
     assert table is not None

@@ -7,8 +7,9 @@ import pytest
 
 from tests.calibrate import lumped_case
 from twin.calibrate.fit.calibration import calibrate, chosen, windows
+from twin.calibrate.fit.evaluated import Evaluated, floors
 from twin.calibrate.fit.experiments import propose
-from twin.calibrate.fit.fit import Stop, fit
+from twin.calibrate.fit.fit import Stop, _seen, fit
 from twin.calibrate.fit.options import Options
 from twin.calibrate.fit.problem import problem
 from twin.calibrate.fit.separation import separation
@@ -95,6 +96,24 @@ def test_a_fit_stops_where_told_and_stays_within_bounds(parameters):
     stopped = fit(made, report=interrupt)
     assert stopped.stopped == "interrupted"
     np.testing.assert_array_equal(stopped.x, seen[1].x)
+
+
+def test_a_fit_of_a_poor_model_is_repeated_until_its_own_noise_changes_it_no_more(parameters):
+    run, rng = lumped_case.truth(planted(parameters, 2)[1], 2), np.random.default_rng(2)
+    time = run.temperatures.time
+    columns = {  # about 1 K that no machine of this form can do
+        name: values + rng.uniform(0.5, 1.5) * np.sin(time / rng.uniform(1500.0, 6000.0) + rng.uniform(0.0, 6.0))
+        for name, values in run.temperatures.columns.items()
+    }
+    made = problem(
+        lumped_case.artefact(), [replace(run, temperatures=replace(run.temperatures, columns=columns))], parameters,
+        OPTIONS,
+    )  # fmt: skip
+    found = fit(made)
+    noise = _seen(Evaluated(made), found.noise, [floors(made, own) for own in made.runs], found.x)
+    again = fit(made, start=found.x, known=noise)
+    assert found.stopped == "minimum"
+    assert np.max(np.abs(again.x - found.x) / found.sigma) < 0.3  # 1.5 after two repetitions
 
 
 @pytest.mark.long

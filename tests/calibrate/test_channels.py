@@ -8,6 +8,8 @@ import pytest
 from models.recordings import lathe_days, lathe_run
 from tests.hidden.trials import trial
 from twin.calibrate.channels.judge import judge, set_aside, words
+from twin.calibrate.channels.readings import readings
+from twin.calibrate.channels.refute import refuted
 from twin.calibrate.fit.weights import stretch_weights
 from twin.inject.damage.channels import Damage
 from twin.inject.damage.kinds import damaged
@@ -58,6 +60,19 @@ def test_a_leap_is_named_with_its_size_and_set_aside(runs, size, start):
     assert np.isnan(first[time > found.start]).all()
     assert np.isfinite(first[time < found.start]).all()
     assert f"'{name}' reads" in words(found, ["monday", "tuesday"])
+
+
+def test_a_leap_that_its_own_rows_show_needs_less_of_the_others(runs):
+    name, size, start = "x_motor", 2.0, 4 * HOUR
+    bad = damaged(runs[0], Damage("sensor", f"sensors.{name}", size, "offset", start=start))
+    table = readings([bad, runs[1]])
+    assert refuted(table) == []
+    (found,) = refuted(table, [(0, name, start)])
+    assert (found.what, found.channels, found.runs) == ("leap", (name,), (0,))
+    assert found.size == pytest.approx(size, rel=0.2)
+    assert found.least < found.statistic
+    assert refuted(table, [(0, name, start + 2 * HOUR)]) == []
+    assert refuted(table, [(0, "column_right", start)]) == []
 
 
 def test_a_drift_and_an_offset_of_one_run_are_named(runs):

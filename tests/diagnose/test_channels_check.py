@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from twin.diagnose.faults.channels_check import stuck_sensors
+from tests.logs.faults.test_usable import changed, made
+from twin.calibrate.channels.judge import judge
+from twin.diagnose.faults.channels_check import channels_at_fault
+from twin.diagnose.result.diagnosis import Cause
 from twin.logs.run import Run, Table
 
 HOUR = 3600.0
 TIME = 30.0 * np.arange(1800)  # 15 h
 NIGHT = (TIME >= 8 * HOUR) & (TIME < 14 * HOUR)
 NAMES = ("a", "b", "c")
+THREE = ("t0", "t1", "t2")
 
 
 def temperatures(resolution: float = 0.0) -> dict[str, np.ndarray]:
@@ -21,16 +27,21 @@ def temperatures(resolution: float = 0.0) -> dict[str, np.ndarray]:
     for k, name in enumerate(NAMES):
         values = 22.0 + (1.5 + 0.4 * k) * np.sin(TIME / 900.0 + k) + 0.02 * rng.standard_normal(len(TIME))
         if resolution:
-            values[NIGHT] = 21.0
-            values = resolution * np.round(values / resolution)
+            rest = 21.0 + (values - 21.0) * np.exp(-np.maximum(TIME - 8 * HOUR, 0.0) / 600.0)
+            wakes = 21.0 + (values - 21.0) * -np.expm1(-np.maximum(TIME - 14 * HOUR, 0.0) / 600.0)
+            values = resolution * np.round(np.where(TIME < 14 * HOUR, rest, wakes) / resolution)
         columns[name] = values
     return columns
+
+
+def at_fault(runs: list[Run], names: list[str]) -> tuple[list[Run], list[Cause]]:
+    return channels_at_fault(runs, judge(runs), NAMES, names)
 
 
 def checked(columns: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[tuple[str, float, float]]]:
     """Columns after the check, and (place, start, end) of each cause."""
     run = Run(Table(TIME, {}, {}), Table(TIME, columns, dict.fromkeys(columns, "degC")))
-    (after,), causes = stuck_sensors([run], NAMES, ["run"])
+    (after,), causes = at_fault([run], ["run"])
     assert after.temperatures is not None
     assert all(c.history == "stuck" for c in causes)
     return dict(after.temperatures.columns), [(c.place, w.start, w.end) for c in causes for w in c.windows]
@@ -77,33 +88,46 @@ def test_a_channel_that_froze_in_one_run_is_frozen_in_all_of_the_next():
     first["b"] = np.where(TIME >= 9 * HOUR, 22.5, first["b"])
     second["b"], second["c"] = np.full(len(TIME), 22.1), np.full(len(TIME), np.nan)
     runs = [Run(Table(TIME, {}, {}), Table(TIME, own, dict.fromkeys(own, "degC"))) for own in (first, second)]
-    usable, causes = stuck_sensors(runs, NAMES, ["monday", "tuesday"])
+    usable, causes = at_fault(runs, ["monday", "tuesday"])
     assert [(c.place, c.windows[0].run) for c in causes] == [("sensors.b", "monday"), ("sensors.b", "tuesday")]
     assert [np.isfinite(run.temperatures.columns["b"]).sum() for run in usable] == [1080, 0]
-    assert stuck_sensors(runs, ["a", "c"], ["monday", "tuesday"])[1] == []
     # alone, the second run does not tell how often it should have changed
-    assert stuck_sensors(runs[1:], NAMES, ["tuesday"])[1] == []
+    assert at_fault(runs[1:], ["tuesday"])[1] == []
 
 
 def test_a_run_at_rest_is_not_a_frozen_channel():
     work, rest = temperatures(resolution=0.1), {name: np.full(len(TIME), 21.0) for name in NAMES}
     runs = [Run(Table(TIME, {}, {}), Table(TIME, own, dict.fromkeys(own, "degC"))) for own in (work, rest)]
-    assert stuck_sensors(runs, NAMES, ["work", "rest"])[1] == []
+    assert at_fault(runs, ["work", "rest"])[1] == []
 
 
-def test_a_sensor_that_breaks_is_named_and_left_out_of_what_is_fitted():
-    from tests.logs.faults.test_usable import changed, made
-    from twin.diagnose.faults.channels_check import broken_sensors
-
+def test_a_sensor_that_breaks_is_named_with_its_size_and_left_out_of_what_is_fitted():
     run = made()
     broken = run.temperatures.columns["t3"].copy()
     broken[200:] = 850.0
     leapt = run.temperatures.columns["t1"].copy()
     leapt[300:] += 7.0
     runs = [changed(changed(run, "t3", broken), "t1", leapt), made(2)]
-    causes = broken_sensors(runs, ("t1", "t3"), ("monday", "tuesday"))
-    assert {(c.place, c.history) for c in causes} == {("sensors.t1", "leap"), ("sensors.t3", "broken")}
+    judgement, names = judge(runs), ("monday", "tuesday")
+    usable, causes = channels_at_fault(runs, judgement, ("t1", "t3"), names)
+    by_place = {c.place: c for c in causes}
+    assert set(by_place) == {"sensors.t1", "sensors.t3"}
+    assert by_place["sensors.t3"].history == "rail"
+    assert (by_place["sensors.t3"].amplitude, by_place["sensors.t3"].unit) == (850.0, "degC")
+    assert "leap" in by_place["sensors.t1"].history
+    assert abs(by_place["sensors.t1"].amplitude - 7.0) < 0.5
     assert {w.run for c in causes for w in c.windows} == {"monday"}
-    (leap,) = (c for c in causes if c.history == "leap")
-    assert abs(leap.amplitude - 7.0) < 0.5
-    assert broken_sensors(runs, ("t0",), ("monday", "tuesday")) == []
+    assert np.isnan(usable[0].temperatures.columns["t3"][200:]).all()
+    assert np.isfinite(usable[0].temperatures.columns["t3"][:200]).all()
+
+
+def test_a_leap_without_witnesses_is_told_of_sensors_of_the_machine_alone():
+    run = made()
+    few = replace(run, temperatures=replace(run.temperatures, columns={n: run.temperatures.columns[n] for n in THREE}))
+    leapt = few.temperatures.columns["t1"].copy()
+    leapt[300:] += 7.0
+    few = changed(few, "t1", leapt)
+    (cause,) = channels_at_fault([few], judge([few]), ("t0", "t1"), ["monday"])[1]
+    assert (cause.place, cause.history) == ("sensors.t1", "leap")
+    assert abs(cause.amplitude - 7.0) < 0.5
+    assert channels_at_fault([few], judge([few]), ("t0",), ["monday"])[1] == []

@@ -11,11 +11,12 @@ import numpy as np
 from tests.hidden.trials import MODEL, STATES, trial
 from twin.build.cache import folder
 from twin.build.project import orthonormalise, project
+from twin.calibrate.channels.judge import judge
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.evidence.coarse import Coarse, too_coarse
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.result.diagnosis import Cause, Verdict
@@ -61,14 +62,14 @@ def said(settings: Settings, name: str) -> Said:
     else:
         detector = made_detector(settings)
     study = detector.study
-    usable, stuck = stuck_sensors(runs[:2], study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
+    names, sensors = [p.run.name for p in study.runs[:2]], study.probed.base.sensors
+    usable, faults = channels_at_fault(runs[:2], judge(runs[:2]), sensors, names)
     plans = [
         measured(study.probed.base, run, p.run.drive, p.run.name)
         for run, p in zip([*usable, runs[2]], study.runs, strict=True)
     ]
-    stuck += broken_sensors(usable, study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
     found, _ = searched(emptied(detector, plans), measured_of(with_measured(study, plans)))
-    verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
+    verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
     states, coarse = STATES.get(name), None
     if states:
         coarse = too_coarse(_few(detector, states), study, settings.temperature_sigma, settings.tcp_sigma)

@@ -30,7 +30,7 @@ def _options() -> type[Any]:
     "--only", multiple=True, help="parameters to fit: a path, or a pattern such as 'sources.*'  [default: all]"
 )
 @click.option("--hold", multiple=True, help="parameters to leave as they are; both repeatable")
-@click.option("--iterations", default=30, show_default=True, type=click.IntRange(1), help="stop after so many")
+@click.option("--iterations", default=100, show_default=True, type=click.IntRange(1), help="stop after so many")
 @click.option("--budget", default="10 min", show_default=True, type=Quantity("s"), help="stop after this time")
 @click.option("--noise", default="0.1 K", show_default=True, type=Quantity("K"),
               help="standard deviation of one temperature sample")  # fmt: skip

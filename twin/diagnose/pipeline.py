@@ -20,7 +20,7 @@ from twin.diagnose.evidence.discretisation import Difference, differences
 from twin.diagnose.evidence.nulls import form_of
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import VERSION
-from twin.diagnose.faults.channels_check import broken_sensors, refuted_sensors, stuck_sensors
+from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import FAMILIES
 from twin.diagnose.model.probed_model import ProbedModel, drive_arrays, make_probed_model
@@ -172,10 +172,9 @@ def diagnose(
     """
     names = run_names([*runs, *sealed])
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
-    usable, faults = stuck_sensors(runs, sensors, names[: len(runs)])
-    judgement = judge(usable, sensors)
-    usable, refuted = refuted_sensors(usable, judgement, names[: len(runs)])
-    faults += [*broken_sensors(usable, sensors, names[: len(runs)]), *refuted]
+    logged = {n for run in runs if run.temperatures is not None for n in run.temperatures.columns}
+    judgement = judge(runs, logged - set(settings.exclude))
+    usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
     _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)

@@ -32,7 +32,7 @@ Runs = Sequence["Run | str | Path"]
 class CalibrateOptions:
     """How runs are compared, and when the fit stops."""
 
-    iterations: int = 30
+    iterations: int = 100
     budget: Quantity = "10 min"  # stop after this time
     noise: Quantity = "0.1 K"  # standard deviation of one temperature sample
     tcp_noise: Quantity = "1 um"  # of a TCP deviation, where tcp.csv has no sigma
@@ -182,7 +182,8 @@ def calibrate(
     """
     import twin.run.jax_setup  # noqa: F401  isort: skip  first: it prepares JAX before NumPy is loaded
 
-    from twin.calibrate.channels.judge import judge, set_aside
+    from twin.calibrate.channels.filled import filled
+    from twin.calibrate.channels.judge import KNOWN, judge, set_aside
     from twin.calibrate.fit.calibration import chosen
 
     options = options or CalibrateOptions()
@@ -199,6 +200,8 @@ def calibrate(
     whole = runs_of(given)
     judgement = judge(whole)
     read_runs = set_aside(whole, judgement.findings)
+    if judgement.findings:
+        read_runs = filled(whole, read_runs, KNOWN)
     steps = [read_runs] if options.window is None else [[run] for run in _windows(read_runs, options)]
     parameters = chosen(loaded.artefact, only, hold, any(run.tcp is not None for run in read_runs))
     fitter = _Fitter(loaded.artefact, parameters, settings, options, reporter(progress), on_iteration, judgement)
@@ -257,8 +260,9 @@ class _Fitter:
                     raise
                 on_window(Window(hours, problem=e.problems[0].what))
                 continue
-            facts = told(result, these, k == len(steps) - 1, self.judgement)
-            found = facts, traces_of(result.fit, whole, self.judgement)
+            traces = traces_of(result.fit, whole, self.judgement)
+            facts = told(result, these, k == len(steps) - 1, self.judgement, traces)
+            found = facts, traces
             if self.options.window is not None:
                 on_window(Window(hours, facts))
             if result.fit.stopped == "interrupted":

@@ -31,3 +31,4 @@ class Finding:
     size: float  # in UNITS; NaN of a swapped pair
     interval: tuple[float, float]  # 95 %; that of the size itself where it is read and not estimated
     statistic: float  # twice a log-likelihood ratio; inf where rows of the run itself show it
+    least: float = 0.0  # of the statistic, for a name; 0 where rows of the run itself show it

@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twin.calibrate.channels.filled import driven
 from twin.calibrate.channels.finding import Finding, What
-from twin.calibrate.channels.readings import EMPTIED, emptied, readings
+from twin.calibrate.channels.readings import EMPTIED, STUCK, emptied, readings
 from twin.calibrate.channels.refute import refuted
 from twin.logs.faults.fault import Fault
 from twin.logs.run import Run
+from twin.logs.stuck import frozen_throughout
 
 # Of normal noise: how far a reading typically (median) departs from the mean of its neighbours, in standard deviations
 _DEPARTS = 0.6745 * 1.5**0.5
@@ -38,21 +40,43 @@ def judge(runs: Sequence[Run], within: Collection[str] | None = None) -> Judgeme
 
 def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[str] | None = None) -> Judgement:
     """The same, of what `emptied` has made of each run."""
-    plain = [run for run, _ in parts]
+    frozen = _frozen([run for run, _ in parts])
+    plain = [_without(run, k, [f for f in frozen if k in f.runs]) for k, (run, _) in enumerate(parts)]
     faults = [(k, f) for k, (_, found) in enumerate(parts) for f in found]
-    own = [_own(k, f, channel) for k, f in faults if f.kind in EMPTIED for channel in f.channels]
-    splices = tuple((k, f) for k, f in faults if f.kind == "splice")
-    leaps = tuple((k, channel) for k, f in faults if f.kind == "leap" for channel in f.channels)
+    leaps = [(k, f) for k, f in faults if f.kind == "leap"]
     table = readings(plain)
-    found = [*own, *(refuted(table) if table is not None else [])]
-    found = [f for f in found if within is None or any(c in within for c in f.channels)]
-    return Judgement(tuple(found), splices, leaps)
+    found = [*_own(faults), *frozen]
+    if table is not None:
+        found += refuted(table, [(k, f.channels[0], f.first_time) for k, f in leaps if len(f.channels) == 1])
+    return Judgement(
+        tuple(f for f in found if within is None or set(f.channels) & set(within)),
+        tuple((k, f) for k, f in faults if f.kind == "splice"),
+        tuple((k, channel) for k, f in leaps for channel in f.channels),
+    )
 
 
-def _own(run: int, f: Fault, channel: str) -> Finding:
-    what: What = "noise" if f.kind == "noise" else "rail" if f.kind == "rail" else "stuck"
-    size = f.size / _DEPARTS if what == "noise" else f.size if what == "rail" else f.last_time - f.first_time
-    return Finding(what, (channel,), (run,), f.first_time, f.last_time, size, (size, size), np.inf)
+def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:
+    """What rows of a run itself show of each channel that is noise, rests at a limit or stands still."""
+    found = []
+    for run, f in faults:
+        what: What = "noise" if f.kind == "noise" else "rail" if f.kind == "rail" else "stuck"
+        size = f.size / _DEPARTS if what == "noise" else f.size if what == "rail" else f.last_time - f.first_time
+        for channel in f.channels if f.kind in EMPTIED else ():
+            found.append(Finding(what, (channel,), (run,), f.first_time, f.last_time, size, (size, size), np.inf))
+    return found
+
+
+def _frozen(runs: Sequence[Run]) -> list[Finding]:
+    """Channels that stand still in all of a run, and not in others."""
+    tables = [(k, run.temperatures) for k, run in enumerate(runs) if run.temperatures is not None]
+    found = []
+    for i, still in frozen_throughout([table for _, table in tables]):
+        k, table = tables[i]
+        start, end = float(table.time[still.first]), float(table.time[still.last])
+        if end - start >= STUCK:
+            size = end - start
+            found.append(Finding("stuck", (still.name,), (k,), start, end, size, (size, size), np.inf))
+    return found
 
 
 def set_aside(runs: Sequence[Run], findings: Sequence[Finding]) -> list[Run]:
@@ -61,9 +85,10 @@ def set_aside(runs: Sequence[Run], findings: Sequence[Finding]) -> list[Run]:
     Swapped pairs are put back in place. What reads too much by a size that is known to KNOWN is corrected by it:
     readings that are lost move a fit of a poor model as far as wrong ones. Within NEAR of a start readings go: when
     exactly it was is not known. Else readings go from the start of a leap on, of an offset or a drift throughout its
-    run.
+    run. Air that drives the model (`twin.calibrate.channels.filled`) is as the temperatures say then.
     """
-    return [_without(run, k, [f for f in findings if k in f.runs]) for k, run in enumerate(runs)]
+    sound = [_without(run, k, [f for f in findings if k in f.runs]) for k, run in enumerate(runs)]
+    return driven(runs, sound) if findings else sound
 
 
 def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:

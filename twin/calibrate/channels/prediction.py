@@ -11,7 +11,7 @@ at a price.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,19 +64,13 @@ class Prediction:
         """A channel by all others but some; at least one must be left."""
         others = predictors(r, channel, without)
         rows = np.flatnonzero(np.isfinite(r.values[:, channel]))
-        theirs = r.values[rows][:, others]
-        middle = np.median(theirs, axis=1)
-        X = theirs - middle[:, None]
-        run, time = r.run[rows], r.time[rows]
-        same = (run[:, None] == run[None, :]).astype(float)
-        local = same * np.exp(-np.abs(time[:, None] - time[None, :]) / LASTS)
-        weight = MIX**2 / len(others)
-        known = weight * X @ X.T + CONSTANT**2 + r.noise[channel] ** 2 * np.eye(len(rows))
-        L = np.linalg.cholesky(known)
+        middle, mixed, left = _covariances(r, others, rows)
+        L = np.linalg.cholesky(mixed + r.noise[channel] ** 2 * np.eye(len(rows)))
         inverse = solve_triangular(L, np.eye(len(rows)), lower=True)
-        slow, Q = np.linalg.eigh(inverse @ (PER_RUN**2 * same + LOCAL**2 * local) @ inverse.T)
+        slow, Q = np.linalg.eigh(inverse @ left @ inverse.T)
         volume = float(np.log(np.diag(L)).sum())
-        return cls(rows, r.values[rows, channel] - middle, Q.T @ inverse, np.maximum(slow, 0.0), volume, weight)
+        to, weight = Q.T @ inverse, MIX**2 / len(others)
+        return cls(rows, r.values[rows, channel] - middle, to, np.maximum(slow, 0.0), volume, weight)
 
     def likelihoods(self) -> np.ndarray:
         """Logarithms, at every one of SIZES."""
@@ -104,6 +98,34 @@ class Prediction:
 
     def _variances(self) -> np.ndarray:
         return np.asarray(1.0 + SIZES[:, None] ** 2 * self.slow)
+
+
+def _covariances(r: Readings, others: Sequence[int], rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The median of other channels (m,) [degC], and covariances (m, m) [K²] of what a channel shows above it: of the
+    mix with its constant, and of what no mix gives, at size 1."""
+    theirs = r.values[rows][:, others]
+    middle = np.median(theirs, axis=1)
+    X = theirs - middle[:, None]
+    run, time = r.run[rows], r.time[rows]
+    same = (run[:, None] == run[None, :]).astype(float)
+    local = same * np.exp(-np.abs(time[:, None] - time[None, :]) / LASTS)
+    return middle, MIX**2 / len(others) * X @ X.T + CONSTANT**2, PER_RUN**2 * same + LOCAL**2 * local
+
+
+def expected(r: Readings, channel: int) -> tuple[np.ndarray, np.ndarray]:
+    """What a channel most likely is in every row (n,) [degC], by what is known of it and all others, and the standard
+    deviation of that (n,) [K]: eqs (2.23) and (2.24) there.
+
+    At least one other must be known in every row.
+    """
+    middle, mixed, left = _covariances(r, predictors(r, channel), np.arange(len(r.run)))
+    known = np.flatnonzero(np.isfinite(r.values[:, channel]))
+    size = SIZES[int(np.argmax(Prediction.of(r, channel).likelihoods()))]
+    K = mixed + size**2 * left
+    seen = K[np.ix_(known, known)] + r.noise[channel] ** 2 * np.eye(len(known))
+    by = np.linalg.solve(seen, K[known])  # (k, n)
+    mean = middle + by.T @ (r.values[known, channel] - middle[known])
+    return mean, np.sqrt(np.maximum(np.diag(K) - np.sum(by * K[known], axis=0), 0.0))
 
 
 def priced(usual: float) -> np.ndarray:

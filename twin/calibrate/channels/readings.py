@@ -16,7 +16,7 @@ BINS = (600.0, 900.0, 1800.0, 3600.0)  # s: the first that leaves
 MOST = 200  # rows or less: a judgement takes some seconds then
 FEWEST = 12  # rows with this many bins: less than an hour says nothing about how channels belong together
 EMPTIED: tuple[Kind, ...] = ("noise", "rail", "stuck")  # readings that are none, found in the run itself
-_LEAST = 1800.0  # s that a channel must stand still to be called stuck
+STUCK = 1800.0  # s that a channel must stand still to be called stuck
 _QUIET = 0.03  # K: no mean over a bin is better known
 _NORMAL = 1.4826  # from a median of magnitudes to a standard deviation
 
@@ -56,7 +56,7 @@ def emptied(run: Run) -> tuple[Run, tuple[Fault, ...]]:
 
 
 def _lasts(f: Fault) -> bool:
-    return f.kind != "stuck" or f.last_time - f.first_time >= _LEAST
+    return f.kind != "stuck" or f.last_time - f.first_time >= STUCK
 
 
 def readings(runs: Sequence[Run]) -> Readings | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twin.calibrate.channels.exchange import THRESHOLD as EXCHANGE
 from twin.calibrate.channels.exchange import Exchange, exchanges
 from twin.calibrate.channels.finding import Finding
 from twin.calibrate.channels.prediction import Prediction, Scan, predictors, usual_size
@@ -31,17 +32,22 @@ class Suspect:
     channel: int
     history: History
     statistic: float
+    least: float  # of the statistic, for a name
     amplitude: float  # K
     sigma: float  # K
 
 
-def refuted(r: Readings) -> list[Finding]:
-    """Channels that read LEAST or more beside what all others say of them, most likely first."""
+def refuted(r: Readings, leaps: Sequence[tuple[int, str, float]] = ()) -> list[Finding]:
+    """Channels that read LEAST or more beside what all others say of them, most likely first.
+
+    leaps: (run, channel, time [s]) of those that rows of the run itself show: when these begin need not be looked for.
+    """
     found: list[Finding] = []
     judged = [c for c in range(len(r.names)) if np.isfinite(r.values[:, c]).any()]
     if len(judged) <= FEWEST or any(len(predictors(r, c)) < FEWEST for c in judged):
         return found
     of = histories(r)
+    least = _thresholds(r, of, leaps)
     predictions = {c: Prediction.of(r, c) for c in judged}
     usual = usual_size(predictions.values())
     gone: tuple[int, ...] = ()
@@ -49,12 +55,12 @@ def refuted(r: Readings) -> list[Finding]:
         left = [c for c in judged if c not in gone]
         if len(left) <= FEWEST:
             break
-        suspects = _suspects(r, predictions, of, usual)
+        suspects = _suspects(predictions, of, least, usual)
         pair = exchanges(r, predictions, usual, gone)
         if pair is not None and pair.statistic > _beside(suspects, pair):
             found.append(_pair(r, pair))
         elif suspects:
-            found.append(_told(r, _to_blame(r, suspects, left, of, usual, gone)))
+            found.append(_told(r, _to_blame(r, suspects, left, of, least, usual, gone)))
         else:
             break
         gone += tuple(r.names.index(n) for n in found[-1].channels)
@@ -62,32 +68,38 @@ def refuted(r: Readings) -> list[Finding]:
     return found
 
 
-def shape_of(f: Finding) -> Shape:
-    """Of what a single channel does; not of a pair, nor of what rows of the run itself show."""
-    return "offset" if f.what == "offset" else "drift" if f.what == "drift" else "leap"
-
-
-def _suspects(r: Readings, predictions: Mapping[int, Prediction], of: Histories, usual: float) -> list[Suspect]:
-    """Channels with a fault that is worth a name, the most likely first."""
-    found = [
-        s for s in (_suspect(r, c, p.scan(of.columns, usual), of) for c, p in predictions.items()) if s is not None
-    ]
-    return sorted(found, key=lambda s: -s.statistic)
-
-
-def _suspect(r: Readings, channel: int, scan: Scan, of: Histories) -> Suspect | None:
+def _thresholds(r: Readings, of: Histories, leaps: Sequence[tuple[int, str, float]]) -> np.ndarray:
+    """(c, k) of the statistic of every channel and history. A leap at a known time is one history, as an offset is."""
     least = np.array(
         [ALWAYS if h.shape == "offset" and len(h.runs) == r.runs > 1 else THRESHOLDS[h.shape] for h in of.of]
     )
+    result = np.tile(least, (len(r.names), 1))
+    for k, h in enumerate(of.of):
+        for run, name, start in leaps if h.shape == "leap" else ():
+            if name in r.names and h.runs[0] == run and abs(r.time[h.first] - start) <= r.length:
+                result[r.names.index(name), k] = THRESHOLDS["offset"]
+    return result
+
+
+def _suspects(predictions: Mapping[int, Prediction], of: Histories, least: np.ndarray, usual: float) -> list[Suspect]:
+    """Channels with a fault that is worth a name, the most likely first."""
+    found = [
+        s for s in (_suspect(c, p.scan(of.columns, usual), of, least[c]) for c, p in predictions.items())
+        if s is not None
+    ]  # fmt: skip
+    return sorted(found, key=lambda s: -s.statistic)
+
+
+def _suspect(channel: int, scan: Scan, of: Histories, least: np.ndarray) -> Suspect | None:
     worth = np.where((np.abs(scan.amplitude) >= LEAST) & (scan.statistic >= least), scan.statistic, 0.0)
     k = int(np.argmax(worth))
     if worth[k] == 0.0:
         return None
-    return Suspect(channel, of.of[k], float(worth[k]), float(scan.amplitude[k]), float(scan.sigma[k]))
+    return Suspect(channel, of.of[k], float(worth[k]), float(least[k]), float(scan.amplitude[k]), float(scan.sigma[k]))
 
 
 def _to_blame(
-    r: Readings, suspects: Sequence[Suspect], channels: Sequence[int], of: Histories, usual: float,
+    r: Readings, suspects: Sequence[Suspect], channels: Sequence[int], of: Histories, least: np.ndarray, usual: float,
     gone: tuple[int, ...],
 ) -> Suspect:  # fmt: skip
     """The suspect without which the others agree best: a faulty channel is a predictor of all others."""
@@ -96,7 +108,7 @@ def _to_blame(
 
     def left(s: Suspect) -> float:
         away = (*gone, s.channel)
-        others = _suspects(r, {c: Prediction.of(r, c, away) for c in channels if c != s.channel}, of, usual)
+        others = _suspects({c: Prediction.of(r, c, away) for c in channels if c != s.channel}, of, least, usual)
         return max((o.statistic for o in others), default=0.0)
 
     return min(suspects[:_SUSPECTS], key=lambda s: (left(s), -s.statistic))
@@ -111,7 +123,7 @@ def _beside(suspects: Sequence[Suspect], pair: Exchange) -> float:
 def _pair(r: Readings, e: Exchange) -> Finding:
     start, end = _times(r, e.history)
     names = tuple(r.names[c] for c in e.channels)
-    return Finding("swapped", names, e.history.runs, start, end, np.nan, (np.nan, np.nan), e.statistic)
+    return Finding("swapped", names, e.history.runs, start, end, np.nan, (np.nan, np.nan), e.statistic, EXCHANGE)
 
 
 def _told(r: Readings, s: Suspect) -> Finding:
@@ -119,7 +131,7 @@ def _told(r: Readings, s: Suspect) -> Finding:
     spread = 1.96 * s.sigma
     return Finding(
         s.history.shape, (r.names[s.channel],), s.history.runs, start, end, s.amplitude,
-        (s.amplitude - spread, s.amplitude + spread), s.statistic,
+        (s.amplitude - spread, s.amplitude + spread), s.statistic, s.least,
     )  # fmt: skip
 
 

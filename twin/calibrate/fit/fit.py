@@ -6,8 +6,9 @@ through the window model. Paper 000, Fig. 5: compare at the sensors, change para
 the minimum or at the maximum of iterations, so that the run time is bounded.
 
 Afterwards residuals are whitened with what they were seen to be (`twin.calibrate.fit.noise`), hours that fit far worse
-than the others of their channel lose weight (`twin.calibrate.fit.weights`), and the fit is repeated; covariance, pulls
-and intervals belong to that last one.
+than the others of their channel lose weight (`twin.calibrate.fit.weights`), and the fit is repeated until parameters
+settle: of a model that misses by far more than the noise, values after a fixed number of fits hang on each reading.
+Covariance, pulls and intervals belong to the last fit.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from twin.calibrate.fit.noise import Noise, estimated, white
 from twin.calibrate.fit.problem import Problem
 from twin.calibrate.fit.weights import stretch_weights
 
-WHITENINGS = 2  # fits with estimated noise after the first one
+WHITENINGS = 2  # fits with estimated noise after the first one, at least; and
+MOST = 6  # at most, while
+SETTLED = 0.3  # of its standard deviation a parameter moves from one fit to the next
 TOLERANCE = 1e-5  # relative change of the cost, and of the parameters
 
 
@@ -32,7 +35,7 @@ TOLERANCE = 1e-5  # relative change of the cost, and of the parameters
 class Stop:
     """When a fit ends, besides at its minimum."""
 
-    iterations: int = 30  # of all passes together
+    iterations: int = 100  # of all passes together
     seconds: float = np.inf
 
 
@@ -92,7 +95,7 @@ def fit(
     low, high = problem.bounds
     x = np.clip(np.zeros(len(problem.scale)) if start is None else start, low + 1e-9, high - 1e-9)
     limits = [floors(problem, run) for run in problem.runs]
-    whitenings = WHITENINGS if known is None else 0
+    last = MOST if known is None else 0
     history: list[Iteration] = []
     stopped = "minimum"
 
@@ -109,22 +112,33 @@ def fit(
     noise = known if known is not None else noise_at(evaluated, [(white(s), white(w)) for s, w in limits], x)
     k = 0
     try:
-        for k in range(whitenings + 1):
-            best = _minimise(evaluated, noise, best, (low, high), count, loose=k < whitenings)
-            if k < whitenings:
-                noise = _seen(evaluated, noise, limits, best)
+        for k in range(last + 1):
+            before, best = best, _minimise(evaluated, noise, best, (low, high), count, loose=k < min(last, WHITENINGS))
+            if k == last or (k >= WHITENINGS and _moved(evaluated, noise, before, best) <= SETTLED):
+                break
+            noise = _seen(evaluated, noise, limits, best)
     except _Over as over:
         stopped, best = str(over), history[-1].x
     except KeyboardInterrupt:
         stopped, best = "interrupted", (history[-1].x if history else x)
-    if stopped != "minimum" and known is None and k < whitenings:  # intervals need the noise that is there
+    if stopped != "minimum" and known is None and k < WHITENINGS:  # intervals need the noise that is there
         noise = _seen(evaluated, noise, limits, best)
     seen_by_data = information(evaluated, noise, best)
-    covariance = np.linalg.inv(seen_by_data + np.eye(len(best)))
     return Fit(
-        problem, best, (covariance + covariance.T) / 2, seen_by_data, noise, tuple(history), stopped,
+        problem, best, _covariance(seen_by_data), seen_by_data, noise, tuple(history), stopped,
         tuple(evaluated.plain_residuals(best)),
     )  # fmt: skip
+
+
+def _covariance(seen_by_data: np.ndarray) -> np.ndarray:
+    found = np.linalg.inv(seen_by_data + np.eye(len(seen_by_data)))
+    return np.asarray((found + found.T) / 2)
+
+
+def _moved(evaluated: Evaluated, noise: tuple[tuple[Noise, Noise], ...], before: np.ndarray, now: np.ndarray) -> float:
+    """Standard deviations by which the parameter moved that moved farthest."""
+    sigma = np.sqrt(np.diag(_covariance(information(evaluated, noise, now))))
+    return float(np.max(np.abs(now - before) / sigma, initial=0.0))
 
 
 def _seen(

@@ -19,6 +19,7 @@ from twin.calibrate.fit.experiments import propose
 from twin.calibrate.fit.fit import Fit
 from twin.calibrate.fit.separation import Separation, sentences, separation
 from twin.logs.run import Run
+from twin.logs.trace import Trace
 from twin.rom.apply import with_values
 from twin.rom.artefact import Artefact, write_artefact
 from twin.rom.parameter import Parameter
@@ -63,9 +64,11 @@ def rows(fit: Fit, found: Separation) -> list[dict[str, Any]]:
 
 
 def told(
-    result: Calibration, runs: Sequence[Run], experiments: bool = True, judgement: Judgement | None = None
-) -> dict[str, Any]:
-    """What there is to report about a calibration, as JSON values. judgement: of the channels of its runs."""
+    result: Calibration, runs: Sequence[Run], experiments: bool = True, judgement: Judgement | None = None,
+    traces: Sequence[Trace] = (),
+) -> dict[str, Any]:  # fmt: skip
+    """What there is to report about a calibration, as JSON values. judgement: of the channels of its runs; traces: of
+    all channels, beside the runs as logged."""
     fit = result.fit
     found = separation(fit.problem.names, fit.information)
     proposals = propose(fit, found.combinations) if experiments else {}
@@ -96,7 +99,7 @@ def told(
             for run, original, (T, w) in zip(fit.problem.runs, runs, fit.residual, strict=True)
         ],
         "set_aside": [words(f, [r.name for r in fit.problem.runs]) for f in judgement.findings] if judgement else [],
-        "channels": channel_table(fit, judgement),
+        "channels": channel_table(fit, judgement, traces),
         "parameters": rows(fit, found),
         "initial": [
             {"path": name, "unit": "K", "value": float(fit.x[n + i] * s.sigma), "sigma": float(sizes[n + i] * s.sigma)}

@@ -19,7 +19,7 @@ from twin.diagnose.result.spot import Spot
 
 LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
 MEASURED = (("K", "temperature"), ("m", "TCP direction"))  # units of channels, and what these are
-SEEN = ("stuck", "leap", "broken")  # histories of sensors at fault that are seen before anything is fitted
+SEEN = ("stuck", "leap", "noise", "rail")  # histories of sensors at fault that are seen before anything is fitted
 
 
 def what(family: str) -> str:
@@ -235,7 +235,8 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
         what = {
             "stuck": f"Its reading stood still for {number(longest / 3600.0)} h",
             "leap": f"Its reading leapt by {number(c.amplitude)} K at {number(at / 3600.0)} h, faster than heat can",
-            "broken": f"Its reading is noise, or at a limit, from {number(at / 3600.0)} h on",
+            "noise": f"Its reading is noise of {number(c.amplitude)} K from {number(at / 3600.0)} h on",
+            "rail": f"Its reading rests at {number(c.amplitude)} °C from {number(at / 3600.0)} h on",
         }[c.history]
         return f"{what}; no statistic is needed to see that."
     entry = family_of(c.family)
