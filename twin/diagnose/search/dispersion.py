@@ -12,8 +12,8 @@ more than a quarter of the excess, r^T Pi r - m.
 
 Where c is above 3 the model is too poor for that. What is left then becomes model discrepancy of its own, a slow error
 of every channel (`twin.diagnose.search.slow_errors`), and a cause must explain more than half of what is left beside
-these. Where nothing does, the verdict is "too poor", with the calibration of a search without slow errors, of which the
-note tells what is missing.
+these. Heat of any history alone is not told: a model wrong in its form leaves that. Where nothing is named, the verdict
+is "too poor", with the calibration of a search without slow errors, from which the note tells what is missing.
 
 Dividing every statistic by c, as those books do, was tried and is not enough: what a form leaves lasts for hours, so
 that one place may explain half of it. Nor is "more than all that is left" without slow errors: what a single channel
@@ -69,7 +69,7 @@ def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
     if own.share > detector.policy.dispersed:
         own = _with_errors(own, detector, y)
         found = search(raised(detector, own), y)
-        return (found if found.accepted or dispersion_of(found).heat else search(_closed(detector), y)), own
+        return (found if found.accepted else search(_closed(detector), y)), own
     return (search(raised(detector, own), y) if own.least(detector.policy) else first), own
 
 
