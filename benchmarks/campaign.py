@@ -17,10 +17,11 @@ import numpy as np
 from benchmarks.five_axis import EXPERIMENT, machine
 from twin.atomic import atomic_path
 from twin.build.spread import spread
+from twin.calibrate.channels.judge import judge
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.search.detector import Detector
@@ -73,15 +74,13 @@ def judged(detector: Detector, trial: Trial) -> dict[str, Any]:
     """One trial: what was hidden, what was said, and what it was worth on the sealed run (of a null nothing)."""
     began = time.perf_counter()
     names = [planned.run.name for planned in detector.study.runs[:2]]
-    usable, stuck = stuck_sensors(trial.runs[:2], detector.study.probed.base.sensors, names)
-    if stuck:
-        trial = replace(trial, runs=(*usable, *trial.runs[2:]))
-    stuck += broken_sensors(usable, detector.study.probed.base.sensors, names)
+    usable, faults = channels_at_fault(trial.runs[:2], judge(trial.runs[:2]), detector.study.probed.base.sensors, names)
+    trial = replace(trial, runs=(*usable, *trial.runs[2:]))
     plans = plans_of(detector, trial)
     own = emptied(detector, plans)
     y = measured_of(with_measured(detector.study, plans))
     found, _ = searched(own, y)
-    verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
+    verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
     unknown = unknown_of(found) if verdict == "unknown" else None
     seconds = time.perf_counter() - began
     without = bare(trial.name, trial.seed) if trial.hidden else None

@@ -22,11 +22,12 @@ from typing import Any
 
 import numpy as np
 
+from twin.calibrate.channels.judge import judge
 from twin.calibrate.fit.measured import measured
 from twin.cli.main import run as command
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.search.dispersion import searched
@@ -273,16 +274,16 @@ def _in_log(healthy: Sequence[Path], out: Path, hidden: tuple[str, str, str]) ->
 def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     began = time.perf_counter()
     study = detector.study
-    usable, stuck = stuck_sensors(runs[:2], study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
+    names = [p.run.name for p in study.runs[:2]]
+    usable, faults = channels_at_fault(runs[:2], judge(runs[:2]), study.probed.base.sensors, names)
     plans = [
         measured(study.probed.base, run, p.run.drive, p.run.name)
         for run, p in zip([*usable, *runs[2:]], study.runs, strict=True)
     ]
-    stuck += broken_sensors(usable, study.probed.base.sensors, [p.run.name for p in study.runs[:2]])
     own = emptied(detector, plans)
     y = measured_of(with_measured(study, plans))
     found, left = searched(own, y)
-    verdict, causes = with_faults(*verdict_of(found, FAMILIES), stuck)
+    verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
     opened = on_sealed(found, y, verdict, causes, FAMILIES, plans[2:], 1)
     verdict, causes = opened.verdict, opened.causes
     return {

@@ -37,7 +37,7 @@ from twin.cli.main import run as command
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES as CATALOGUE
-from twin.diagnose.faults.channels_check import broken_sensors, refuted_sensors, stuck_sensors
+from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, machine_of, prepare
 from twin.diagnose.result.diagnosis import Cause
@@ -136,10 +136,7 @@ def rows_of(path: Path, days: Sequence[str], faults: int, rng: np.random.Generat
 
 def checked(runs: Sequence[Run], sensors: Sequence[str]) -> tuple[list[Run], list[Cause]]:
     """Runs without the channels that are at fault whatever the model says, and these, as `diagnose` does."""
-    names = run_names(runs)
-    usable, stuck = stuck_sensors(runs, sensors, names)
-    usable, refuted = refuted_sensors(usable, judge(usable, sensors), names)
-    return usable, [*stuck, *refuted, *broken_sensors(usable, sensors, names)]
+    return channels_at_fault(runs, judge(runs), sensors, run_names(runs))
 
 
 def drawn(detector: Detector, rng: np.random.Generator) -> tuple[Cause, Effect] | None:

@@ -16,9 +16,10 @@ from functools import cache
 
 from benchmarks.five_axis import EXPERIMENT, FOLDER, TRUTHS
 from twin.build.workers import each
+from twin.calibrate.channels.judge import judge
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.evidence.whiten import measured_of
-from twin.diagnose.faults.channels_check import broken_sensors, stuck_sensors
+from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.faults.table import FAMILIES
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
@@ -65,12 +66,11 @@ def said(trial: str, policies: list[SearchPolicy]) -> list[Said]:
     """The diagnosis of a trial by each policy."""
     runs, made = trial_of(EXPERIMENT, table(EXPERIMENT)[trial], TRUTHS).runs, detector()
     study, names = made.study, [p.run.name for p in made.study.runs[:2]]
-    usable, faults = stuck_sensors(runs[:2], study.probed.base.sensors, names)
+    usable, faults = channels_at_fault(runs[:2], judge(runs[:2]), study.probed.base.sensors, names)
     plans = [
         measured(study.probed.base, run, p.run.drive, p.run.name)
         for run, p in zip([*usable, runs[2]], study.runs, strict=True)
     ]
-    faults += broken_sensors(usable, study.probed.base.sensors, names)
     y, own = measured_of(with_measured(study, plans)), emptied(made, plans)
     result = []
     for policy in policies:
