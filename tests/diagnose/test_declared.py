@@ -17,9 +17,15 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import Study, make_study
-from twin.diagnose.search.accepted import Accepted, jacobian
+from twin.diagnose.search.accepted import Accepted, exchanged, jacobian
 from twin.diagnose.search.contest import misfit
-from twin.diagnose.search.declared import declared_candidates, declared_exactly, misplaced_candidates, with_signal
+from twin.diagnose.search.declared import (
+    declared_candidates,
+    declared_exactly,
+    misplaced_candidates,
+    swapped_candidates,
+    with_signal,
+)
 from twin.diagnose.search.forward import _reads, search
 from twin.diagnose.search.verdict import verdict_of
 from twin.machine.load import load_machine
@@ -156,3 +162,19 @@ def test_a_signal_is_misread_by_what_its_unit_allows():
     assert 1.414 in tried["A"]  # a peak for rms
     assert not {60.0, 0.017} & tried["A"]
     assert tried["m/s"] | tried["1/s"] == {0.5, 2.0, 60.0, 0.017}  # a speed has no peak
+
+
+def test_two_sensors_with_each_others_name_are_judged_by_putting_them_back():
+    """Calibration hides most of it in losses; the linear score, beside these, sees a part of the rest."""
+    detector, study = small_case.made_detector(), small_case.study()
+    x = 0.5 * np.random.default_rng(8).standard_normal(len(study.probed.parameters))
+    y = with_noise(study, outputs(study, x), np.random.default_rng(9))
+    batch = next(b for b in detector.columns.batches if b.kind == "swapped")
+    front = next(i for i, name in enumerate(batch.places) if "front" in name and "housing" in name)
+    h = Hypothesis(batch, front, batch.histories[0], 0.0, (1.0,), 1.0)
+    wrong = exchanged(study, y, [Accepted(h, (), np.ones(1), np.eye(1), 0.0, 0.0, ())])
+    fitted = detector.fitter(wrong)
+    best = max(swapped_candidates(detector, wrong, fitted), key=lambda h: h.statistic)
+    assert best.name == h.name
+    assert best.statistic == pytest.approx(misfit(detector, fitted) - misfit(detector, detector.fitter(y)), rel=0.1)
+    assert not swapped_candidates(detector, y, detector.fitter(y))

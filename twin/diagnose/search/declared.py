@@ -8,7 +8,8 @@ and counts by how much less misfit it leaves than calibration without it.
 To first order that says which factors are worth a try, and not what they explain: with four times the heat a film or a
 joint near the motor counts four times as much. Those few are fitted with the model that has the corrected signal.
 Nor does it say what a bearing does that warms another face, and is as warm as that: such are told by the model with
-the heat there, whose parameters are fitted to first order. (`twin.diagnose.search.contest` fits them exactly.)
+the heat there, whose parameters are fitted to first order. (`twin.diagnose.search.contest` fits them exactly.) And of
+two sensors with each other's name calibration makes two losses that are off, beside which putting them back is wrong.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from twin.diagnose.faults.fault import Fault
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.integration import loads_for
 from twin.diagnose.model.study import Planned, Study
-from twin.diagnose.search.accepted import parameter_of
+from twin.diagnose.search.accepted import Accepted, exchanged, parameter_of
 from twin.diagnose.search.contest import misfit
 from twin.diagnose.search.detector import Detector
 from twin.rom.drive import Drive, evaluate
@@ -49,6 +50,18 @@ def misplaced_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> l
         there = [study.outputs(k, x, slots_with(study, detector.elements, units, k), h.amplitude) for k in study.fitted]
         change = detector.whiten(np.concatenate(there) - detector.fitter.surrogate.y0)
         statistic = before - _fitted_with(detector, y, change)
+        if statistic > 0.0:
+            found.append(replace(h, statistic=statistic))
+    return found
+
+
+def swapped_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
+    """Likewise of two channels that have each other's name, with the readings put back: what calibration has made of
+    them, such as two losses that are off by factors, is not beside it then."""
+    study, before, found = detector.study, misfit(detector, fitted), []
+    for h, _ in _promising(detector, y, lambda fault: fault.exchanges)[: detector.policy.closely]:
+        back = exchanged(study, y, [Accepted(h, (), np.ones(1), np.eye(1), 0.0, 0.0, ())])
+        statistic = before - _fitted_with(detector, back, np.zeros(len(y)))
         if statistic > 0.0:
             found.append(replace(h, statistic=statistic))
     return found

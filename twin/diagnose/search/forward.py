@@ -22,7 +22,12 @@ from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, exchanged
 from twin.diagnose.search.contest import beginning, judged, misfit_of_each, proof, tried
-from twin.diagnose.search.declared import declared_candidates, declared_exactly, misplaced_candidates
+from twin.diagnose.search.declared import (
+    declared_candidates,
+    declared_exactly,
+    misplaced_candidates,
+    swapped_candidates,
+)
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
@@ -106,7 +111,7 @@ def _start(described: Detector, y: np.ndarray) -> _Start:
     if (detector := hotter(described, fitted.x)) is not described:
         fitted = detector.fitter(y)
     x0, covariance = settled(detector, y, ())
-    declared = declared_candidates(detector, y, fitted)
+    declared = [*declared_candidates(detector, y, fitted), *swapped_candidates(detector, y, fitted)]
     known = scored(detector, fitted)
     glance = look(detector, fitted, declared, known)
     loose = loose_ones(detector, y, fitted, x0)
