@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.search.dispersion import searched
+from twin.diagnose.search.look import look
 from twin.diagnose.search.slow_errors import modes_of, with_errors
 
 ROWS = 400
@@ -54,3 +59,16 @@ def test_a_slow_error_is_no_evidence_any_more():
     assert left(wide) < 0.2 * left(detector)
     assert wide.poor
     assert not detector.poor
+
+
+def test_a_score_beyond_no_conductance_at_all_is_held(monkeypatch):
+    """A linear score may say that a joint has less than nothing."""
+    detector = small_case.made_detector()
+    batch = next(b for b in detector.columns.batches if b.family == "joint")
+    h = Hypothesis(batch, 0, batch.histories[0], 1e6, (-3.0,) * batch.q, 1.0)
+    seen, ranked, step = look(detector, detector.fitter(detector.fitter.surrogate.y0))
+    monkeypatch.setattr(sys.modules[searched.__module__], "look", lambda *_: (seen, [h, *ranked], step))
+    y = detector.fitter.surrogate.y0 + 5.0 * np.random.default_rng(3).standard_normal(len(detector.fitter.surrogate.y0))
+    _, own = searched(detector, y)
+    assert own.errors is not None
+    assert np.isfinite(own.errors).all()

@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.faults.acted import units_of
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.contest import beginning, misfit, worth
 from twin.diagnose.search.detector import Detector
@@ -89,7 +90,10 @@ def _with_errors(own: Dispersion, detector: Detector, y: np.ndarray) -> Dispersi
     _, ranked, step = look(wide, fitted)
     most = max([*step.parts.values(), *(h.statistic for h in ranked[:1])], default=0.0)
     for h in sorted(ranked, key=lambda h: -worth(h, detector.policy))[:1]:
-        named = Accepted(h, units_of(detector.study, h), np.array(h.amplitude), np.eye(h.batch.q), h.statistic, 0.0, ())
+        size = np.array(h.amplitude)
+        if fault_of(h).conducts:  # no score ends at zero
+            size[0] = max(size[0], detector.policy.lowest_change)
+        named = Accepted(h, units_of(detector.study, h), size, np.eye(h.batch.q), h.statistic, 0.0, ())
         plain = refit(detector, y, beginning(plain.x, detector.policy), [named])[0]
     return replace(own, errors=slow_errors(detector, plain), beside=misfit(wide, fitted) - most)
 
