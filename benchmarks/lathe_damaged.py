@@ -19,7 +19,6 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +27,8 @@ import numpy as np
 import twin
 from benchmarks.lathe_channels import ALWAYS, KINDS, RIGHT, Trial
 from benchmarks.lathe_diagnosis import OUT as TWIN
-from benchmarks.lathe_diagnosis import the_twin
+from benchmarks.lathe_diagnosis import pairs_of, the_twin
 from models.measured import VARIABLE, measured_data
-from models.recordings import lathe_days
 from twin.diagnose.pipeline import Settings, diagnose, machine_of
 from twin.diagnose.result.diagnosis import Cause
 from twin.inject.damage.channels import with_load
@@ -61,10 +59,7 @@ def main() -> None:
     path = the_twin(data)
     OUT.mkdir(parents=True, exist_ok=True)
     for half in given[:1] or [0, 1]:
-        days = [p.stem for p in lathe_days()[half::2]]
-        every = list(combinations(days, 2))
-        order = np.random.default_rng(half).permutation(len(every))[:pairs]
-        rows = [row for k, i in enumerate(order) for row in _rows(path, half, k, every[int(i)])]
+        rows = [row for k, days in enumerate(pairs_of(half, pairs)) for row in _rows(path, half, k, days)]
         print(f"   days {('1, 3, 5 ...', '2, 4, 6 ...')[half]}: {len(rows)} trials")
         told(rows)
 

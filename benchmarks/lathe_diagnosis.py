@@ -58,9 +58,8 @@ MODEL, OUT = ROOT / "models" / "lathe", ROOT / "out" / "lathe_diagnosis"
 TRAINING = ("20200701", "20200616", "20200710", "20200723", "20200730", "20200814")  # of models/lathe/README.md
 PAIRS, FAULTS = 12, 3  # per half
 FORM, NULLS = 32, 60  # synthetic measurements: what the twin leaves decides anyway
-FAMILIES = {
-    "heat_source": "W"
-}  # of linear size, writable, and not the same as another: a warm zone at one node is heat
+# of linear size, writable, and not the same as another: a warm zone at one node is heat
+FAMILIES = {"heat_source": "W"}
 TWICE = 2.0
 
 Row = dict[str, Any]
@@ -77,10 +76,7 @@ def main() -> None:
     artefact = the_twin(data)
     for half in halves:
         rows: list[Row] = []
-        days = [p.stem for p in lathe_days()[half::2]]
-        every = list(combinations(days, 2))
-        order = np.random.default_rng(half).permutation(len(every))[:pairs]
-        for k, chosen in enumerate(every[int(i)] for i in order):
+        for k, chosen in enumerate(pairs_of(half, pairs)):
             path = OUT / f"{half}_{k}.jsonl"
             if not path.exists():
                 made = rows_of(artefact, chosen, faults, np.random.default_rng([half, k]))
@@ -88,6 +84,12 @@ def main() -> None:
             rows += [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
         print(f"   days {('1, 3, 5 ...', '2, 4, 6 ...')[half]}")
         told(rows)
+
+
+def pairs_of(half: int, count: int) -> list[tuple[str, str]]:
+    """So many pairs of a half's days, in an order that its number draws."""
+    every = list(combinations([p.stem for p in lathe_days()[half::2]], 2))
+    return [every[int(i)] for i in np.random.default_rng(half).permutation(len(every))[:count]]
 
 
 def the_twin(data: Path) -> Path:

@@ -43,7 +43,7 @@ def test_few_rows_say_nothing():
 
 
 def test_a_slow_error_is_no_evidence_any_more():
-    """Of an error in one channel that it holds, a detector leaves hardly anything."""
+    """A slow error of one channel, once it is model discrepancy, is not left in the misfit."""
     detector = small_case.made_detector()
     study = detector.study
     error = np.zeros(len(measured_of(study)))

@@ -11,7 +11,7 @@ The derivative of H_r by V goes through the reduced matrices only: with X = S_r^
 dH_r = dC_r X + Y^T dB_r - Y^T dS_r X, and all frequencies of one theta share one eigendecomposition.
 
 The start decides. From the default's own basis, or from the right projection matrix of balanced truncation alone, the
-gradient leads to bases hardly better than these; from the first columns of its right and of its left one, half of each,
+gradient gains little; from the first columns of its right and of its left one, half of each,
 whose error is four times as large, to a quarter of it.
 """
 

@@ -56,8 +56,8 @@ def misplaced_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> l
 
 
 def swapped_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
-    """Likewise of two channels that have each other's name, with the readings put back: what calibration has made of
-    them, such as two losses that are off by factors, is not beside it then."""
+    """Two channels with each other's name that leave less misfit with their readings put back, to first order: what
+    calibration has made of them, such as two losses that are off by factors, is not beside it then."""
     study, before, found = detector.study, misfit(detector, fitted), []
     for h, _ in _promising(detector, y, lambda fault: fault.exchanges)[: detector.policy.closely]:
         back = exchanged(study, y, [Accepted(h, (), np.ones(1), np.eye(1), 0.0, 0.0, ())])
