@@ -72,14 +72,14 @@ def test_the_difference_follows_the_parameters(both):
 def test_rails_in_segments_of_half_the_length_are_another_discretisation():
     machine = load_machine(Path(__file__).parents[1] / "machines" / "slide")
     moving = {n: c.segments for n, c in machine.contacts.items() if c.kind == "moving"}
-    (same, _, linear), (other, share, quadratic) = _others(machine)
+    (same, _, linear, _), (other, share, quadratic, _) = _others(machine)
     assert same is machine
     assert (linear, quadratic) == (True, False)
     assert moving
     assert {n: other.contacts[n].segments for n in moving} == {n: 2 * s for n, s in moving.items()}
     assert all(other.contacts[n] == c for n, c in machine.contacts.items() if n not in moving)
     assert share == 2.0  # what enters a half too far off is off by twice as much as it moves to a quarter
-    assert all(o.contacts.keys() >= small_case.machine().contacts.keys() for o, _, _ in _others(small_case.machine()))
+    assert all(o.contacts.keys() >= small_case.machine().contacts.keys() for o, *_ in _others(small_case.machine()))
 
 
 def test_an_inside_takes_half_of_a_node_and_nothing_is_lost():

@@ -193,11 +193,11 @@ def diagnose(
         notes.append(coarse.note)
     beside = causes  # what was seen before any search has no statistic that channels could share
     verdict, causes = with_faults(verdict, causes, faults)
+    opened = judged(shown, y, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
+    verdict, causes, extension = opened.verdict, opened.causes, opened.extension
     notes += [
         f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED and not c.rivals
     ]
-    opened = judged(shown, y, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
-    verdict, causes, extension = opened.verdict, opened.causes, opened.extension
     notes += [opened.size] if opened.size else []
     if opened.note:  # what is shown is then the calibration beside faulty channels, as of any unknown
         notes.insert(0, opened.note)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.diagnose.evidence.nulls import Form
-from twin.diagnose.evidence.whiten import Whitener
+from twin.diagnose.evidence.whiten import Whitener, labels
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 
@@ -86,7 +86,7 @@ def leading(white: np.ndarray) -> np.ndarray:
 
 def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.ndarray:
     """(m, k) columns of unit prior variance: every channel's own error of a white response (m,)."""
-    label = np.concatenate([_labels(study, k) for k in study.fitted])
+    label = labels(study)
     columns = [np.where(label == channel, share * white, 0.0) for channel in np.unique(label)]
     kept = [c for c in columns if np.linalg.norm(c) > LEAST]
     return np.stack(kept, axis=1) if kept else np.zeros((len(white), 0))
@@ -96,7 +96,7 @@ def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list
     """Per channel the leading directions of what sources and contacts do to it, in all runs."""
     heated = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
     white = whiten(form.reading * J[:, heated] / study.scale[heated])
-    label = np.concatenate([_labels(study, k) for k in study.fitted])
+    label = labels(study)
     result = []
     for channel in np.unique(label):
         rows = np.flatnonzero(label == channel)
@@ -105,10 +105,3 @@ def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list
         block[rows] = own
         result.append(block)
     return result
-
-
-def _labels(study: Study, k: int) -> np.ndarray:
-    """(size,) which channel every number of a run is of: sensors by number, TCP components -1 to -3."""
-    planned = study.runs[k]
-    (b, _), (rows, _) = planned.shapes
-    return np.concatenate([np.tile(planned.measured.column, b), np.tile([-1, -2, -3], rows)])

@@ -142,7 +142,7 @@ def null(
         parts.append(np.concatenate([T.ravel(), w.ravel()]))
     y = np.concatenate(parts)
     for difference in differences:
-        y = y + rng.standard_normal() * difference.at(x)
+        y = y + difference.drawn(x, rng)
     return y
 
 

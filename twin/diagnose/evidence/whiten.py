@@ -93,6 +93,18 @@ def measured_of(study: Study) -> np.ndarray:
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
+def labels(study: Study) -> np.ndarray:
+    """(m,) which channel every number of the fitted runs is of: sensors by number, then the TCP components."""
+    parts = []
+    for k in study.fitted:
+        (b, _), (rows, _) = study.runs[k].shapes
+        parts += [
+            np.tile(study.runs[k].measured.column, b),
+            len(study.probed.base.sensors) + np.tile(np.arange(3), rows),
+        ]
+    return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
+
+
 def offsets(study: Study) -> tuple[np.ndarray, tuple[str, ...]]:
     """(m, s) 1 K on one sensor in all fitted runs, and the names of these sensors."""
     names = tuple(dict.fromkeys(s for k in study.fitted for s in study.runs[k].measured.sensors))

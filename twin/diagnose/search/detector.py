@@ -221,7 +221,7 @@ def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.nda
 
 def _discretised(differences: Differences, whiten: Whitener) -> list[np.ndarray]:
     """White (m, k) of unit variance: the difference to each other discretisation, and of each parameter's effect."""
-    return [leading(whiten(np.column_stack([o.d, SPREAD * o.D]))) for o in differences]
+    return [leading(whiten(o.columns(SPREAD))) for o in differences]
 
 
 def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:

@@ -32,7 +32,7 @@ def predicted(found: Search, k: int) -> Predicted:
     delivered = study.outputs(k, np.zeros(len(found.x)))
     recalibrated = study.outputs(k, found.x0)
     if not found.accepted:
-        return Predicted(delivered, recalibrated, recalibrated)
+        return Predicted(delivered, recalibrated, study.outputs(k, found.x))
     extended = stepped(detector, found.accepted, k, with_shifts(study, found.accepted, found.x))
     return Predicted(delivered, recalibrated, extended + _read(found, k))
 

@@ -5,7 +5,8 @@ of the machine that makes more of the channels that it moves worse than better, 
 that were looked at and not the machine, and its name is withdrawn. Where another size that the runs that were looked
 at allow makes more of them better than worse, the run refutes the size alone: the name stays, and nothing is written
 into the description. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
-calibration makes of it without its tolerance.
+calibration makes of it without its tolerance. A number that calibration alone moved out of its tolerance is judged
+beside the calibration that keeps it in.
 """
 
 from __future__ import annotations
@@ -45,6 +46,12 @@ def judged(
     opened: Sequence[Measured], seed: int,
 ) -> Judged:  # fmt: skip
     """The headline of a search in y (m,), held against the measurements of the sealed runs, the last of its study."""
+    kept = tuple(c for c in causes if c.history != CALIBRATED or _worth(_freed(found, y, c, opened, seed)) >= 0)
+    if len(kept) < len(causes):
+        gone = " and ".join(f"{c.family.replace('_', ' ')} at {c.place}" for c in causes if c not in kept)
+        note = f"withdrawn: {gone}. Without its tolerance calibration predicts the sealed run worse"
+        left = verdict if any(c.history == CALIBRATED for c in kept) else "sensor" if kept else "nothing"
+        return Judged(left, kept, (), _gains(found, opened, seed), note)
     entries = {f.name: f for f in families}
     named = verdict in ("named", "out_of_tolerance", "ambiguous", "signal")
     extension = tuple(
@@ -77,6 +84,15 @@ def _gains(found: Search, opened: Sequence[Measured], seed: int) -> tuple[Gain, 
     return tuple(
         g for k, m in enumerate(opened, start=first) for g in gains(found, k, m, seed, _noise(found.detector, m))
     )  # fmt: skip
+
+
+def _freed(found: Search, y: np.ndarray, cause: Cause, opened: Sequence[Measured], seed: int) -> tuple[Gain, ...]:
+    """The same of a calibration in which a number has the value that it has without its tolerance."""
+    known = [p.path for p in found.detector.study.probed.parameters]
+    own = next(own for own in found.loose if known[own.index] == cause.parameter)
+    x, _ = settled_alone(found.detector.fitter, y, (own.index,))
+    x[own.index] = own.x
+    return _gains(replace(found, x=x), opened, seed)
 
 
 def _worth(table: Sequence[Gain]) -> int:
