@@ -20,7 +20,7 @@ from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K
-from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian
+from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian, readings_columns
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import Edge, edges_of, moved, with_pulses
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -108,9 +108,14 @@ def tried(
 
 def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Candidates, most worthy first. One that leads by its score while another near it was refitted is refitted, too:
-    the exact model takes some hundredths from each, and that alone would decide between the two."""
+    the exact model takes some hundredths from each, and that alone would decide between the two. Beside a leader that
+    was refitted what acts on readings alone is, too: parameters may have bent to it."""
     worthy = partial(worth, policy=detector.policy)
     order, exactly = sorted(candidates, key=worthy, reverse=True), set[int]()
+    if order and bent(detector, order[0]):
+        least = (1.0 - detector.policy.behind) * worthy(order[0])
+        order = [exact(detector, y, fitted, h) if _follows(h) and worthy(h) > least else h for h in order]
+        order.sort(key=worthy, reverse=True)
     while True:
         lead = order[0]
         near = [h for h in order[1:] if worthy(h) > (1.0 - detector.policy.behind) * worthy(lead)]
@@ -121,6 +126,11 @@ def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequenc
         exactly.add(id(order[0]))
         order.sort(key=worthy, reverse=True)
     return order
+
+
+def _follows(h: Hypothesis) -> bool:
+    """Whether a hypothesis acts on readings in proportion to a size that is free."""
+    return fault_of(h).read and not fault_of(h).curved and not h.batch.fixed
 
 
 def _saturated(detector: Detector, h: Hypothesis) -> bool:
@@ -151,7 +161,8 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     if h.when.bell is not None:
         h = moved(study, detector.elements, h, ())  # hours found by `growth` get their windows
     before = misfit(detector, fitted)
-    inner = edges_of(study, h)
+    inner = [] if fault.read else edges_of(study, h)
+    read = readings_columns(detector, h) if fault.read else np.zeros((len(y), q))
     low, high = bounds(study)
     floor = lowest(detector, h)
     a = np.maximum(a, floor)
@@ -168,7 +179,7 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
         outputs, derivatives = _outputs(detector, now, edges)
         J = jacobian(detector, now.x, [(h, float(now.a[0]))])
         projector = detector.fitter.projector(J, fitted.more)
-        left = detector.whiten(y - fitted.beside - outputs + J @ now.x)
+        left = detector.whiten(y - fitted.beside - outputs + J @ now.x) - read @ now.a
         removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
         arrived = i > held and abs(removed - statistic) < max(
             detector.policy.less, detector.policy.less_share * removed
@@ -188,7 +199,7 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
                 break
             D = derivatives
             D[:, q:] *= [e.per_second for e in edges]
-            D = detector.whiten(D)
+            D = detector.whiten(D) + np.pad(read, ((0, 0), (0, len(edges))))
             PD = projector(D)
             stiff = 1e9 * inverse if i < held else inverse
             F = D.T @ PD + np.diag([*stiff, *(e.prior(detector.policy) ** -2.0 for e in edges)])
