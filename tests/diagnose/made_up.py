@@ -58,8 +58,6 @@ def series(run: str, rng: np.random.Generator, sensors: int = 6, bins: int = 60,
         tcp_extended=tcp,
         loads={"x_current": current, "x_speed": speed, "ambient": 20.0 + np.sin(time / 9000), "idle": 0 * time},
         sealed=sealed,
-        measured=21.0 + delivered,
-        tcp_measured=tcp + 2e-5 * warm[5::6, None],
     )
 
 

@@ -13,8 +13,7 @@ from tests.diagnose.made_up import SHELL, diagnosis
 from tests.diagnose.test_search import measured
 from tests.support.descriptions import SLIDE
 from twin.build.places import Place
-from twin.diagnose.report.pictures import inline_svg
-from twin.diagnose.report.place import place_picture
+from twin.diagnose.report.place import channels_told, place_html, place_picture
 from twin.diagnose.report.scene import scene_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.support import shared, support_of
@@ -131,11 +130,14 @@ def test_a_network_is_laid_out_by_its_links():
 
 def test_a_picture_says_where_and_what_is_left_of_the_channels():
     for verdict, title in (("named", "Where: bed.y_min"), ("sensor", "Where: sensor x_nut")):
-        picture = place_picture(diagnosis(verdict))
+        d = diagnosis(verdict)
+        picture = place_picture(d, d.scene)
         assert picture.title == title
-        svg = inline_svg(picture.figure, "p")
-        assert "TCP dx" in svg
-        assert "sensor_3" in svg
-        before = float(np.sqrt(np.mean(diagnosis(verdict).series[0].recalibrated[:, 0] ** 2)))
-        assert f"{before:.2g} →" in svg
-    assert place_picture(replace(diagnosis("named"), scene=None)) is None
+        numbers = [t.get_text() for t in picture.figure.axes[0].texts]
+        assert "1" in numbers
+        told = channels_told(d)
+        assert "TCP dx" in told
+        assert "sensor_3" in told
+        before = float(np.sqrt(np.mean(d.series[0].recalibrated[:, 0] ** 2)))
+        assert f'<td class="number">{before:.3f} K</td>' in told
+    assert place_html(replace(diagnosis("named"), scene=None)) == ""

@@ -217,7 +217,7 @@ def diagnose(
             verdict, causes, described = "named", (*kept, *missing.causes), missing.description
             gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
             notes.insert(0, missing.note)
-    traces = _traces(shown, plans, [*runs, *sealed], judgement)
+    series, traces = _compared(shown, plans, [*runs, *sealed], judgement)
     first = found.steps[0]
     heat = unknown_of(found) if verdict == "unknown" else None
     planned = None
@@ -240,8 +240,8 @@ def diagnose(
         nulls=detector.nulls,
         thresholds=detector.thresholds,
         observed=first.observed,
-        whiteness=_whiteness(shown, plans),
-        series=_series(shown, plans, len(runs)),
+        whiteness=_whiteness(series),
+        series=series,
         notes=tuple(notes),
         seed=settings.seed,
         catalogue=VERSION,
@@ -292,50 +292,42 @@ def _summary(verdict: Verdict, causes: Sequence[Cause], found: Search) -> tuple[
     return tuple(lines)
 
 
-def _whiteness(found: Search, plans: Sequence[Measured]) -> tuple[tuple[str, float, float], ...]:
-    """Lag-1 correlation of every channel's residual, recalibrated and extended, over all fitted runs."""
+def _lag_1(residual: np.ndarray) -> float:
+    """Correlation of a residual (b,) with itself one bin later; NaN of fewer than 4 pairs of bins."""
+    there = np.isfinite(residual[1:]) & np.isfinite(residual[:-1])
+    a, b = residual[1:][there], residual[:-1][there]
+    return float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-30)) if len(a) > 3 else np.nan
+
+
+def _whiteness(series: Sequence[Series]) -> tuple[tuple[str, float, float], ...]:
+    """Lag-1 correlation of every channel's residual, recalibrated and extended, in the mean of all fitted runs."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    for s in (s for s in series if not s.sealed):
+        for name, before, after in zip(s.sensors, s.recalibrated.T, s.extended.T, strict=True):
+            both = _lag_1(before), _lag_1(after)
+            if np.isfinite(both).all():
+                found.setdefault(name, []).append(both)
+    return tuple((name, *np.mean(both, axis=0).tolist()) for name, both in found.items())
+
+
+def _compared(
+    found: Search, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement
+) -> tuple[tuple[Series, ...], tuple[Trace, ...]]:
+    """The residuals of every run, and every channel beside the extended model: the recalibrated one where there is no
+    extension."""
     study = found.detector.study
-    before: dict[str, list[float]] = {}
-    after: dict[str, list[float]] = {}
-    for k in study.fitted:
-        models = predicted(found, k)
-        for table, flat in ((before, models.recalibrated), (after, models.extended)):
-            T, _ = study.runs[k].split(flat)
-            error = plans[k].temperature - T
-            for i, name in enumerate(plans[k].sensors):
-                r = error[:, i]
-                pair = np.isfinite(r[1:]) & np.isfinite(r[:-1])
-                if pair.sum() > 3:
-                    a, b = r[1:][pair], r[:-1][pair]
-                    table.setdefault(name, []).append(float(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-30)))
-    return tuple((name, float(np.mean(before[name])), float(np.mean(after[name]))) for name in before)
-
-
-def _traces(found: Search, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement) -> tuple[Trace, ...]:
-    """Every channel of every run beside the extended model, or the recalibrated one where there is no extension."""
-    traces: list[Trace] = []
-    for k, (m, run) in enumerate(zip(plans, runs, strict=True)):
-        T, w = found.detector.study.runs[k].split(predicted(found, k).extended)
-        traces += traces_of_run(m, run, T, w)
-    return with_findings(traces, judgement, [m.name for m in plans[: len(found.detector.study.fitted)]])
-
-
-def _series(found: Search, plans: Sequence[Measured], fitted: int) -> tuple[Series, ...]:
-    study = found.detector.study
-    result = []
-    for k, (planned, m) in enumerate(zip(study.runs, plans, strict=True)):
-        models = [planned.split(v) for v in vars(predicted(found, k)).values()]
+    series, traces = [], list[Trace]()
+    for k, (planned, m, measured_run) in enumerate(zip(study.runs, plans, runs, strict=True)):
+        (T0, w0), (T1, w1), (T2, w2) = (planned.split(v) for v in vars(predicted(found, k)).values())
+        traces += traces_of_run(m, measured_run, T2, w2)
         run = planned.run
         start, dt = run.drive.time[0], run.drive.time[1] - run.drive.time[0]
         step = np.clip(((m.bin_time - start) / dt).astype(int), 0, run.drive.n_steps - 1)
-        result.append(
+        series.append(
             Series(
-                run=m.name, time=m.bin_time - start, sensors=m.sensors,
-                delivered=m.temperature - models[0][0], recalibrated=m.temperature - models[1][0],
-                extended=m.temperature - models[2][0], tcp_time=m.tcp_time - start,
-                tcp_delivered=m.tcp - models[0][1], tcp_recalibrated=m.tcp - models[1][1],
-                tcp_extended=m.tcp - models[2][1], loads={s: v[step] for s, v in run.signals.items()},
-                sealed=k >= fitted, measured=m.temperature, tcp_measured=m.tcp,
+                m.name, m.bin_time - start, m.sensors, m.temperature - T0, m.temperature - T1, m.temperature - T2,
+                m.tcp_time - start, m.tcp - w0, m.tcp - w1, m.tcp - w2,
+                {s: v[step] for s, v in run.signals.items()}, k not in study.fitted,
             )
         )  # fmt: skip
-    return tuple(result)
+    return tuple(series), with_findings(traces, judgement, [plans[k].name for k in study.fitted])

@@ -86,7 +86,7 @@ class Diagnosis:
         return self.findings.causes
 
     def __str__(self) -> str:
-        from twin.diagnose.report.text import summary_lines
+        from twin.diagnose.report.page import summary_lines
 
         return "\n".join(summary_lines(self.findings))
 
@@ -163,8 +163,8 @@ class Report:
         return read(self.folder / ARTEFACT)
 
     def __str__(self) -> str:
+        from twin.diagnose.report.page import summary_lines
         from twin.diagnose.report.plan import plan_lines
-        from twin.diagnose.report.text import summary_lines
 
         planned = plan_lines(self.findings.plan) if self.findings.plan else []
         return "\n".join([*summary_lines(self.findings), *planned, *self.said])

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.diagnose.result.diagnosis import Diagnosis, Pull
-from twin.diagnose.result.numbers import number, quantity, size_words
+from twin.diagnose.result.numbers import number, quantity, rms, size_words
 
 KELVIN, METRES = 0.5, 3e-6  # rms of a channel, from which a change is told: what users asked for
 WHITE = 0.2  # correlation from bin to bin: two standard deviations of that of 100 bins (8 h) of white noise
@@ -17,7 +17,8 @@ def moved_words(d: Diagnosis) -> str:
     """How far calibration moved the channels that it moved most, and by which parameter; empty below KELVIN, METRES."""
     of_sensors, of_tcp = [(0.0, "", "")], [(0.0, "", "")]
     for s in (s for s in d.series if not s.sealed):
-        T, w = _rms(s.recalibrated - s.delivered), _rms(s.tcp_recalibrated - s.tcp_delivered)
+        changes = s.recalibrated - s.delivered, s.tcp_recalibrated - s.tcp_delivered
+        T, w = (np.nan_to_num(rms(change)).tolist() for change in changes)
         of_sensors += [(v, f"sensors.{name}", s.run) for v, name in zip(T, s.sensors, strict=True)]
         of_tcp += [(v, f"d{axis}", s.run) for v, axis in zip(w, "xyz", strict=True)]
     said = []
@@ -30,12 +31,6 @@ def moved_words(d: Diagnosis) -> str:
     most = max(d.pulls, key=_weight, default=None)
     by = f", most of it by {_value(most)}" if most is not None and _weight(most) > 0.0 else ""
     return f"first of all, the description as delivered is not right: calibration moved {' and '.join(said)} (rms){by}"
-
-
-def _rms(change: np.ndarray) -> list[float]:
-    """Of each column, what is not finite taken as no change."""
-    known = np.where(np.isfinite(change), change, 0.0)
-    return [float(v) for v in np.sqrt(np.mean(np.square(known), axis=0))] if len(change) else [0.0] * change.shape[1]
 
 
 def left_words(d: Diagnosis) -> str:

@@ -5,10 +5,11 @@ STYLE = """
   --grey: #8a9099; --blue: #0072b2; --orange: #d55e00; --good: #2f7d4f; color-scheme: light dark; }
 @media screen and (prefers-color-scheme: dark) {
   :root { --ink: #e4e6e9; --page: #16191d; --soft: #20242a; --grid: #32373e; --muted: #a0a6ae; --faint: #5b626b;
-    --grey: #9aa1aa; --blue: #56b4e9; --orange: #f0803c; --good: #6cc08f; } }
+    --grey: #9aa1aa; --blue: #56b4e9; --orange: #f0803c; --good: #6cc08f; }
+  img { filter: invert(0.9) hue-rotate(180deg); } }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page); max-width: 1100px;
   margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.5rem; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--grid); font-size: 1.25rem; }
+h1 { font-size: 1.5rem; } h2 { margin-top: 1.6rem; border-bottom: 1px solid var(--grid); font-size: 1.25rem; }
 h3 { font-size: 1rem; margin: 1.5rem 0 .4rem; }
 .verdict { background: var(--soft); border-left: 6px solid var(--orange); padding: .8rem 1.2rem; margin: 1rem 0; }
 .verdict.nothing { border-color: var(--good); }
@@ -19,8 +20,9 @@ h3 { font-size: 1rem; margin: 1.5rem 0 .4rem; }
 nav { margin: 1rem 0; } nav a { color: var(--blue); margin-right: 1rem; }
 figure { margin: 1.2rem 0 2rem; break-inside: avoid; }
 figcaption { color: var(--muted); }
-svg.plot { width: 100%; height: auto; font-family: system-ui, sans-serif; }
-svg.plot * { stroke-linejoin: round; stroke-linecap: butt; }
+img { max-width: 100%; height: auto; }
+.place { display: flex; flex-wrap: wrap; gap: 1rem 2rem; align-items: center; }
+.place figure { flex: 1 1 26rem; min-width: 0; margin: 0; } .place .wide { flex: 1 1 22rem; }
 details > summary { cursor: pointer; color: var(--blue); margin: .4rem 0; }
 details.part > summary { margin: 1.2rem 0 0; border-bottom: 1px solid var(--grid); }
 details.part > summary h2 { display: inline-block; margin: .4rem 0; border: none; color: var(--ink); }

@@ -6,17 +6,19 @@ import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from twin.diagnose.report.text import beyond, history_words, place_words, times, what
-from twin.diagnose.result.diagnosis import Cause, Diagnosis, Rival
+from twin.diagnose.report.text import history_words, place_words, times, what
+from twin.diagnose.result.diagnosis import Diagnosis, Rival
 from twin.diagnose.result.numbers import customary, interval_and_unit, number, quantity
 
 MANY = 60  # rows that a table shows at most
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """A table with a head; columns in `numbers` are set right. Cells are plain text."""
-    kinds = [' class="number"' if k in numbers else "" for k in range(len(head))]
+    """A table with a head; columns in `numbers` are set right. Cells are plain text; empty without a row."""
     rows = list(rows)
+    if not rows:
+        return ""
+    kinds = [' class="number"' if k in numbers else "" for k in range(len(head))]
     shown = "\n".join(
         "<tr>" + "".join(f"<td{kind}>{escape(cell)}</td>" for kind, cell in zip(kinds, row, strict=True)) + "</tr>"
         for row in rows[:MANY]
@@ -24,6 +26,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[
     more = f"<p>{len(rows) - MANY} more in report.json.</p>" if len(rows) > MANY else ""
     titles = "".join(f"<th{kind}>{escape(title)}</th>" for kind, title in zip(kinds, head, strict=True))
     return f'<div class="wide"><table><thead><tr>{titles}</tr></thead><tbody>\n{shown}\n</tbody></table></div>{more}'
+
+
+def items(texts: Iterable[str]) -> str:
+    """A list of plain texts, empty of none."""
+    told = "\n".join(f"<li>{escape(text)}</li>" for text in texts)
+    return f"<ul>\n{told}\n</ul>" if told else ""
 
 
 def folded(summary: str, html: str) -> str:
@@ -38,17 +46,6 @@ def _sized(value: float, ci95: tuple[float, float], unit: str) -> tuple[str, str
     return f"{middle} {name}".rstrip(), f"{low} to {high} {name}".rstrip() if math.isfinite(sum(ci95)) else "-"
 
 
-def when(cause: Cause) -> str:
-    """The history in words, with the windows where it is made of them."""
-    parts = [
-        f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" + (f" at {w.level:.2g}" if w.level != 1.0 else "")
-        for w in cause.windows[:6]
-    ]
-    if len(cause.windows) > 6:
-        parts.append(f"and {len(cause.windows) - 6} more")
-    return "; ".join([history_words(cause.history) or "always", *parts])
-
-
 def channels_table(d: Diagnosis) -> str:
     """How every channel is met and what of it counted: those with something wrong first, then those met worst."""
     order = sorted(d.channels, key=lambda r: (not (r["wrong"] or r["leaps"]), r["kept"] >= 0.9, -(r["rms"] or 0.0)))
@@ -57,31 +54,18 @@ def channels_table(d: Diagnosis) -> str:
         rms = "-" if r["rms"] is None else f"{r['rms']:.3f} K" if r["unit"] == "K" else f"{1e6 * r['rms']:.2f} um"
         rows.append([r["channel"], r["run"], rms, f"{100 * r['kept']:.0f} %", str(r["leaps"]), r["wrong"]])
     head = ["channel", "run", "rms that is left", "kept", "leaps", "what is wrong"]
-    return table(head, rows, (2, 3, 4)) if rows else ""
+    return table(head, rows, (2, 3, 4))
 
 
-def causes_table(causes: Sequence[Cause]) -> str:
-    rows = []
-    for k, c in enumerate(causes):
-        size, interval = _sized(c.amplitude, c.ci95, c.unit)
-        rows.append(
-            [str(k + 1), what(c.family), place_words(c.place), size, interval, when(c), number(c.statistic),
-             number(c.threshold), c.parameter or "nothing"]
-        )  # fmt: skip
-    head = ["", "what", "where", "size", "95 % interval", "when", "statistic", "needed", "changes"]
-    return table(head, rows, (3, 4, 6, 7))
-
-
-def rivals_table(rivals: Sequence[Rival], thresholds: bool, d: Diagnosis) -> str:
-    """Candidates or rivals; `thresholds` adds the column of their family's threshold."""
+def rivals_table(rivals: Sequence[Rival], d: Diagnosis) -> str:
+    """Candidates or rivals, each beside what its family needs."""
     rows = []
     for k, r in enumerate(rivals):
-        size, interval = _sized(r.amplitude, r.ci95, r.unit)
-        row = [str(k + 1), what(r.family), place_words(r.place), history_words(r.history) or "always", size, interval]
-        row += [number(r.statistic)] + ([number(d.thresholds.get(r.family, math.nan))] if thresholds else [])
+        when = history_words(r.history) or "always"
+        row = [str(k + 1), what(r.family), place_words(r.place), when, *_sized(r.amplitude, r.ci95, r.unit)]
+        row += [number(r.statistic), number(d.thresholds.get(r.family, math.nan))]
         rows.append([*row, f"{r.cosine:.2f}" if math.isfinite(r.cosine) else "-"])
-    needed = ["needed"] if thresholds else []
-    head = ["", "what", "where", "when", "size", "95 % interval", "statistic", *needed, "cosine"]
+    head = ["", "what", "where", "when", "size", "95 % interval", "statistic", "needed", "cosine"]
     return table(head, rows, range(4, len(head)))
 
 
@@ -117,19 +101,21 @@ def gain_table(d: Diagnosis) -> str:
 
 
 def pulls_table(d: Diagnosis) -> str:
-    """Parameters beyond two standard deviations, and those that were freed of their tolerance."""
+    """Every fitted parameter: those freed of their tolerance first, then the farthest."""
     rows = [
         [p.path + (" (free of its tolerance)" if p.freed else ""), quantity(p.nominal, p.unit),
          quantity(p.value, p.unit), f"{p.pull:+.1f}", f"{p.sigma:.2f}"]
-        for p in beyond(d.pulls, 0.0) if p.freed or abs(p.pull) > 2.0
+        for p in sorted(d.pulls, key=lambda p: (not p.freed, -abs(p.pull)))
     ]  # fmt: skip
     return table(["parameter", "declared", "fitted", "pull", "posterior sigma"], rows, (1, 2, 3, 4))
 
 
 def families_table(d: Diagnosis) -> str:
-    """Per family its statistic in these data, its threshold, and what simulated data without an effect gave."""
+    """Per family its statistic in these data, its threshold, and what simulated data without an effect gave; what comes
+    nearest to its threshold, or is farthest above it, first."""
+    known = dict.fromkeys([*d.observed, *d.thresholds, *d.nulls])
     rows = []
-    for family in dict.fromkeys([*d.observed, *d.thresholds, *d.nulls]):
+    for family in sorted(known, key=lambda f: -d.observed.get(f, 0.0) / max(d.thresholds.get(f, math.inf), 1e-9)):
         nulls = [float(v) for v in d.nulls.get(family, []) if math.isfinite(v)]
         threshold = d.thresholds.get(family, math.nan)
         row = [number(d.observed[family]) if family in d.observed else "-", number(threshold)]

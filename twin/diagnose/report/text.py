@@ -1,4 +1,5 @@
-"""The words of a diagnosis: causes, places and chances, a sentence per verdict, ten lines for a terminal."""
+"""The words of a diagnosis: causes, places and chances, a sentence per verdict, and the lines that its sections begin
+with."""
 
 from __future__ import annotations
 
@@ -12,14 +13,25 @@ import numpy as np
 from twin.diagnose.faults.channels_check import REFUTED
 from twin.diagnose.faults.table import family_of
 from twin.diagnose.report.recalibration import left_words, moved_words
-from twin.diagnose.result.diagnosis import Cause, Diagnosis, Gain, Limit, Pull, Rival
-from twin.diagnose.result.numbers import interval_and_unit, number, quantity, size_words
+from twin.diagnose.result.diagnosis import Cause, Diagnosis, Limit, Pull, Rival
+from twin.diagnose.result.numbers import interval_and_unit, number, quantity, rms, size_words
 from twin.diagnose.result.place import Support
 from twin.diagnose.result.spot import Spot
 
 LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
 MEASURED = (("K", "temperature"), ("m", "TCP direction"))  # units of channels, and what these are
 SEEN = ("stuck", "leap", "noise", "rail")  # histories of sensors at fault that are seen before anything is fitted
+# What follows from a verdict, for who acts on it
+_FOLLOWS = {
+    "named": "The extended model whose gain is shown below holds this.",
+    "ambiguous": "The data allow more than one edit of the description; what to measure next is said below.",
+    "unknown": "Where the heat enters is known, its law is not; look below at when it comes.",
+    "out_of_tolerance": "The structure of the model holds; the declared values do not, or an effect hides in them.",
+    "sensor": "The model of the machine is left as it is.",
+    "signal": "The model of the machine is left as it is.",
+    "too_poor": "No cause is named: with such a model many would fit. Add what would help first, and diagnose again.",
+    "nothing": "The model of the machine is left as it is. An effect below the following sizes could still be there.",
+}
 
 
 def what(family: str) -> str:
@@ -148,6 +160,15 @@ def verdict_sentence(d: Diagnosis) -> str:
     return _sentence(f"{len(d.causes)} causes act together: {causes}")
 
 
+def follows(d: Diagnosis) -> str:
+    """What to do with a verdict."""
+    if d.verdict == "unknown" and d.unknown is None:  # the sealed run refuted the name
+        return "What was named does not predict the sealed run; see the notes."
+    if d.verdict == "signal" and any(c.parameter for c in d.causes):
+        return "No cause is added to the machine: machine.toml corrects the declaration of the signal."
+    return _FOLLOWS[d.verdict]
+
+
 def _strained_words(d: Diagnosis) -> str:
     numbers = {
         c.place: pull_words(replace(p, value=p.nominal * c.amplitude), c.ci95)
@@ -254,6 +275,16 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
     return f"Calibration moves it {far} times as far as all but 3 % of simulated data sets without an effect do."
 
 
+def when(cause: Cause) -> str:
+    """The history in words, with the windows where it is made of them."""
+    parts = [
+        f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" + (f" at {w.level:.2g}" if w.level != 1.0 else "")
+        for w in cause.windows[:6]
+    ]
+    more = [f"and {len(cause.windows) - 6} more"] if len(cause.windows) > 6 else []
+    return "; ".join([history_words(cause.history) or "always", *parts, *more])
+
+
 def support_words(support: Support) -> str:
     """How many channels carry the first cause, and which."""
     strongest = [f"{name} {100 * share:.0f} %" for name, share in support.shares[:3] if share >= LEAST_SHARE]
@@ -261,72 +292,69 @@ def support_words(support: Support) -> str:
     return f"{n} channels carry this (participation ratio): {', '.join(strongest)} of the evidence."
 
 
-def sealed_runs(d: Diagnosis) -> list[str]:
-    """The runs on which the gain was measured."""
-    return list(dict.fromkeys(g.run for g in d.gain))
+def evidence_lines(d: Diagnosis) -> list[str]:
+    """What the verdict rests on, what follows from it, and what would tell rivals apart."""
+    several = len(d.causes) > 1
+    lines = [(f"{c.place}: " if several else "") + cause_evidence(d, c) for c in d.causes]
+    lines += [support_words(d.support)] if d.support else []
+    if d.unknown and not d.causes:
+        lines.append(evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold))
+    if d.verdict in ("sensor", "signal"):
+        lines.append(follows(d))
+    if d.verdict in ("ambiguous", "named") and remedies(d):
+        lines.append(f"To tell rivals apart: {remedies(d)[0]}")
+    return lines
 
 
-def rms_of(gains: Sequence[Gain]) -> tuple[float, float, float]:
-    """Root mean square over channels of one unit: as delivered, recalibrated, extended; NaN of none."""
-    rows = np.array([[g.delivered, g.recalibrated, g.extended] for g in gains], dtype=float).reshape(-1, 3)
-    rows = rows[np.isfinite(rows).all(axis=1)]
-    if not len(rows):
-        return math.nan, math.nan, math.nan
-    a, b, c = np.sqrt((rows**2).mean(axis=0)).tolist()
-    return a, b, c
+def unknown_lines(d: Diagnosis) -> list[str]:
+    if not d.unknown or not d.unknown.correlated_signals:
+        return []
+    name, correlation = d.unknown.correlated_signals[0]
+    return [f"The unexplained heat follows {name} best (correlation {correlation:+.2f})."]
 
 
-def gain_sentences(d: Diagnosis) -> list[str]:
+def pull_lines(d: Diagnosis) -> list[str]:
+    far = [] if d.verdict == "out_of_tolerance" else beyond(d.pulls, 2.0)
+    return [f"Worth a look: {joined([pull_words(p) for p in far[:2]])}."] if far else []
+
+
+def limit_lines(d: Diagnosis) -> list[str]:
+    shown = joined([limit_words(x) for x in d.detection_limits[:5]])
+    return [f"At half of all places these data would have shown, in 95 of 100 cases: {shown}."] if shown else []
+
+
+def whiteness_lines(d: Diagnosis) -> list[str]:
+    before, after = (np.array([w[k] for w in d.whiteness], dtype=float) for k in (1, 2))
+    if not np.isfinite(before).any() or not np.isfinite(after).any():
+        return []
+    return [
+        f"What is left is correlated by {np.nanmedian(after):.2f} from bin to bin (median of channels; "
+        f"{np.nanmedian(before):.2f} before)."
+    ]
+
+
+def gain_lines(d: Diagnosis) -> list[str]:
     """What the extended model brings on each sealed run: the channels that the causes move, then the others."""
-    result, runs = [], sealed_runs(d)
+    result, runs = [], list(dict.fromkeys(g.run for g in d.gain))
     groups = product(runs, ((True, "that the causes move"), (False, "that they do not move")), MEASURED)
     for run, (affected, which), (unit, name) in groups:
         these = [g for g in d.gain if g.run == run and g.affected == affected and g.unit == unit]
         if not these:
             continue
-        a, b, c = (quantity(v, unit) for v in rms_of(these))
-        head = f"{run}: " if len(runs) > 1 else ""
+        rows = np.array([[g.delivered, g.recalibrated, g.extended] for g in these], dtype=float)
+        a, b, c = (quantity(v, unit) for v in rms(rows[np.isfinite(rows).all(axis=1)]).tolist())
+        head = f"Sealed run {run}" if len(runs) > 1 else "Sealed run"
         counted = f"{len(these)} {name}{'s' if len(these) > 1 else ''}"
         better, worse = sum(g.ci95[0] > 0 for g in these), sum(g.ci95[1] < 0 for g in these)
         result.append(
-            f"{head}{counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
+            f"{head}: {counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
             f"noise included); better beyond chance in {better}, worse in {worse}."
         )
     return result
 
 
-def summary_lines(diagnosis: Diagnosis) -> list[str]:
-    """At most ten lines for a terminal: verdict, evidence, what would tell rivals apart, gain, limits."""
-    d = diagnosis
-    lines = [f"{d.machine}: {d.verdict.replace('_', ' ')}", verdict_sentence(d)]
-    several = len(d.causes) > 1
-    lines += [(f"{c.place}: " if several else "") + cause_evidence(d, c) for c in d.causes[:2]]
-    if d.support:
-        lines.append(support_words(d.support))
-    if d.unknown and not d.causes:
-        lines.append(evidence_sentence(d, "unknown", d.unknown.statistic, d.unknown.threshold))
-    if d.verdict == "signal" and any(c.parameter for c in d.causes):
-        lines.append("No cause is added to the machine: machine.toml corrects the declaration of the signal.")
-    elif d.verdict in ("sensor", "signal"):
-        lines.append("The model of the machine is left as it is.")
-    if d.verdict in ("ambiguous", "named") and remedies(d):
-        lines.append(f"To tell rivals apart: {remedies(d)[0]}")
-    if d.unknown and d.unknown.correlated_signals:
-        name, correlation = d.unknown.correlated_signals[0]
-        lines.append(f"The unexplained heat follows {name} best (correlation {correlation:+.2f}).")
-    lines += [f"Sealed run{' ' if len(sealed_runs(d)) > 1 else ': '}{text}" for text in gain_sentences(d)[:2]]
-    far = beyond(d.pulls, 2.0)
-    if far and d.verdict != "out_of_tolerance":
-        lines.append(f"Worth a look: {joined([pull_words(p) for p in far[:2]])}.")
-    if d.detection_limits and d.verdict in ("nothing", "too_poor"):
-        shown = joined([limit_words(x) for x in d.detection_limits[:5]])
-        lines.append(f"At half of all places these data would have shown, in 95 of 100 cases: {shown}.")
-    before, after = (np.array([w[k] for w in d.whiteness], dtype=float) for k in (1, 2))
-    if np.isfinite(before).any() and np.isfinite(after).any():
-        lines.append(
-            f"What is left is correlated by {np.nanmedian(after):.2f} from bin to bin (median of channels; "
-            f"{np.nanmedian(before):.2f} before)."
-        )
-    if d.notes:
-        lines.append(f"Note: {d.notes[0]}" + (f" ({len(d.notes) - 1} more in the report)" if len(d.notes) > 1 else ""))
-    return [" ".join(line.split()) for line in lines[:10]]
+def no_gain(d: Diagnosis) -> str:
+    """Why there is none."""
+    sealed = any(s.sealed for s in d.series)
+    why = "nothing was measured in the run kept aside" if sealed else "no run was kept aside"
+    return f"There is no gain to report: {why}."

@@ -123,8 +123,6 @@ class Series:
     tcp_extended: np.ndarray
     loads: Mapping[str, np.ndarray]  # signals (b,) in SI at `time`, for the load strip
     sealed: bool = False
-    measured: np.ndarray | None = None  # (b, s) degC
-    tcp_measured: np.ndarray | None = None  # (k, 3) m
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 # SI unit without blanks and dots -> factor, customary unit
 _CUSTOMARY: dict[str, tuple[float, str]] = {
     "m": (1e6, "µm"),
@@ -70,3 +72,12 @@ def size_words(value: float, ci95: tuple[float, float], unit: str) -> str:
     if not any(math.isfinite(v) for v in ci95):
         return f"{middle}{name}"
     return f"{middle}{name} (95 % interval {low} to {high}{name})"
+
+
+def rms(values: np.ndarray, axis: int = 0) -> np.ndarray:
+    """Root mean square along an axis of what is finite; NaN where nothing is."""
+    values = np.asarray(values, dtype=float)
+    there = np.isfinite(values)
+    squares = np.where(there, values, 0.0) ** 2
+    count = there.sum(axis=axis)
+    return np.where(count > 0, np.sqrt(squares.sum(axis=axis) / np.maximum(count, 1)), np.nan)
