@@ -127,7 +127,7 @@ def test_a_terminal_gets_a_table_by_gain_and_the_page_a_section():
     assert lines[1].split()[:5] == ["8.00", "x", "from", "5.00", "W,"]
     assert "today seen not up to 5.00 times the declared" in lines[3]
     html = plan_section(planned())
-    assert html.count("<details>") == 3
+    assert html.count("<details>") == 4
     assert "sensor at bed.left" in html
     assert "the same noise" in html
     assert plan_section(None) == ""

@@ -29,7 +29,8 @@ from twin.diagnose.model.surrogate import Surrogate
 from twin.diagnose.plan.plan import make_plan
 from twin.diagnose.plan.suspicion import known_family, named, pairs_of, suspicions_in, worst_of_machine
 from twin.diagnose.report.scene import scene_of
-from twin.diagnose.result.diagnosis import Cause, Diagnosis, Series, Unknown, Verdict
+from twin.diagnose.report.text import cause_words
+from twin.diagnose.result.diagnosis import Cause, Diagnosis, Pull, Series, Unknown, Verdict
 from twin.diagnose.result.place import Scene
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.dispersion import raised, searched, wrong_temperatures
@@ -135,16 +136,8 @@ def prepare(
     def differ(surrogate: Surrogate) -> tuple[Difference, ...]:
         return differences(machine, study, surrogate, known, every, closed, progress)
 
-    inputs = (
-        machine_hash(machine),
-        asked,
-        tuple(study.fitted),
-        arrays_hash(parts),
-        instruments,
-        names,
-        tolerance,
-        counts,
-    )
+    fitted, loads = tuple(study.fitted), arrays_hash(parts)
+    inputs = (machine_hash(machine), asked, fitted, loads, instruments, names, tolerance, counts)
     families, policy = settings.families, settings.policy
     detector = cached(
         "detector", make_detector.__module__, inputs,
@@ -159,13 +152,9 @@ def _closed(m: Measured) -> Measured:
 
 
 def diagnose(
-    artefact: Artefact,
-    machine: Machine,
-    runs: Sequence[Run],
-    sealed: Sequence[Run] = (),
-    settings: Settings = Settings(),
-    progress: Progress = silent,
-) -> Result:
+    artefact: Artefact, machine: Machine, runs: Sequence[Run], sealed: Sequence[Run] = (),
+    settings: Settings = Settings(), progress: Progress = silent,
+) -> Result:  # fmt: skip
     """The diagnosis of measured runs. Sealed runs are opened after everything else is decided.
 
     Raises LogError and TwinError for runs and descriptions that cannot be used.
@@ -218,6 +207,7 @@ def diagnose(
             gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
             notes.insert(0, missing.note)
     series, traces = _compared(shown, plans, [*runs, *sealed], judgement)
+    pulls = pulls_of(shown)
     first = found.steps[0]
     heat = unknown_of(found) if verdict == "unknown" else None
     planned = None
@@ -229,9 +219,9 @@ def diagnose(
     diagnosis = Diagnosis(
         machine=machine.machine.name,
         verdict=verdict,
-        summary=_summary(verdict, causes, shown),
+        summary=_summary(verdict, causes, pulls),
         causes=causes,
-        pulls=pulls_of(shown),
+        pulls=pulls,
         detection_limits=limits_of(detector),
         unknown=heat,
         gain=gains,
@@ -275,21 +265,14 @@ def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unkno
     """Where the first cause is, or the heat that nothing explains."""
     if unknown is not None:
         return scene_of(machine, probed, unknown.surface)
-    if not causes:
-        return None
-    return scene_of(machine, probed, causes[0].place, str(causes[0].settings.get("surface", "")))
+    return scene_of(machine, probed, causes[0].place, str(causes[0].settings.get("surface", ""))) if causes else None
 
 
-def _summary(verdict: Verdict, causes: Sequence[Cause], found: Search) -> tuple[str, ...]:
-    from twin.diagnose.report.text import cause_words
-
+def _summary(verdict: Verdict, causes: Sequence[Cause], pulls: Sequence[Pull]) -> tuple[str, ...]:
     lines = [cause_words(c) for c in causes]
-    if verdict == "nothing":
-        lines.append("no significant misfit")
-    strong = [p.path for p in pulls_of(found) if abs(p.pull) > 3.0]
-    if strong:
-        lines.append(f"far from their nominal values: {', '.join(strong[:5])}")
-    return tuple(lines)
+    lines += ["no significant misfit"] if verdict == "nothing" else []
+    strong = [p.path for p in pulls if abs(p.pull) > 3.0]
+    return (*lines, *([f"far from their nominal values: {', '.join(strong[:5])}"] if strong else []))
 
 
 def _lag_1(residual: np.ndarray) -> float:

@@ -40,31 +40,15 @@ AT = "sensor at "  # and its place: the name of what adds a sensor
 
 
 @dataclass(frozen=True)
-class Asked:
-    """Columns (u,) of today's detector whose information is wanted, by their keys."""
-
-    keys: tuple[Key, ...]
-    histories: Histories  # of today's runs
-
-
-@dataclass(frozen=True)
 class Foreseen:
     """One experiment, with one more sensor or none."""
 
-    experiment: Experiment
-    place: str  # of another sensor; "" for none
+    name: str
+    words: str  # what to do
     # (2 u, 2 u): of the asked columns as they act in today's runs, then of each alone in the hours of the new run in
     # which it acts in today's (zero for what does not switch: its first column goes on)
     before: np.ndarray
     after: np.ndarray
-
-    @property
-    def name(self) -> str:
-        return f"{AT}{self.place}" if self.place else self.experiment.name
-
-    @property
-    def words(self) -> str:
-        return self.experiment.words + (f", with a temperature sensor at {self.place}" if self.place else "")
 
 
 @dataclass(frozen=True)
@@ -77,12 +61,13 @@ class _Run:
 
 
 def foreseen(
-    detector: Detector, machine: Machine, runs: Sequence[Run], experiments: Sequence[Experiment], asked: Asked,
-    noise: float, progress: Progress = silent,
+    detector: Detector, machine: Machine, runs: Sequence[Run], experiments: Sequence[Experiment],
+    asked: Sequence[Key], noise: float, progress: Progress = silent,
 ) -> Iterator[Foreseen]:  # fmt: skip
     """The experiments one after the other, each beside today's runs.
 
-    runs: as the detector's study was fitted to; noise [K] of a reading, where no sensor of today tells that of a mean.
+    runs: as the detector's study was fitted to; asked: keys of the detector's columns (u,) whose information is wanted;
+    noise [K] of a reading, where no sensor of today tells that of a mean.
     """
     today = detector.study
     n = len(runs)
@@ -102,7 +87,7 @@ def foreseen(
             both = replace(study, runs=(*study.runs[:n], own), fitted=tuple(range(n + 1)))
             each = [*known, _at_nominal(study, n + e)]
             whiten = Whitener(both, (*channels, _channels(detector, own, of_new, noise)))
-            yield from _compared(both, whiten, each, experiment, asked, form_of(machine))
+            yield from _compared(both, whiten, each, experiment, asked, detector.elements.histories, form_of(machine))
             advance(experiment.name)
 
 
@@ -147,13 +132,14 @@ def _channels(detector: Detector, planned: Planned, k: int, noise: float) -> tup
 
 
 def _compared(
-    study: Study, whiten: Whitener, runs: Sequence[_Run], experiment: Experiment, asked: Asked, form: Form
-) -> Iterator[Foreseen]:
+    study: Study, whiten: Whitener, runs: Sequence[_Run], experiment: Experiment, asked: Sequence[Key],
+    today: Histories, form: Form,
+) -> Iterator[Foreseen]:  # fmt: skip
     nominal = tuple(r.nominal for r in runs)
     elements = elements_of(study, nominal)
     J = np.vstack([r.J for r in runs])
     readings, of_reading = readings_of(study, nominal, [r.outputs for r in runs], [r.J for r in runs], swaps=False)
-    wanted = [_columns(elements, of_reading, key, asked.histories) for key in asked.keys]
+    wanted = [_columns(elements, of_reading, key, today) for key in asked]
     asked_for = {c for now, new, reading, _ in wanted for c in (now, new) if c is not None and not reading}
     chosen = sorted(asked_for | {c for key, c in elements.index.items() if is_nuisance(key)})
     narrow = _narrowed(elements, chosen)
@@ -170,13 +156,14 @@ def _compared(
             D[:, len(wanted) + i] = factor * raw[:, place[new]]
     M = np.hstack([whiten(D), whiten(J), *map(whiten, bare_forms(study, readings, of_reading)), known])
     rows = _rows(study)
-    before = _gram(M[rows == "today"])
-    after = before + _gram(M[rows == ""])
-    u = D.shape[1]
+    of_rows = {name: M[rows == name].T @ M[rows == name] for name in ("today", "", *experiment.places)}
+    before, after, u = of_rows["today"], of_rows["today"] + of_rows[""], D.shape[1]
     told = _information(before, u)
-    for name in experiment.places or ("",):
-        more = after + _gram(M[rows == name]) if name else after
-        yield Foreseen(experiment, name, told, _information(more, u))
+    if not experiment.places:
+        yield Foreseen(experiment.name, experiment.words, told, _information(after, u))
+    for name in experiment.places:
+        words = f"{experiment.words}, with a temperature sensor at {name}"
+        yield Foreseen(f"{AT}{name}", words, told, _information(after + of_rows[name], u))
 
 
 def _columns(
@@ -224,10 +211,6 @@ def _rows(study: Study) -> np.ndarray:
         names = of_sensor if last else ["today"] * len(of_sensor)
         parts += [np.tile(np.array(names, dtype=object), bins), np.full(3 * tcp, "" if last else "today", dtype=object)]
     return np.concatenate(parts)
-
-
-def _gram(M: np.ndarray) -> np.ndarray:
-    return np.asarray(M.T @ M)
 
 
 def _information(gram: np.ndarray, u: int) -> np.ndarray:

@@ -20,7 +20,7 @@ from twin.diagnose.faults.elements import Key
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.plan.actuators import actuators_of
 from twin.diagnose.plan.experiments import AGAIN, experiments_of, longest_of
-from twin.diagnose.plan.foreseen import AT, Asked, Foreseen, foreseen
+from twin.diagnose.plan.foreseen import AT, Foreseen, foreseen
 from twin.diagnose.plan.suspicion import Suspicion
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
 from twin.diagnose.result.spot import Spot
@@ -91,8 +91,7 @@ def make_plan(
     columns = _needed(detector, suspicions, pairs)
     key_of = {c: key for key, c in detector.index.items()}
     keys: tuple[Key, ...] = tuple(key_of[c] for c in columns)
-    asked = Asked(keys, detector.elements.histories)
-    made = list(foreseen(detector, machine, runs, experiments, asked, noise, progress))
+    made = list(foreseen(detector, machine, runs, experiments, keys, noise, progress))
     _, J = detector.fitter.surrogate.at(np.zeros(len(study.probed.parameters)))
     now = sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J)))
     basis = Basis(tuple(columns), tuple(_hour(detector, key) for key in keys))
@@ -117,8 +116,8 @@ def _needed(
 
 def _listed(ordered: Sequence[_P]) -> list[_P]:
     """All loads, and of sensors the best."""
-    sensors = [p for p in ordered if p.experiment.startswith(AT)]
-    return [p for p in ordered if not p.experiment.startswith(AT) or p in sensors[:SENSORS]]
+    best = [p for p in ordered if p.experiment.startswith(AT)][:SENSORS]
+    return [p for p in ordered if not p.experiment.startswith(AT) or p in best]
 
 
 def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made: Sequence[Foreseen]) -> Foresight:

@@ -51,25 +51,21 @@ class Section:
 
     def html(self) -> str:
         """Empty where there is nothing to say."""
-        head, more = f"<h2>{self.title}</h2>", self.more()
+        more = self.more()
         if not self.lines and not more:
             return ""
+        lines = "".join(f"<span>{escape(line)}</span>" for line in self.lines)
+        summary = f"<summary><h2>{self.title}</h2>{lines}</summary>"
         opened = " open" if self.opened else ""
-        if not self.lines:
-            inner = f'<section id="{self.name}">\n{more}\n</section>'
-            return f'<details class="part"{opened}><summary>{head}</summary>\n{inner}</details>'
-        told = tables.items(self.lines)
-        if more:
-            told += f"\n<details{opened}><summary>More</summary>\n{more}\n</details>"
-        return f'<section id="{self.name}">{head}\n{told}</section>'
+        return f'<details{opened}>{summary}\n<section id="{self.name}">\n{more}\n</section></details>'
 
 
 def sections(d: Diagnosis) -> list[Section]:
     """In their order; after "nothing" what would have been seen comes first, as it is the result then."""
-    quiet = d.verdict in ("nothing", "too_poor")
+    quiet, told = d.verdict in ("nothing", "too_poor"), words.evidence_lines(d)
     return sorted(
         [
-            Section("evidence", "What it rests on", words.evidence_lines(d), lambda: _evidence(d), True),
+            Section("evidence", "What it rests on", told, lambda: _evidence(d), not told),
             Section("unknown", "Heat that nothing explains", words.unknown_lines(d), lambda: _unknown(d), True),
             Section("plan", "The next experiment", [], lambda: plan_section(d.plan), True),
             Section("gain", "Gain on the sealed run", words.gain_lines(d),

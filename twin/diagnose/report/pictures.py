@@ -25,7 +25,7 @@ RESIDUAL_MAP = LinearSegmentedColormap.from_list(
 LOAD_MAP = LinearSegmentedColormap.from_list("load", ["#eceef0", "#3d4249"]).with_extremes(bad="#b8bcc2")
 # Names hold what people type: no formulas in them
 PAGE_RC: dict[Any, Any] = RC | {"text.parse_math": False, "legend.frameon": False, "axes.axisbelow": True}
-DPI = 100
+DPI = 120
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ def place_html(d: Diagnosis) -> str:
 
 
 def place_picture(d: Diagnosis, scene: Scene) -> Picture:
-    with drawing(6.4, 4.6, grid=False) as fig:
+    with drawing(6.4, 4.2, grid=False) as fig:
         axes = fig.subplots()
         axes.set_axis_off()
         if isinstance(scene.machine, Shell):

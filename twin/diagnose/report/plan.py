@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from html import escape
-
-from twin.diagnose.report.tables import folded, table
-from twin.diagnose.report.text import place_words, times, what
-from twin.diagnose.result.numbers import number, quantity
+from twin.diagnose.report.tables import folded, items, table
+from twin.diagnose.report.text import place_words, sized, what
+from twin.diagnose.result.numbers import number
 from twin.diagnose.result.plan import Apart, Foresight, Plan
 
 FEW = 2  # suspicions of which a terminal gets all experiments; of more the best one each
@@ -41,8 +39,7 @@ def plan_section(plan: Plan | None) -> str:
         best = f"; best: {rows[0][2]}, {rows[0][1]} ({rows[0][0]})" if rows and _worth(f) else ""
         head = ["times smaller", "seen then", "experiment", "what to do"]
         parts.append(folded(lead + best, table(head, rows, (0, 1))))
-    taken = "; ".join(plan.assumptions)
-    return "\n".join([*parts, f"<p>This takes: {escape(taken)}.</p>"])
+    return "\n".join([*parts, folded("What this takes for granted", items(plan.assumptions))])
 
 
 def _experiments(f: Foresight) -> list[list[str]]:
@@ -66,6 +63,6 @@ def _separation(apart: Apart) -> str:
 
 def _seen(f: Foresight, limit: float) -> str:
     """From which size on, or that none within physics is seen."""
-    none = f.largest is not None and limit > f.largest
-    size = f"{quantity(f.largest if f.largest is not None and none else limit, f.unit)} {times(f.family, f.unit)}"
-    return f"{'not up to' if none else 'from'} {size}".rstrip()
+    if f.largest is not None and limit > f.largest:
+        return f"not up to {sized(f.family, f.largest, f.unit)}"
+    return f"from {sized(f.family, limit, f.unit)}"

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import Colormap
+from matplotlib.image import AxesImage
 
 from twin.diagnose.report.pictures import LOAD_MAP, RESIDUAL_MAP, Picture, drawing, short
 from twin.diagnose.result.diagnosis import Diagnosis, Series
@@ -30,18 +32,14 @@ def drawn_runs(d: Diagnosis) -> list[Series]:
     return [s for s in d.series if s.run in chosen]
 
 
-def with_gaps(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (n + 1,) [the unit of time] and rows (n, ...) for a map; where bins are missing a row of NaN stands."""
+def with_gaps(time: np.ndarray, values: np.ndarray) -> tuple[tuple[float, float], np.ndarray]:
+    """First and last edge [the unit of time] of a map, and its rows (n, ...), one per usual step: NaN where a bin is
+    missing."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-    step = step if step > 0 else 1.0
-    edges, rows = [time[0] - step / 2], []
-    for t, row in zip(time, values, strict=True):
-        if t - step / 2 > edges[-1] + step:
-            edges.append(t - step / 2)
-            rows.append(np.full_like(row, np.nan))
-        edges.append(max(t + step / 2, edges[-1] + 1e-6 * step))
-        rows.append(row)
-    return np.array(edges), np.array(rows)
+    at = np.rint((time - time[0]) / step).astype(int)
+    rows = np.full((at[-1] + 1, *values.shape[1:]), np.nan)
+    rows[at] = values
+    return (float(time[0] - step / 2), float(time[0] + (at[-1] + 0.5) * step)), rows
 
 
 def load_rows(loads: Mapping[str, np.ndarray]) -> tuple[list[str], np.ndarray]:
@@ -76,17 +74,13 @@ def residual_map(series: Series) -> Picture | None:
         panels = fig.subplots(len(heights), 3, squeeze=False, sharex=True, sharey="row",
                               gridspec_kw={"height_ratios": heights})  # fmt: skip
         for axes, (stage, values) in zip(panels[0], shown.items(), strict=True):
-            edges, rows = with_gaps(hours, values)
-            image = axes.pcolormesh(
-                edges, np.arange(len(chosen) + 1), rows.T, cmap=RESIDUAL_MAP, vmin=-largest, vmax=largest
-            )
+            image = _map(axes, hours, values, RESIDUAL_MAP, (-largest, largest))
             left = float(rms(values.ravel()))
             axes.set_title(f"{stage}, {left:.2f} K" if np.isfinite(left) else stage)
             axes.tick_params(labelbottom=True)
         _named(panels[0, 0], [series.sensors[i] for i in chosen])
         if names:  # one strip for all stages: their loads are the same
-            edges, rows = with_gaps(hours, loads.T)
-            panels[1, 0].pcolormesh(edges, np.arange(len(names) + 1), rows.T, cmap=LOAD_MAP, vmin=0, vmax=1)
+            _map(panels[1, 0], hours, loads.T, LOAD_MAP, (0.0, 1.0))
             _named(panels[1, 0], names)
             for axes in panels[1, 1:]:
                 axes.set_axis_off()
@@ -102,7 +96,13 @@ def residual_map(series: Series) -> Picture | None:
     )
 
 
+def _map(axes: Axes, hours: np.ndarray, values: np.ndarray, cmap: Colormap, limits: tuple[float, float]) -> AxesImage:
+    """Values (b, rows) over time, the first row on top."""
+    edges, rows = with_gaps(hours, values)
+    return axes.imshow(
+        rows.T, cmap=cmap, clim=limits, extent=(*edges, values.shape[1], 0), aspect="auto", interpolation="nearest"
+    )
+
+
 def _named(axes: Axes, names: list[str]) -> None:
-    """Rows of a map with their names, the first on top."""
     axes.set_yticks(np.arange(len(names)) + 0.5, [short(n) for n in names], fontsize=NAMES)
-    axes.set_ylim(len(names), 0)

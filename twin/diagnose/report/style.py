@@ -9,7 +9,7 @@ STYLE = """
   img { filter: invert(0.9) hue-rotate(180deg); } }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page); max-width: 1100px;
   margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.5rem; } h2 { margin-top: 1.6rem; border-bottom: 1px solid var(--grid); font-size: 1.25rem; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; }
 h3 { font-size: 1rem; margin: 1.5rem 0 .4rem; }
 .verdict { background: var(--soft); border-left: 6px solid var(--orange); padding: .8rem 1.2rem; margin: 1rem 0; }
 .verdict.nothing { border-color: var(--good); }
@@ -18,11 +18,16 @@ h3 { font-size: 1rem; margin: 1.5rem 0 .4rem; }
 .label { text-transform: uppercase; letter-spacing: .06em; font-size: .8rem; color: var(--muted); }
 .sentence { font-size: 1.2rem; line-height: 1.4; overflow-wrap: anywhere; }
 nav { margin: 1rem 0; } nav a { color: var(--blue); margin-right: 1rem; }
-figure { margin: 1.2rem 0 2rem; break-inside: avoid; }
+figure { margin: .6rem 0 1.2rem; break-inside: avoid; }
 figcaption { color: var(--muted); }
 img { max-width: 100%; height: auto; }
 .place { display: flex; flex-wrap: wrap; gap: 1rem 2rem; align-items: center; }
 .place figure { flex: 1 1 26rem; min-width: 0; margin: 0; } .place .wide { flex: 1 1 22rem; }
+summary { cursor: pointer; color: var(--blue); margin: .4rem 0; }
+body > details > summary { border-bottom: 1px solid var(--grid); }
+summary h2 { display: inline-block; margin: .3rem 0; color: var(--ink); }
+summary span { display: block; color: var(--ink); margin: 0 0 .3rem 1rem; }
+.wide { flex: 1 1 22rem; }
 details > summary { cursor: pointer; color: var(--blue); margin: .4rem 0; }
 details.part > summary { margin: 1.2rem 0 0; border-bottom: 1px solid var(--grid); }
 details.part > summary h2 { display: inline-block; margin: .4rem 0; border: none; color: var(--ink); }

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from twin.diagnose.report.text import history_words, place_words, times, what
+from twin.diagnose.report.text import history_words, place_words, sized, what
 from twin.diagnose.result.diagnosis import Diagnosis, Rival
-from twin.diagnose.result.numbers import customary, interval_and_unit, number, quantity
+from twin.diagnose.result.numbers import interval_and_unit, number, quantity, size_words
 
 MANY = 60  # rows that a table shows at most
 
@@ -39,13 +39,6 @@ def folded(summary: str, html: str) -> str:
     return f"<details><summary>{escape(summary)}</summary>\n{html}\n</details>" if html else ""
 
 
-def _sized(value: float, ci95: tuple[float, float], unit: str) -> tuple[str, str]:
-    middle, low, high, name = interval_and_unit(value, *ci95, unit)
-    if not math.isfinite(value):
-        return "-", "-"
-    return f"{middle} {name}".rstrip(), f"{low} to {high} {name}".rstrip() if math.isfinite(sum(ci95)) else "-"
-
-
 def channels_table(d: Diagnosis) -> str:
     """How every channel is met and what of it counted: those with something wrong first, then those met worst."""
     order = sorted(d.channels, key=lambda r: (not (r["wrong"] or r["leaps"]), r["kept"] >= 0.9, -(r["rms"] or 0.0)))
@@ -62,20 +55,21 @@ def rivals_table(rivals: Sequence[Rival], d: Diagnosis) -> str:
     rows = []
     for k, r in enumerate(rivals):
         when = history_words(r.history) or "always"
-        row = [str(k + 1), what(r.family), place_words(r.place), when, *_sized(r.amplitude, r.ci95, r.unit)]
-        row += [number(r.statistic), number(d.thresholds.get(r.family, math.nan))]
+        row = [str(k + 1), what(r.family), place_words(r.place), when]
+        row += [
+            size_words(r.amplitude, r.ci95, r.unit) or "-",
+            number(r.statistic),
+            number(d.thresholds.get(r.family, math.nan)),
+        ]
         rows.append([*row, f"{r.cosine:.2f}" if math.isfinite(r.cosine) else "-"])
-    head = ["", "what", "where", "when", "size", "95 % interval", "statistic", "needed", "cosine"]
+    head = ["", "what", "where", "when", "size", "statistic", "needed", "cosine"]
     return table(head, rows, range(4, len(head)))
 
 
 def limits_table(d: Diagnosis) -> str:
     rows = []
     for x in d.detection_limits:
-        largest = max((abs(v) for v in (x.size, x.smallest, x.largest) if math.isfinite(v)), default=math.nan)
-        factor, unit = customary(x.unit, largest)
-        unit = unit or times(x.family, x.unit)
-        sizes = [f"{number(factor * v)} {unit}".rstrip() for v in (x.size, x.smallest, x.largest)]
+        sizes = [sized(x.family, v, x.unit) for v in (x.size, x.smallest, x.largest)]
         rows.append([what(x.family), *sizes, place_words(x.place)])
     head = ["what", "seen from (median of places)", "at the best place", "at the worst place", "place of the median"]
     return table(head, rows, (1, 2, 3))

@@ -54,6 +54,11 @@ def times(family: str, unit: str) -> str:
     return entry.times if entry and unit in ("", "1") else ""
 
 
+def sized(family: str, value: float, unit: str) -> str:
+    """An SI value in its customary unit, or what it is a multiple of."""
+    return f"{quantity(value, unit)} {times(family, unit)}".rstrip()
+
+
 def setting_words(cause: Cause) -> str:
     """What a size holds for: the surface that heat really enters, the medium, the part that a scale follows."""
     settings, said = cause.settings, []
@@ -92,7 +97,7 @@ def cause_words(cause: Cause | Rival) -> str:
 
 
 def limit_words(limit: Limit) -> str:
-    return f"{what(limit.family)}, {quantity(limit.size, limit.unit)} {times(limit.family, limit.unit)}".rstrip()
+    return f"{what(limit.family)}, {sized(limit.family, limit.size, limit.unit)}"
 
 
 def joined(items: Sequence[str]) -> str:
@@ -122,11 +127,10 @@ def pull_words(pull: Pull, factors: tuple[float, float] = (math.nan, math.nan)) 
 
 def pull_of(d: Diagnosis, cause: Cause) -> Pull | None:
     """The pull of the declared number that a cause is; None of other causes."""
-    return next((p for p in d.pulls if p.path == cause.parameter or (p.freed and _of(cause.place, p.path))), None)
-
-
-def _of(place: str, path: str) -> bool:
-    return path == place or path.startswith(f"{place}.")
+    known = (
+        p for p in d.pulls if p.path == cause.parameter or (p.freed and f"{p.path}.".startswith(f"{cause.place}."))
+    )
+    return next(known, None)
 
 
 def verdict_sentence(d: Diagnosis) -> str:
@@ -196,29 +200,17 @@ def _unknown_words(d: Diagnosis) -> str:
     return f"{text}; its peak is {middle} {unit} (95 % interval {low} to {high} {unit}), {at / 3600:.1f} h into {run}"
 
 
-def alternatives(d: Diagnosis) -> list[Cause | Rival]:
-    """What an ambiguous verdict leaves open, the likeliest first."""
-    if d.causes:
-        first = _rivalled(d)
-        return [first, *first.rivals]
-    return list(d.ranked[:2])
-
-
-def _rivalled(d: Diagnosis) -> Cause:
-    """The first cause that has rivals: a stuck sensor before it has none."""
-    return next((c for c in d.causes if c.rivals), d.causes[0])
-
-
 def _ambiguous_words(d: Diagnosis) -> str:
-    these = alternatives(d)
+    """The first cause that has rivals (a stuck sensor before it has none) and these, or the best candidates."""
+    first = next((c for c in d.causes if c.rivals), d.causes[0] if d.causes else None)
+    these: list[Cause | Rival] = [first, *first.rivals] if first else list(d.ranked[:2])
     if not these:
         return "something is missing, and these data do not tell what"
     ways = "; or ".join(cause_words(c) for c in these[:3])
     more = f"; or {len(these) - 3} more" if len(these) > 3 else ""
-    besides = joined([cause_words(c) for c in d.causes if c is not _rivalled(d)])
-    return f"something is missing, and these data do not tell what: either {ways}{more}" + (
-        f"; besides: {besides}" if besides else ""
-    )
+    besides = joined([cause_words(c) for c in d.causes if c is not first])
+    told = f"something is missing, and these data do not tell what: either {ways}{more}"
+    return told + (f"; besides: {besides}" if besides else "")
 
 
 def remedies(d: Diagnosis) -> list[str]:
