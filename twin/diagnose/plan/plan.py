@@ -170,12 +170,6 @@ def _among(columns: Sequence[int], own: np.ndarray, weights: np.ndarray) -> np.n
     return result
 
 
-def _coefficients(columns: Sequence[int], h: Hypothesis) -> np.ndarray:
-    """(1, u) of a hypothesis at its amplitudes."""
-    own, weights = h.combination()
-    return _among(columns, own, (np.asarray(h.amplitude) @ weights)[None])
-
-
 def _information(F: np.ndarray, W: np.ndarray) -> np.ndarray:
     """(h,) of the first amplitudes, of weights W (h, q, 2 u)."""
     own = np.einsum("hql,lm,hrm->hqr", W, F, W, optimize=True)
@@ -186,7 +180,12 @@ def _information(F: np.ndarray, W: np.ndarray) -> np.ndarray:
 
 def _apart(a: Hypothesis, b: Hypothesis, basis: Basis, made: Sequence[Foreseen], apart: float) -> Apart:
     """What each experiment makes of LR (1 - cos^2), with the first one true at its fitted size."""
-    one, two = (basis.spread(_coefficients(basis.columns, h))[0] for h in (a, b))
+
+    def fitted(h: Hypothesis) -> np.ndarray:
+        own, weights = h.combination()
+        return basis.spread(_among(basis.columns, own, (np.asarray(h.amplitude) @ weights)[None]))[0]
+
+    one, two = fitted(a), fitted(b)
 
     def explained(F: np.ndarray) -> tuple[float, float]:
         aa, bb, ab = float(one @ F @ one), float(two @ F @ two), float(one @ F @ two)

@@ -75,8 +75,8 @@ def sections(d: Diagnosis) -> list[Section]:
                     lambda: tables.limits_table(d), quiet),
             Section("residuals", "Residuals", words.whiteness_lines(d), lambda: _residuals(d)),
             Section("channels", "Channels", [], lambda: _channels(d)),
-            Section("decision", "How it was decided", [], lambda: tables.families_table(d) + tables.rivals_table(
-                d.ranked, d)),
+            Section("decision", "How it was decided", [],
+                    lambda: tables.families_table(d) + tables.rivals_table(d.ranked, d)),
             Section("notes", "Notes and provenance", list(d.notes[:1]), lambda: _notes(d)),
         ],
         key=lambda s: d.verdict == "nothing" and s.name != "limits",
@@ -86,9 +86,7 @@ def sections(d: Diagnosis) -> list[Section]:
 def summary_lines(d: Diagnosis) -> list[str]:
     """At most LINES lines for a terminal: verdict, and what the sections tell."""
     lines = [f"{d.machine}: {d.verdict.replace('_', ' ')}", words.verdict_sentence(d)]
-    parts = {s.name: s.lines for s in sections(d)}
-    order = sorted(parts, key=lambda name: name in ("limits", "residuals"))  # of less worth than the pulls
-    lines += [line for name in order for line in parts[name][: AT_MOST.get(name)]]
+    lines += [line for s in sections(d) for line in s.lines[: AT_MOST.get(s.name)]]
     if d.notes:
         lines.append(f"Note: {d.notes[0]}" + (f" ({len(d.notes) - 1} more in the report)" if len(d.notes) > 1 else ""))
     return [" ".join(line.split()) for line in lines[:LINES]]

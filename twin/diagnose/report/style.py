@@ -1,11 +1,11 @@
 """The look of the page of a diagnosis: light, dark and on paper."""
 
 STYLE = """
-:root { --ink: #22262b; --page: #ffffff; --soft: #f4f5f7; --grid: #e6e8eb; --muted: #6a7078; --faint: #b8bcc2;
-  --grey: #8a9099; --blue: #0072b2; --orange: #d55e00; --good: #2f7d4f; color-scheme: light dark; }
+:root { --ink: #22262b; --page: #ffffff; --soft: #f4f5f7; --grid: #e6e8eb; --muted: #6a7078;
+  --blue: #0072b2; --orange: #d55e00; --good: #2f7d4f; color-scheme: light dark; }
 @media screen and (prefers-color-scheme: dark) {
-  :root { --ink: #e4e6e9; --page: #16191d; --soft: #20242a; --grid: #32373e; --muted: #a0a6ae; --faint: #5b626b;
-    --grey: #9aa1aa; --blue: #56b4e9; --orange: #f0803c; --good: #6cc08f; }
+  :root { --ink: #e4e6e9; --page: #16191d; --soft: #20242a; --grid: #32373e; --muted: #a0a6ae;
+    --blue: #56b4e9; --orange: #f0803c; --good: #6cc08f; }
   img { filter: invert(0.9) hue-rotate(180deg); } }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page); max-width: 1100px;
   margin: 2rem auto; padding: 0 1rem; }
