@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.sealed import judged, other_sizes
-from twin.diagnose.search.verdict import verdict_of
+from twin.diagnose.search.verdict import strained_of, verdict_of
 
 
 def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
@@ -45,6 +46,29 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     kept, extension, note = opened(-0.5, smaller=0.2)  # the cause predicts the sealed run, and its size does not
     assert (kept, extension) == (verdict, 0)
     assert note.startswith("not written")
+
+
+@pytest.mark.parametrize("sealed", [4.5, 0.0])
+def test_a_number_by_calibration_that_predicts_the_sealed_run_worse_is_withdrawn(sealed):
+    """The diagnosed runs say that a source is 4.5 standard deviations off, the sealed one says so, too, or does not."""
+    detector = small_case.made_detector()
+    j, y = small_case.source_off(4.5)
+    study, x = detector.study, np.zeros(len(detector.study.probed.parameters))
+    found = replace(search(detector, y), accepted=(), x=x, x0=x, loose=(Loose(j, 4.5, 0.3, 1.5),))
+    causes = strained_of(found)
+    x = x.copy()
+    x[j] = sealed
+    T, w = study.runs[2].split(study.outputs(2, x))
+    opened = [replace(study.runs[2].measured, temperature=T, tcp=w)]
+    told = judged(found, y, "out_of_tolerance", causes, FAMILIES, opened, 1)
+    if sealed:
+        assert (told.verdict, told.causes, told.note) == ("out_of_tolerance", causes, "")
+        assert judged(found, y, "out_of_tolerance", causes, FAMILIES, (), 1).causes == causes  # without a sealed run
+    else:
+        assert (told.verdict, told.causes) == ("nothing", ())
+        assert causes[0].place in told.note
+        faulty = replace(causes[0], family="sensor", history="offset", parameter="")
+        assert judged(found, y, "sensor", (faulty, *causes), FAMILIES, opened, 1).verdict == "sensor"
 
 
 def test_other_sizes_are_the_smallest_and_that_of_the_settled_calibration():
