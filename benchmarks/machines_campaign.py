@@ -19,7 +19,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks import drawn_machines, shipped_machines
-from benchmarks.drawn_machines import VISIBLE, Row, answer
+from benchmarks.drawn_machines import VISIBLE, Row, answer, headlined
 from twin.atomic import atomic_path
 from twin.build.spread import spread
 from twin.inject.judge.figures import Share
@@ -83,12 +83,13 @@ def table(rows: Sequence[tuple[str, Row]]) -> str:
                      f"{right.of} ({right.text}) | {among.of} ({among.text}) |")  # fmt: skip
     lines += [
         "",
-        "| hidden, visible | right | among ambiguous | unknown | wrong | missed |",
-        6 * "|---" + "|",
+        "| hidden, visible | right | among ambiguous | unknown | wrong | missed | of these in the headline |",
+        7 * "|---" + "|",
     ]
     for family in dict.fromkeys(r["hidden"][0] for _, r in rows if r["hidden"][0] != "nothing"):
-        said = Counter(answer(r) for _, r in rows if r["hidden"][0] == family and seen(r))
-        shown = (str(said[name]) for name in ("right", "among", "unknown", "wrong", "missed"))
+        own = [r for _, r in rows if r["hidden"][0] == family and seen(r)]
+        said = Counter(map(answer, own)) + Counter({"headline": sum(map(headlined, own))})
+        shown = (str(said[name]) for name in ("right", "among", "unknown", "wrong", "missed", "headline"))
         lines.append(f"| {family} | {' | '.join(shown)} |")
     return "\n".join(lines)
 

@@ -506,5 +506,10 @@ def test_nothing_says_first_what_calibration_had_to_change():
     assert "within their noise" not in text
     for words in ("by 2.00 K", "dy by 9.00 um", "most of it by sources.spindle.gain, 1.35"):
         assert words in text
+    second = replace(pull, path="films.bed.gain", temperature_change=0.6, displacement_change=0.0)
+    small = replace(pull, path="films.table.gain", temperature_change=0.4, displacement_change=1e-6)
+    text = verdict_sentence(replace(quiet, series=(moved,), pulls=(small, second, pull)))
+    assert 0 < text.index("sources.spindle.gain") < text.index("films.bed.gain")
+    assert "films.table.gain" not in text
     left = tuple((name, before, 0.5) for name, before, _ in d.whiteness)
     assert "correlated by 0.50" in verdict_sentence(replace(quiet, whiteness=left))

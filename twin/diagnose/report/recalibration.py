@@ -4,17 +4,20 @@ of nothing, because a tolerance swallows what lies within it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from twin.diagnose.result.diagnosis import Diagnosis, Pull
 from twin.diagnose.result.numbers import number, quantity, rms, size_words
 
 KELVIN, METRES = 0.5, 3e-6  # rms of a channel, from which a change is told: what users asked for
+LARGE = 3  # parameters at most that a headline names
 WHITE = 0.2  # correlation from bin to bin: two standard deviations of that of 100 bins (8 h) of white noise
 
 
 def moved_words(d: Diagnosis) -> str:
-    """How far calibration moved the channels that it moved most, and by which parameter; empty below KELVIN, METRES."""
+    """How far calibration moved the channels that it moved most, and by which parameters; empty below these sizes."""
     of_sensors, of_tcp = [(0.0, "", "")], [(0.0, "", "")]
     for s in (s for s in d.series if not s.sealed):
         changes = s.recalibrated - s.delivered, s.tcp_recalibrated - s.tcp_delivered
@@ -28,8 +31,8 @@ def moved_words(d: Diagnosis) -> str:
             said.append(f"{channel} by {number(factor * size)} {unit} in {run}")
     if not said:
         return ""
-    most = max(d.pulls, key=_weight, default=None)
-    by = f", most of it by {_value(most)}" if most is not None and _weight(most) > 0.0 else ""
+    most = large(d.pulls) or [p for p in sorted(d.pulls, key=_weight)[-1:] if _weight(p) > 0.0]
+    by = f", most of it by {' and by '.join(map(_value, most))}" if most else ""
     return f"first of all, the description as delivered is not right: calibration moved {' and '.join(said)} (rms){by}"
 
 
@@ -42,6 +45,11 @@ def left_words(d: Diagnosis) -> str:
         f"what is left is no noise (correlated by {np.nanmedian(after):.2f} from bin to bin), but no more than "
         "simulated machines without an effect leave"
     )
+
+
+def large(pulls: Sequence[Pull]) -> list[Pull]:
+    """Those that move a channel by KELVIN or METRES (rms), LARGE at most, the largest first."""
+    return sorted((p for p in pulls if _weight(p) >= 1.0), key=_weight, reverse=True)[:LARGE]
 
 
 def _weight(pull: Pull) -> float:
