@@ -18,7 +18,7 @@ from twin.logs.stuck import frozen_throughout
 # Of normal noise: how far a reading typically (median) departs from the mean of its neighbours, in standard deviations
 _DEPARTS = 0.6745 * 1.5**0.5
 KNOWN = 0.5  # K, half of a 95 % interval: the tolerance of a good sensor (class B of IEC 60751 at 40 degC)
-NEAR = 1200.0  # s about the start of a swap: two bins of the judgement
+NEAR = 1200.0  # s about the start of a leap or a swap: two bins of the judgement
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,8 @@ def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[st
     table = readings(plain)
     found = [*_own(faults), *frozen]
     if table is not None:
-        found += refuted(table, [(k, f.channels[0], f.first_time) for k, f in leaps if len(f.channels) == 1])
+        told = [(k, f.channels[0], f.first_time) for k, f in leaps if len(f.channels) == 1]
+        found += [f for f in refuted(table, told) if f.what != "leap" or _leaps(plain[f.runs[0]], f)]
     return Judgement(
         tuple(f for f in found if within is None or set(f.channels) & set(within)),
         tuple((k, f) for k, f in faults if f.kind == "splice"),
@@ -64,6 +65,17 @@ def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:
         for channel in f.channels if f.kind in EMPTIED else ():
             found.append(Finding(what, (channel,), (run,), f.first_time, f.last_time, size, (size, size), np.inf))
     return found
+
+
+def _leaps(run: Run, f: Finding) -> bool:
+    """Whether a channel leaps by as much as all others say, to KNOWN, from one reading to the next about its start: a
+    sensor that a warm nut comes to rises as far, but takes its time."""
+    assert run.temperatures is not None
+    time, values = run.temperatures.time, run.temperatures.columns[f.channels[0]]
+    known = np.flatnonzero(np.isfinite(values) & (np.abs(time - f.start) <= NEAR))
+    sign = np.sign(f.size)
+    steps = sign * np.diff(values[known])
+    return bool(steps.max(initial=0.0) >= min(sign * end for end in f.interval) - KNOWN)
 
 
 def _frozen(runs: Sequence[Run]) -> list[Finding]:
