@@ -24,12 +24,11 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.accepted import settled
+from twin.diagnose.search.detector import Detector, emptied
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.gain import predicted
-from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
 from twin.inject.draw.trial import draw
 from twin.inject.hidden import Hidden, Trial

@@ -31,8 +31,8 @@ from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.report.recalibration import large
+from twin.diagnose.search.detector import emptied
 from twin.diagnose.search.dispersion import searched
-from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.sealed import judged as on_sealed
 from twin.diagnose.search.verdict import pulls_of, verdict_of, with_faults
 from twin.inject.machines.drawn import HOURS, NOISE, RUNS, SAMPLINGS, DrawnMachine, draw_machine

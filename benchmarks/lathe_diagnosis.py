@@ -42,9 +42,8 @@ from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, machine_of, prepare
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import Accepted
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.detector import Detector, emptied
 from twin.diagnose.search.dispersion import raised, searched
-from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.verdict import cause_of, limits_in, verdict_of, with_faults
 from twin.logs.read import read_run
 from twin.logs.run import Run

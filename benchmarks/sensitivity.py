@@ -23,9 +23,8 @@ from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.faults.table import FAMILIES
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.detector import Detector, emptied
 from twin.diagnose.search.dispersion import searched
-from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.policy import POLICY, SearchPolicy, rules
 from twin.diagnose.search.verdict import verdict_of, with_faults
 from twin.errors import TwinError

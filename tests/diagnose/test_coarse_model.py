@@ -10,7 +10,7 @@ import pytest
 from tests.calibrate import lumped_case
 from tests.diagnose import small_case
 from twin.build.project import orthonormalise, project
-from twin.diagnose.evidence.coarse import Coarse, too_coarse
+from twin.diagnose.faults.coarse_model import Coarse, too_coarse
 from twin.rom.model import MachineModel
 
 NOISE = small_case.NOISE, small_case.TCP_NOISE

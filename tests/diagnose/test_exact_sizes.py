@@ -16,8 +16,8 @@ from twin.diagnose.search.accepted import Accepted, curved_change, freed, parame
 from twin.diagnose.search.contest import exact
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import gains
+from twin.diagnose.search.look import sized_candidates
 from twin.diagnose.search.refit import refit
-from twin.diagnose.search.sizes import sized_candidates
 from twin.diagnose.search.verdict import verdict_of
 
 pytestmark = pytest.mark.long

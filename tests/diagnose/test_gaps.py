@@ -9,7 +9,7 @@ import numpy as np
 from tests.diagnose import small_case
 from twin.diagnose.evidence.whiten import measured_of, missing
 from twin.diagnose.model.study import with_measured
-from twin.diagnose.search.gaps import emptied
+from twin.diagnose.search.detector import emptied
 
 
 def test_what_is_missing_counts_nowhere():

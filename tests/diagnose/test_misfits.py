@@ -15,12 +15,11 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.accepted import Accepted, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.declared import declared_candidates
 from twin.diagnose.search.forward import _leaking, _restless, refit, search
 from twin.diagnose.search.look import look
-from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.strained import _untied, _weak, closed, loose_ones, strained
 from twin.diagnose.search.verdict import verdict_of
 

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.formal import wind_columns
 from twin.diagnose.evidence.nulls import Form
-from twin.diagnose.evidence.windy import wind_columns
-from twin.diagnose.search.settled_beside import settled
+from twin.diagnose.search.accepted import settled
 
 HIDDEN = np.array([1.0, -0.8])  # prior standard deviations of the first two sources
 

@@ -10,9 +10,8 @@ import pytest
 from tests.diagnose import small_case
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.whiten import measured_of
-from twin.diagnose.search.dispersion import searched
+from twin.diagnose.search.dispersion import modes_of, searched, with_errors
 from twin.diagnose.search.look import look
-from twin.diagnose.search.slow_errors import modes_of, with_errors
 
 ROWS = 400
 

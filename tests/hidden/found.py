@@ -13,16 +13,15 @@ from twin.build.cache import folder
 from twin.build.project import orthonormalise, project
 from twin.calibrate.channels.judge import judge
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.evidence.coarse import Coarse, too_coarse
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.channels_check import channels_at_fault
+from twin.diagnose.faults.coarse_model import Coarse, too_coarse
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.result.diagnosis import Cause, Verdict
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.detector import Detector, emptied
 from twin.diagnose.search.dispersion import searched
-from twin.diagnose.search.gaps import emptied
 from twin.diagnose.search.verdict import unknown_of, verdict_of, with_faults
 from twin.machine.load import load_machine
 from twin.rom.model import MachineModel

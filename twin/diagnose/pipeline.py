@@ -15,12 +15,12 @@ from twin.calibrate.channels.table import channel_rows, with_findings
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.traces import traces_of_run
-from twin.diagnose.evidence.coarse import too_coarse
 from twin.diagnose.evidence.discretisation import Difference, differences
 from twin.diagnose.evidence.nulls import form_of
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import VERSION
 from twin.diagnose.faults.channels_check import channels_at_fault
+from twin.diagnose.faults.coarse_model import too_coarse
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import FAMILIES
 from twin.diagnose.model.probed_model import ProbedModel, drive_arrays, make_probed_model
@@ -32,6 +32,7 @@ from twin.diagnose.report.scene import scene_of
 from twin.diagnose.report.text import cause_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Pull, Series, Unknown, Verdict
 from twin.diagnose.result.place import Scene
+from twin.diagnose.search.accepted import settled
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.dispersion import raised, searched, wrong_temperatures
 from twin.diagnose.search.gain import predicted
@@ -40,7 +41,6 @@ from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.poor import poor_note
 from twin.diagnose.search.sealed import judged
-from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.support import support_of
 from twin.diagnose.search.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
 from twin.errors import ArtefactError, LogError

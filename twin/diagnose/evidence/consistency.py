@@ -1,13 +1,12 @@
 """Whether a cause has the same size in every run: a property of the machine has one, an imitation takes what fits.
 
-Each run alone gives a size a_k with standard deviation s_k, the parameters free within their tolerances in each. Around
-their weighted mean
+Each run alone gives a size a_k with standard deviation s_k, the parameters free within their tolerances. Around their
+weighted mean
 
     Q = sum_k (a_k - mean)^2 / (s_k^2 + (own mean)^2)
 
 is chi-square of as many degrees of freedom as runs tell a size, less one (Cochran, Biometrics 10, 1954; own: the share
-by which the form of the model may bend a size in one run and not in another). No model of what the description has
-wrong is needed.
+by which the form of the model may bend a size in one run and not in another).
 """
 
 from __future__ import annotations
@@ -16,8 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 import scipy.stats
+
+from twin.diagnose.evidence.whiten import Projector
 
 CHANCE = 1e-3  # probability that a true cause is refused in a diagnosis: with three causes still below a per cent
 TOLD = 3.0  # times the standard deviation over all runs: a run that tells a size worse than that tells nothing
@@ -41,12 +41,8 @@ def sizes(
     """
     made = []
     for own in rows:
-        n, d, w = N[own], D[own], white[own]
-        factor = scipy.linalg.cho_factor(np.eye(n.shape[1]) + n.T @ n, lower=True)
-        F, g = d.T @ d, d.T @ w
-        cross = n.T @ d
-        solved = scipy.linalg.cho_solve(factor, cross)
-        F, g = F - cross.T @ solved, g - solved.T @ (n.T @ w)
+        d, Pd = D[own], Projector.of(N[own])(D[own])
+        F, g = d.T @ Pd, Pd.T @ white[own]
         acts = np.diag(F) > 0.0
         found, variance = np.zeros(len(F)), np.full(len(F), np.inf)
         inverse = np.linalg.pinv(F[np.ix_(acts, acts)], rcond=1e-10, hermitian=True)
@@ -56,8 +52,7 @@ def sizes(
 
 
 def differs(found: Sequence[Size], own: float, least: float = 0.0) -> bool:
-    """Whether sizes of one cause are not the same beyond CHANCE; own: see above, a share of the mean; least: of Q, what
-    is no evidence in a poor model."""
+    """Whether sizes of one cause are not the same beyond CHANCE; least: of Q, what is no evidence in a poor model."""
     told = [s for s in found if np.isfinite(s.sigma) and s.sigma > 0.0]
     if len(told) < 2:
         return False

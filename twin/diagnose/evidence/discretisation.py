@@ -1,10 +1,9 @@
 """What another discretisation of the same machine would show: model discrepancy that is this machine's own.
 
-Two sensors beside one rail differ by 0.1 K between two meshes, and the nut of a ball screw sits between two elements:
-no drawn coefficient looks like that, and a joint or an expansion does. So the machine is described once more, with
-linear elements on its mesh, with rails in segments of half the length, with bars of finer elements, and with each of
-its heavy nodes in turn not at one temperature, and what the measurements of both differ by is known in its shape, and
-unknown in its share.
+Two sensors beside one rail differ by 0.1 K between two meshes: no drawn coefficient looks like that, and a joint does.
+So the machine is described once more, with linear elements, with rails in segments of half the length, with bars of
+finer elements, and with an inside for each heavy node; what both measure otherwise is known in shape and unknown in its
+share.
 
     y_other(x) - y(x) = d + D x,      share ~ N(0, 1)
 
@@ -82,9 +81,9 @@ def differences(
         known = [_acting(p, other) for p in parameters]
         probed = make_probed_model(other, known, runs, progress, linear)
         of_other = make_study(probed, plans, study.fitted)
-        y = np.concatenate([of_other.outputs(k, x) for k in study.fitted])
-        channels = labels(study) if apart else np.zeros(len(y), dtype=int)
-        found.append(Difference(share * (y - surrogate.y0), share * (jacobian_of(of_other, x) - J), channels))
+        d, D = of_other.all_outputs(x) - surrogate.y0, jacobian_of(of_other, x) - J
+        channels = labels(study) if apart else np.zeros(len(d), dtype=int)
+        found.append(Difference(share * d, share * D, channels))
     return tuple(found)
 
 

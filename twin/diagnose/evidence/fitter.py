@@ -60,7 +60,7 @@ class Fitter:
                 moved, x = float(np.abs(found - x).max(initial=0.0)), found
                 if moved < CLOSE:
                     break
-            exact = np.concatenate([self.study.outputs(k, x) for k in self.study.fitted])
+            exact = self.study.all_outputs(x)
             f, J = self.surrogate.at(x)
             offset = exact - f
             if np.abs(x - before).max(initial=0.0) < 5 * CLOSE:

@@ -1,8 +1,7 @@
 """Model discrepancy that is known by kind: nuisance columns with priors, from the same sizes that synthetic data use.
 
-What the modes of `detector` would have to learn from hundreds of synthetic measurements is mostly known beforehand:
-where a source's heat enters, each face's coefficient, each film's reaction to speed, each sensor's place, each zone's
-air, and each channel's own reading of every source. Only the rest is left to be learned.
+What the modes of `detector` would have to learn from hundreds of synthetic measurements is mostly known beforehand;
+only the rest is left to be learned.
 """
 
 from __future__ import annotations
@@ -11,14 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.diagnose.evidence.nulls import Form
+from twin.build.workers import each
+from twin.diagnose.evidence.nulls import EXPONENTS, Form, winds
 from twin.diagnose.evidence.whiten import Whitener, labels
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
+from twin.progress import Progress, silent
 
 CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
 READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
 LEAST = 0.7  # standard deviations over all its rows that a direction of a channel's readings must have
+SPREAD = 12.0**-0.5  # standard deviation of a uniform law of width 1
+BENT = 2.0**-0.5  # and of half a squared standard normal
 
 
 @dataclass(frozen=True)
@@ -34,10 +37,7 @@ def known_forms(
     study: Study, described: Described, nominal: tuple[Nominal, ...], raw: np.ndarray, J: np.ndarray, wind: np.ndarray,
     whiten: Whitener, form: Form,
 ) -> np.ndarray:  # fmt: skip
-    """White columns (m, k) of unit prior variance; raw (m, n) responses in physical units, J (m, n_parameters).
-
-    wind (m, w): columns of `windy`.
-    """
+    """White columns (m, k) of unit prior variance; raw (m, n), J (m, n_parameters), wind (m, w): `wind_columns`."""
     columns = np.hstack([described.columns, _aside(study, nominal, len(J), form)])
     parts = [whiten(np.hstack([columns, wind]))] if columns.shape[1] else []
     parts += _wobbles(study, described, raw, whiten, form)
@@ -48,18 +48,14 @@ def _aside(study: Study, nominal: tuple[Nominal, ...], m: int, form: Form) -> np
     """(m, k): every sensor some millimetres beside where it is described."""
     probed = study.probed
     (body,) = probed.base.bodies
-    first = {k: sum(study.runs[i].size for i in study.fitted if i < k) for k in study.fitted}
     columns = []
     for s in range(len(probed.base.sensors)):
         moved = np.zeros(m)
-        for k in study.fitted:
-            planned = study.runs[k]
+        for k, (planned, T, _) in zip(study.fitted, study.split(moved), strict=True):
             read = planned.measured
             if s in read.column:
                 i = int(np.flatnonzero(read.column == s)[0])
-                own = read.mean_of @ (nominal[k].states @ (probed.displaced[s] - body.C[s]))
-                (b, n), _ = planned.shapes
-                moved[first[k] + np.arange(b) * n + i] = form.aside * own
+                T[:, i] = form.aside * (read.mean_of @ (nominal[k].states @ (probed.displaced[s] - body.C[s])))
         if np.any(moved):
             columns.append(moved)
     return np.stack(columns, axis=1) if columns else np.zeros((m, 0))
@@ -105,3 +101,36 @@ def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list
         block[rows] = own
         result.append(block)
     return result
+
+
+def wind_columns(study: Study, form: Form, progress: Progress = silent) -> np.ndarray:
+    """(m, 3 films that hear a speed) outputs [K, m] of one standard deviation each, by the exact model: films of motors
+    and screws stand 15 K above the air, where half as much again of a coefficient is no small change.
+
+    Per film: its reaction with the mean of two exponents, the difference of exponents, the second order.
+    """
+    n = len(study.probed.base.load_model.films)
+    heard = [f for f in range(n) if any(winds(study, k, np.ones(n))[:, f].any() for k in study.fitted)]
+    if not heard or form.wind == 0.0:
+        return np.zeros((study.rows[-1].stop, 0))
+    with progress("films that hear a speed", len(heard)) as advance:
+        made = each(_of_film, (study, form), heard, lambda _: advance(""))
+    return np.hstack(made)
+
+
+def _of_film(shared: tuple[Study, Form], f: int) -> np.ndarray:
+    study, form = shared
+    x = np.zeros(len(study.probed.parameters))
+    n_films = len(study.probed.base.load_model.films)
+    parts = []
+    for k in study.fitted:
+        slots = study.slots(k)
+        shapes = [winds(study, k, np.full(n_films, e))[:, f] for e in EXPONENTS]
+        for q, shape in enumerate((*shapes, (shapes[0] + shapes[1]) / 2)):
+            slots.film[:, q, f] = shape
+        y, D = study.by_amplitudes(k, x, slots, (0.0, 0.0, 0.0))
+        more, less = (study.outputs(k, x, slots, (0.0, 0.0, a)) for a in (form.wind, -form.wind))
+        parts.append(
+            np.stack([form.wind * D[:, 2], SPREAD * form.wind * (D[:, 1] - D[:, 0]), BENT * (more + less - 2 * y)], 1)
+        )
+    return np.vstack(parts)

@@ -1,10 +1,8 @@
 """Synthetic measurements of a machine without any hidden cause, by a model that differs from the twin in its form.
 
-On the user's own loads: parameters drawn from their tolerances, and besides them everything that no parameter stands
-for: coefficients that differ from face to face and with load, heat that enters partly beside where it is described,
-sensors some millimetres off and with their own reading of every source, air that fluctuates locally, parts that do not
-start equally warm, white noise. What the twin's calibration leaves of these measurements is the null distribution of
-every statistic: model discrepancy is learned from some of them, thresholds from the others.
+On the user's own loads: parameters drawn from their tolerances, and everything that no parameter stands for (`Form`).
+What the twin's calibration leaves of them is the null distribution of every statistic: model discrepancy is learned
+from some of these measurements, thresholds from the others.
 """
 
 from __future__ import annotations
@@ -13,15 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from twin.build.places import beside
 from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.model.integration import INNER
-from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study, heated_places, own_place
 from twin.diagnose.result.spot import Spot
 from twin.machine.description import Machine
-from twin.run.system import Array
+from twin.rom.drive import Drive
 
 SPREAD = 0.6  # of parameters, in prior standard deviations: tolerances are stated with care
 # of the logarithm of a contact's conductance in a lumped machine, beyond its tolerance (chosen among 0, 0.2 and 0.5 on
@@ -103,14 +101,13 @@ def null(
         films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in probed.places])
         air = run.drive.environment.reshape(n, INNER, -1)
         mean, apart = shared_by_film(study, local)
-        least = lowest(study, k)
-        A, M, rise = np.zeros_like(body.A0), np.zeros(body.n), np.zeros((n, INNER))
+        least = convection(run.drive, len(load.films)).min(axis=0)
+        A, M = np.zeros_like(body.A0), np.zeros(body.n)
         for p in np.flatnonzero(films >= 0):
             strength = apart[p] * least[films[p]]
             A += strength * probed.A[p]
             M += strength * probed.M[p]
-        surround = air[:, :, load.surroundings] - probed.base.reference_temperature
-        rise[:] = surround
+        rise = air[:, :, load.surroundings] - probed.base.reference_temperature
         slow = _smooth(rng, n, len(load.films), form.shape_time / (INNER * (run.drive.time[1] - run.drive.time[0])))
         wobble = mean + form.shape * slow + wind * winds(study, k, exponent)
         forcing = np.zeros((n, INNER, body.n))
@@ -120,16 +117,11 @@ def null(
         fluctuation = _ornstein(rng, n * INNER, len(load.environments), form.air_time / 60.0) * form.air
         initial = form.start * rng.standard_normal() * body.one if not run.stated_start else np.zeros(body.n)
         initial = initial + form.start_apart * _body_starts(study, rng)
-        filled = Slots(
-            A=_first(slots.A, A), M=_first(slots.M, M), E=_first(slots.E, E), B=slots.B, reads=slots.reads,
-            gate=_row(slots.gate, 1.0), rise=_fill(slots.rise, rise), forcing=_fill(slots.forcing, forcing),
-            film=_row(slots.film, wobble),
-            joint=_row(slots.joint, joint), contact=_row(slots.contact, contact),
-            environment=_fill(slots.environment, fluctuation.reshape(n, INNER, -1)),
-            initial=_first(slots.initial, initial),
-        )  # fmt: skip
+        slots.A[0], slots.M[0], slots.E[0], slots.gate[:, 0], slots.rise[:, :, 0] = A, M, E, 1.0, rise
+        slots.film[:, 0], slots.joint[:, 0], slots.contact[:, 0], slots.initial[0] = wobble, joint, contact, initial
+        slots.forcing[:, :, 0], slots.environment[:, :, 0] = forcing, fluctuation.reshape(n, INNER, -1)
         m = planned.measured
-        states = study.states(k, x, filled, (1.0,))
+        states = study.states(k, x, slots, (1.0,))
         T, w = study.read(k, states, x)
         own_T, own_w = planned.split(readings[i])
         T, w = T + own_T, w + own_w
@@ -146,34 +138,11 @@ def null(
     return y
 
 
-def _first(zeros: Array, value: np.ndarray) -> np.ndarray:
-    result = np.array(zeros)
-    result[0] = value
-    return result
-
-
-def _fill(zeros: Array, value: np.ndarray) -> np.ndarray:
-    result = np.array(zeros)
-    result[:, :, 0] = value
-    return result
-
-
-def _row(zeros: Array, value: np.ndarray | float) -> np.ndarray:
-    result = np.array(zeros)
-    result[:, 0] = value
-    return result
-
-
 def _ornstein(rng: np.random.Generator, n: int, columns: int, memory: float) -> np.ndarray:
     """Unit Ornstein-Uhlenbeck noise (n, columns) with a memory of so many steps."""
     phi = float(np.exp(-1.0 / memory))
     white = rng.standard_normal((n, columns))
-    result = np.empty_like(white)
-    state = white[0]
-    for i in range(n):
-        state = phi * state + np.sqrt(1 - phi**2) * white[i]
-        result[i] = state
-    return result
+    return np.asarray(lfilter([np.sqrt(1 - phi**2)], [1.0, -phi], white, axis=0, zi=phi * white[:1])[0])
 
 
 def _smooth(rng: np.random.Generator, n: int, columns: int, memory: float) -> np.ndarray:
@@ -219,20 +188,9 @@ def shared_by_film(study: Study, local: np.ndarray) -> tuple[np.ndarray, np.ndar
     return mean, apart
 
 
-def typical(study: Study, k: int) -> np.ndarray:
-    """(n_films,) W/(m^2 K): the mean convection of each film in a run, at a rise of a few kelvin."""
-    return _convection(study, k).mean(axis=0)
-
-
-def lowest(study: Study, k: int) -> np.ndarray:
-    """(n_films,) W/(m^2 K): the least convection of each film in a run, at a rise of a few kelvin."""
-    return _convection(study, k).min(axis=0)
-
-
-def _convection(study: Study, k: int) -> np.ndarray:
-    """(n, n_films) W/(m^2 K) in every step, at a rise of a few kelvin where it follows the surface."""
-    drive = study.runs[k].run.drive
-    result = np.array(drive.theta[:, : len(study.probed.base.load_model.films)])
+def convection(drive: Drive, films: int) -> np.ndarray:
+    """(n_steps, films) W/(m^2 K) of a drive, at a rise of a few kelvin where it follows the surface."""
+    result = np.array(drive.theta[:, :films])
     middle = drive.films.value.shape[2] // 2 + 15
     result[:, list(drive.films.index)] = drive.films.value[:, :, middle]
     return result
@@ -295,7 +253,6 @@ def _readings(study: Study, J: list[np.ndarray], rng: np.random.Generator, form:
     for jac, k in zip(J, study.fitted, strict=True):
         planned = study.runs[k]
         T, w = planned.split(jac[:, sources] / sigma)
-        T = T * of_sensor[planned.measured.column]
-        w = w * of_tcp
+        T, w = T * of_sensor[planned.measured.column], w * of_tcp
         result.append(np.concatenate([T.sum(axis=2).ravel(), w.sum(axis=2).ravel()]))
     return result

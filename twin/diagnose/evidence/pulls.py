@@ -1,9 +1,8 @@
 """How far calibration moves each parameter of a machine that has nothing but its tolerances: what is far beyond that.
 
-A tolerance swallows what lies within it. Whether a loss 1.6 times as large is news follows from this machine's own
-synthetic measurements without a cause: each parameter's moves there have their own spread, and the farthest of all its
-own distribution. Two calibrations tell: the one that finds causes, which is sure of fast and local effects, and the
-settled one, which is sure of slow ones.
+Whether a loss 1.6 times as large is news follows from this machine's own synthetic measurements without a cause: each
+parameter's moves there have their own spread, and the farthest of all its own distribution. Two calibrations tell: the
+one that finds causes is sure of fast and local effects, the settled one of slow ones.
 """
 
 from __future__ import annotations

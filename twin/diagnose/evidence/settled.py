@@ -1,9 +1,9 @@
 """The calibration that is delivered: parameters that predict, with and without the causes that were named.
 
-What finds causes weighs residuals by all that model discrepancy can do, and leaves to it what it can explain: right for
-tests, but a model that keeps its parameters and forgets that discrepancy predicts badly. Here model discrepancy is
-noise that lasts as long as a run: a channel of a run counts about once, however often it was read, and the rest is
-left to the tolerances. The fit begins at the description, so that of two calibrations alike the nearer one is taken.
+What finds causes leaves to model discrepancy what that can explain: right for tests, but a model that forgets it then
+predicts badly. Here model discrepancy is noise that lasts as long as a run: a channel of a run counts about once,
+however often it was read, and the rest is left to the tolerances. The fit begins at the description, so that of two
+calibrations alike the nearer one is taken.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from twin.diagnose.evidence.fitter import CLOSE, Fitter, bounds
-from twin.diagnose.model.study import Study
 
 PASSES, INNER = 3, 6
 LONGEST = 1.0  # prior standard deviations, of a step
@@ -23,14 +22,12 @@ Outputs = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def settled_alone(fitter: Fitter, y: np.ndarray, free: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """Parameters (n,) in prior standard deviations of measurements y (m,) without a cause, and their covariance (n, n).
-
-    free: parameters that have no tolerance: the data and the tolerances of all others decide.
-    """
+    """Parameters (n,) in prior standard deviations of measurements y (m,) without a cause, and their covariance (n, n);
+    free: parameters that have no tolerance."""
     study = fitter.study
 
     def left(x: np.ndarray) -> np.ndarray:
-        return fitter.whiten(y - np.concatenate([study.outputs(k, x) for k in study.fitted]))
+        return fitter.whiten(y - study.all_outputs(x))
 
     return settle(fitter, fitter.surrogate.at, left, free)
 
@@ -47,7 +44,8 @@ def settle(
     study, whiten = fitter.study, fitter.whiten
     low, high = bounds(study)
     N = fitter.others
-    W = 1.0 / (1.0 + _rows(study) * (N**2).sum(axis=1))
+    rows = study.joined(lambda p: (p.shapes[0][0], p.shapes[1][0]))  # that the channel of each number has in its run
+    W = 1.0 / (1.0 + rows * (N**2).sum(axis=1))
     precision = np.ones(len(low))
     precision[list(free)] = ANY**-2.0
     P = np.diag(precision)
@@ -69,12 +67,3 @@ def settle(
     weighted = W[:, None] * white
     crossed = N.T @ weighted
     return x, A @ (P + weighted.T @ weighted + crossed.T @ crossed) @ A
-
-
-def _rows(study: Study) -> np.ndarray:
-    """(m,) how many numbers the channel of each number has in its run."""
-    parts = []
-    for k in study.fitted:
-        (bins, sensors), (rows, _) = study.runs[k].shapes
-        parts += [np.full(bins * sensors, float(bins)), np.full(3 * rows, float(rows))]
-    return np.concatenate(parts) if parts else np.zeros(0)

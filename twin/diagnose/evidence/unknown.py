@@ -1,11 +1,11 @@
 """Heat of any history: a Gaussian process per part, for what no entry of the catalogue explains.
 
 Heat in blocks of an hour at every surface of a part, with a squared-exponential covariance in time of 2 h, independent
-from surface to surface, amplitude chosen by evidence. The statistic is twice the log evidence against no heat
+from surface to surface. The statistic is twice the log evidence against no heat
 
     max over sigma of  g^T (K^-1 + F)^-1 g - ln det(1 + K F),      K = sigma^2 R
 
-with g = D^T Pi r, F = D^T Pi D (Rasmussen, Williams 2006, eq 2.30): it charges for its freedom, which an RMS does not.
+with g = D^T Pi r, F = D^T Pi D (Rasmussen, Williams 2006, eq 2.30), which charges for its freedom.
 """
 
 from __future__ import annotations
@@ -37,10 +37,8 @@ class Heat:
 
 
 def heat_of(study: Study, blocks: Sequence[tuple[int, int, int]], of_place: Mapping[str, np.ndarray]) -> Heat:
-    """The unknown channel of a study, without matrices yet (`with_information`).
-
-    blocks: (fitted run, first fine step, end). of_place: per place the columns of 1 W in every block.
-    """
+    """The unknown channel of a study, without matrices yet; of_place: columns of 1 W in every block (fitted
+    run, first fine step, end)."""
     parts = list(dict.fromkeys(m for p in study.probed.places for m in p.members))
     run = np.array([i for i, _, _ in blocks])
     when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)

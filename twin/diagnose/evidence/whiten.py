@@ -1,7 +1,7 @@
 """Residuals in units of what cannot be explained: noise with memory, model discrepancy, and everything calibratable.
 
-With white residual r, nuisance columns N (parameters and sensor offsets in prior standard deviations, modes
-of model discrepancy in theirs) the marginal covariance of r is 1 + N N^T, and
+With nuisance columns N (parameters, sensor offsets, modes of model discrepancy, each in prior standard deviations) the
+marginal covariance of a white residual r is 1 + N N^T, and
 
     (1 + N N^T)^-1 = 1 - N (1 + N^T N)^-1 N^T =: Pi
 
@@ -35,25 +35,18 @@ class Whitener:
         lost = missing(self.study)
         if lost.any():
             values = np.where(lost.reshape(-1, *([1] * (values.ndim - 1))), np.nan, values)
-        parts, first = [], 0
-        for k, (sensors, tcp) in zip(self.study.fitted, self.channels, strict=True):
-            planned = self.study.runs[k]
-            T, w = planned.split(values[first : first + planned.size])
-            rest = values.shape[1:]
+        parts, rest = [], values.shape[1:]
+        for (planned, T, w), (sensors, tcp) in zip(self.study.split(values), self.channels, strict=True):
             weight = planned.measured.row_weight(float(np.median(tcp.sigma))).reshape(-1, 1, *([1] * len(rest)))
             white = sensors.whiten(T), tcp.whiten(w * weight)
             parts += [v.reshape(v.shape[0] * v.shape[1], *rest) for v in white]  # no sensors: nothing for -1 to count
-            first += planned.size
         return np.concatenate(parts)
 
     def colour(self, white: np.ndarray) -> np.ndarray:
         """White values (m,) back in their units, of channels without memory; NaN where nothing was measured."""
-        parts, first = [], 0
-        for k, (sensors, tcp) in zip(self.study.fitted, self.channels, strict=True):
-            planned = self.study.runs[k]
-            T, w = planned.split(white[first : first + planned.size])
+        parts = []
+        for (_, T, w), (sensors, tcp) in zip(self.study.split(white), self.channels, strict=True):
             parts += [(T * sensors.sigma).ravel(), (w * tcp.sigma).ravel()]
-            first += planned.size
         return np.where(missing(self.study), np.nan, np.concatenate(parts))
 
 
@@ -86,34 +79,16 @@ def missing(study: Study) -> np.ndarray:
 
 def measured_of(study: Study) -> np.ndarray:
     """(m,) what was measured in the fitted runs, NaN where nothing was."""
-    parts = []
-    for k in study.fitted:
-        m = study.runs[k].measured
-        parts += [m.temperature.ravel(), m.tcp.ravel()]
-    return np.concatenate(parts) if parts else np.zeros(0)
+    return study.joined(lambda p: (p.measured.temperature, p.measured.tcp))
 
 
 def labels(study: Study) -> np.ndarray:
     """(m,) which channel every number of the fitted runs is of: sensors by number, then the TCP components."""
-    parts = []
-    for k in study.fitted:
-        (b, _), (rows, _) = study.runs[k].shapes
-        parts += [
-            np.tile(study.runs[k].measured.column, b),
-            len(study.probed.base.sensors) + np.tile(np.arange(3), rows),
-        ]
-    return np.concatenate(parts) if parts else np.zeros(0, dtype=int)
+    return study.joined(lambda p: (p.measured.column, len(study.probed.base.sensors) + np.arange(3)))
 
 
 def offsets(study: Study) -> tuple[np.ndarray, tuple[str, ...]]:
     """(m, s) 1 K on one sensor in all fitted runs, and the names of these sensors."""
     names = tuple(dict.fromkeys(s for k in study.fitted for s in study.runs[k].measured.sensors))
-    blocks = []
-    for k in study.fitted:
-        planned = study.runs[k]
-        block = np.zeros((planned.size, len(names)))
-        (b, s), _ = planned.shapes
-        for i, name in enumerate(planned.measured.sensors):
-            block[np.arange(b) * s + i, names.index(name)] = 1.0
-        blocks.append(block)
-    return np.vstack(blocks) if blocks else np.zeros((0, 0)), names
+    number = study.joined(lambda p: ([names.index(name) for name in p.measured.sensors], -1))
+    return (number[:, None] == np.arange(len(names))).astype(float), names

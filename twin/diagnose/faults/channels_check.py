@@ -43,8 +43,7 @@ def _cause(f: Finding, runs: Sequence[Run], names: Sequence[str]) -> Cause:
 def _leaps(
     runs: Sequence[Run], sensors: Sequence[str], names: Sequence[str], told: Collection[tuple[int, str]]
 ) -> list[Cause]:
-    """A cause for each sensor that leaps or breaks within a run and was not told, of the size of its first leap:
-    `measured` leaves out what it shows from then on."""
+    """A cause for each sensor that leaps or breaks within a run and was not told, of the size of its first leap."""
     causes = []
     for k, (run, name) in enumerate(zip(runs, names, strict=True)):
         known = {channel for n, channel in told if n == k}

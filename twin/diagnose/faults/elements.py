@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.places import beside
+from twin.diagnose.evidence.nulls import convection
 from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.integration import INNER, gammas
 from twin.diagnose.model.study import Study, own_place
@@ -308,8 +309,8 @@ def _signals(
                 ratio = grown_power / np.where(power > 0.0, power, 1.0)
                 forcing = grown_power @ B.T
                 forcing = forcing + np.einsum("ts,tsp->tp", ratio[:, in_contact], run.drive.contact_heat) @ body.P.T
-                for i, f in enumerate(films):
-                    grown = _convection(drive, i, own) - _convection(run.drive, f, own)
+                more = convection(drive, len(films)) - convection(run.drive, len(load.films))[:, films]
+                for f, grown in zip(films, more.T, strict=True):
                     if np.any(grown):
                         flow = -own.middle @ A[f].T + own.outer[:, [f]] * M[:, f]
                         forcing = forcing + np.clip(grown, -50.0, 200.0)[:, None] * flow
@@ -331,14 +332,6 @@ def _evaluated(study: Study, k: int, signal: str, factor: float) -> tuple[list[i
     signals = {name: values * (factor if name == signal else 1.0) for name, values in run.signals.items()}
     dt = run.drive.time[1] - run.drive.time[0]
     return sources, films, evaluate(only, run.drive.time[:-1], signals, dt, run.drive.n_steps)
-
-
-def _convection(drive: Drive, f: int, nominal: Nominal) -> np.ndarray:
-    if f not in drive.films.index:
-        return np.asarray(drive.theta[:, f])
-    i = drive.films.index.index(f)
-    middle = drive.films.value.shape[2] // 2 + 15
-    return np.asarray(drive.films.value[:, i, middle])
 
 
 def _fields(study: Study) -> list[tuple[str, np.ndarray]]:

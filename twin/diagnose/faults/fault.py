@@ -5,7 +5,7 @@ elementary cause that it has. Other rooms ask these and know no names.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ from twin.diagnose.model.integration import INNER
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
+from twin.diagnose.result.spot import Spot
 from twin.machine.effects.effect import Effect, Window
 
 if TYPE_CHECKING:
@@ -115,8 +116,7 @@ class Fault:
     prefix: str = ""  # of its places, before the name that its columns have
     sign: int = 0  # of the first amplitude; 0: either
     least: float = 0.0  # first amplitude worth naming
-    # beyond which physics has no such cause: the model is wrong and not the machine (relative changes as factor - 1,
-    # logarithms of factors). Estimates on the generous side, chosen without looking at any case but for the one named
+    # beyond which the model is wrong, not the machine: generous, chosen without looking at cases but for the one named
     largest: float | None = None
     fixed: bool = False  # amplitudes are one
     own: float = 0.05  # relative standard deviation of its size, by what the form of the model may have wrong
@@ -131,20 +131,24 @@ class Fault:
     leaves: float = 0.005  # of its statistic: heat that it may leave in windows because the model is not the machine
     faint: bool = False  # its score by the derivative is small when it is many times as large
     read: bool = False  # acts on what is read, not in the machine
-    curved: bool = False  # on what is read, and not in proportion to its size
-    sizes: tuple[float, ...] = ()  # at which such a one is scored beside its column's
+    sizes: tuple[float, ...] = ()  # of what is read and not in proportion to its size: at which it is scored, too
     called: str = ""  # what its history is called, where it is not that of its columns
     exchanges: bool = False  # two channels, exactly
     corrects: bool = False  # a logged signal, by an exact factor
-    instant: bool = False  # of a reading: without edges that could be fitted
     lasts: bool = False  # of a reading: goes on in runs that were not looked at
     everywhere: bool = False  # of no one place: it may switch as often as the weather
     elsewhere: bool = False  # all of a source's heat at another place, compared with the description
+    partner: str = ""  # what the second of the two names of its place is called in settings
 
     @property
     def declared(self) -> bool:
         """Whether its size is that of a declared parameter, whose place it takes."""
         return self.parameter or self.conducts
+
+    @property
+    def curved(self) -> bool:
+        """Whether it acts on what is read, and not in proportion to its size."""
+        return bool(self.sizes)
 
     def bare(self, name: str) -> str:
         """The name that its columns have, of a place of a hypothesis."""
@@ -167,13 +171,13 @@ class Fault:
             np.array([c for _, c in rows], dtype=int), tuple(histories), self.sign, self.fixed, self.least, of_places,
         )]  # fmt: skip
 
-    def log_change(self, amplitude: float) -> float:
-        """An amplitude of a declared parameter as the logarithm of its factor."""
-        return float(np.log1p(amplitude)) if self.conducts else amplitude
+    def log_change(self, amplitude: float, sigma: float = 0.0) -> tuple[float, float]:
+        """An amplitude of a declared parameter as the logarithm of its factor, with its standard deviation."""
+        return (float(np.log1p(amplitude)), sigma / (1.0 + amplitude)) if self.conducts else (amplitude, sigma)
 
-    def amplitude(self, log_change: float) -> float:
+    def amplitude(self, change: float, sigma: float = 0.0) -> tuple[float, float]:
         """The inverse of `log_change`."""
-        return float(np.expm1(log_change)) if self.conducts else log_change
+        return (float(np.expm1(change)), float(np.exp(change)) * sigma) if self.conducts else (change, sigma)
 
     def uncertain(self, value: float) -> float:
         """Standard deviation of an amplitude by what the form of the model may have wrong."""
@@ -212,8 +216,8 @@ class Fault:
         return False
 
     def left_open(self, units: Sequence[Unit], a: np.ndarray) -> list[Unit] | None:
-        """What the shape of a cause leaves open at amplitudes (q,), one standard deviation each; None: as its history
-        has it."""
+        """What the shape of a cause leaves open at amplitudes (q,), one standard deviation each; None: its
+        history's."""
         return None
 
     # readings
@@ -227,6 +231,8 @@ class Fault:
         self, one: Study, nominal: Sequence[Nominal], name: str, size: float, known: Mapping[str, np.ndarray]
     ) -> np.ndarray:
         """(size,) what it adds to the reading of the one run of a study; known: its columns of that run, by name."""
+        if self.curved:
+            return self.change(one, nominal, lambda k: nominal[k].states, name, size)
         column = known.get(self.bare(name))
         return np.zeros(one.runs[0].size) if column is None else np.asarray(size * column)
 
@@ -237,7 +243,10 @@ class Fault:
 
     def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
         """A cause as reports and edits take it, of one at its place with the size of its first amplitude as told."""
-        return d
+        if not self.partner:
+            return d
+        spot = Spot.read(d.place)
+        return replace(d, place=spot.owner, settings={self.partner: spot.partner})
 
 
 def as_found(cause: Cause, study: Study) -> Effect:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.diagnose.evidence.formal import Described
-from twin.diagnose.evidence.nulls import Form, lump_of, typical
+from twin.diagnose.evidence.nulls import Form, convection, lump_of
 from twin.diagnose.faults.elements import EXPONENT, Elements, Key
 from twin.diagnose.faults.signal import CLOCK
 from twin.diagnose.model.bank import Nominal
@@ -30,7 +30,8 @@ def described_forms(
     """Of raw (m, n) responses in physical units."""
     load, probed = study.probed.base.load_model, study.probed
     films = [f.name for f in load.films]
-    usual = np.mean([typical(study, k) for k in study.fitted], axis=0)
+    drives = [study.runs[k].run.drive for k in study.fitted]
+    usual = np.mean([convection(drive, len(films)).mean(axis=0) for drive in drives], axis=0)
     columns: list[np.ndarray] = []
 
     def add(key: Key, size: float) -> None:

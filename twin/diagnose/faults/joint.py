@@ -12,29 +12,21 @@ RANGE = 9.0  # conductances of joints scatter by a decade with pressure and roug
 
 
 @dataclass(frozen=True)
-class Joint(Fault):
-    """A joint between faces that do not move."""
+class Conductance(Fault):
+    """Of a joint between faces that do not move, or of a contact that moves."""
 
     def fill(self, slot: Slot) -> None:
-        joints = [j.name for j in slot.study.probed.base.load_model.joints]
-        slot.slots.joint[:, slot.s, joints.index(slot.unit.place)] = slot.gate
-
-
-@dataclass(frozen=True)
-class Contact(Fault):
-    """A contact that moves."""
-
-    def fill(self, slot: Slot) -> None:
-        contacts = slot.study.probed.base.load_model.contacts
-        slot.slots.contact[:, slot.s, contacts.index(slot.unit.place)] = slot.gate
+        load = slot.study.probed.base.load_model
+        names = [j.name for j in load.joints] if self.kind == "joint" else load.contacts
+        getattr(slot.slots, self.kind)[:, slot.s, names.index(slot.unit.place)] = slot.gate
 
 
 FAULTS = tuple(
-    of(
+    Conductance(
         "joint", kind, "1", "contacts.", least=0.3, curve=Curve.RELATIVE, conducts=True, bent=True, grows=False,
         largest=RANGE,
     )
-    for of, kind in ((Joint, "joint"), (Contact, "contact"))
+    for kind in ("joint", "contact")
 )  # fmt: skip
 
 

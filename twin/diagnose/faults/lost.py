@@ -1,7 +1,7 @@
 """Conductances that are nearly gone: responses with the exact model, to tell which contacts to look at closely.
 
-A contact that has lost nine tenths of its conductance moves temperatures nine times as far as its derivative says, and
-others as well: by its derivative alone it may score nothing. What passes here is refitted before it is believed.
+Such a contact moves temperatures nine times as far as its derivative says, by which it may score nothing. What passes
+here is refitted before it is believed.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ def lost_conductances(study: Study, elements: Elements, whiten: Whitener, progre
     """Of every contact and joint of the machine, from the start of every run on."""
     names = tuple(dict.fromkeys(key for key in elements.block_of if key[0] in ("joint", "contact")))
     if not names:
-        return Lost((), np.zeros((sum(study.runs[k].size for k in study.fitted), 0)))
+        return Lost((), np.zeros((study.rows[-1].stop, 0)))
     with progress("contacts that are nearly gone", len(names)) as advance:
         outputs = each(_without, (study, elements), names, lambda _: advance(""))
-    nominal = np.concatenate([study.outputs(k, np.zeros(len(study.probed.parameters))) for k in study.fitted])
+    nominal = study.all_outputs(np.zeros(len(study.probed.parameters)))
     return Lost(names, whiten(np.stack(outputs, axis=1) - nominal[:, None]))
 
 

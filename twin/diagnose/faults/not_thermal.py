@@ -9,10 +9,8 @@ from twin.diagnose.faults.context import Context, single
 from twin.diagnose.faults.fault import Family, Fault
 from twin.machine.effects.effect import Window
 
-STEP = Fault("not_thermal", "step", "m", "tcp.", 0, 2e-6, 1e-3, read=True, instant=True, grows=False)
-LOAD = Fault(
-    "not_thermal", "load", "m per unit", "tcp.", read=True, lasts=True, instant=True, grows=False, called="load"
-)  # fmt: skip
+STEP = Fault("not_thermal", "step", "m", "tcp.", 0, 2e-6, 1e-3, read=True, grows=False)
+LOAD = Fault("not_thermal", "load", "m per unit", "tcp.", read=True, lasts=True, grows=False, called="load")
 FAULTS = (STEP, LOAD)
 
 

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import replace
 
 from twin.diagnose.faults.context import Singly
-from twin.diagnose.faults.fault import Described, Family, Fault, as_found
+from twin.diagnose.faults.fault import Family, Fault, as_found
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
-from twin.diagnose.result.spot import Spot
 from twin.machine.effects.effect import Effect
 
-
-@dataclass(frozen=True)
-class Scale(Fault):
-    """Of an axis, as warm as a part; its place is axes.AXIS<PART."""
-
-    def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
-        spot = Spot.read(d.place)
-        return replace(d, place=spot.owner, settings={"part": spot.partner})
-
-
 FAULTS = (
-    Scale(
-        "scale_expansion", "scale", "1/K", least=3e-7, own=0.12, read=True, lasts=True,
+    Fault(  # of an axis, as warm as a part: at axes.AXIS<PART
+        "scale_expansion", "scale", "1/K", least=3e-7, own=0.12, read=True, lasts=True, partner="part",
         largest=5e-5,  # 1/K: twice that of aluminium
     ),
 )  # fmt: skip

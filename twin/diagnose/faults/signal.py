@@ -42,7 +42,7 @@ class Clock(Fault):
 
 SIGNAL = Factor("signal", "signal", "1", "signals.", 1, 0.0, fixed=True, corrects=True, called="factor")
 CLOCK = Clock(
-    "signal", "clock", "s", "runs.", 0, 30.0, read=True, curved=True, called="clock",
+    "signal", "clock", "s", "runs.", 0, 30.0, read=True, called="clock",
     sizes=(-3600.0, -1200.0, -400.0, 400.0, 1200.0, 3600.0),
     largest=43200.0,  # s: half a day
 )  # fmt: skip

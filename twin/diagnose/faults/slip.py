@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,15 +23,10 @@ class Slip(Fault):
     ) -> np.ndarray:
         return size * play(study, nominal, self.bare(name), abs(size))
 
-    def read_in(
-        self, one: Study, nominal: Sequence[Nominal], name: str, size: float, known: Mapping[str, np.ndarray]
-    ) -> np.ndarray:
-        return size * play(one, nominal, self.bare(name), abs(size))
-
 
 FAULTS = (
     Slip(
-        "slip", "slip", "m", "tcp.", 1, 1e-6, own=0.12, read=True, curved=True, lasts=True,
+        "slip", "slip", "m", "tcp.", 1, 1e-6, own=0.12, read=True, lasts=True,
         sizes=(1e-6, 2e-6, 6e-6, 9e-6, 13e-6, 20e-6), largest=1e-4,
     ),
 )  # fmt: skip

@@ -1,10 +1,8 @@
 """First-order responses of everything that may act anywhere, in one pass through the runs.
 
-About the calibrated trajectory z(t) a cause of small amplitude enters as a forcing f(t) = v(t) s(t): v the place (the
-input vector of a surface, the heat that its film would carry, the flow of a joint), s its history. All are stepped
-together as columns of one linear system with the matrices of the nominal run and the steps of
-`twin.diagnose.model.integration`, so that thousands of hypotheses cost a few matrix products per step. The laws' own
-reaction is left out here, and is in the exact refit of what was chosen.
+About the calibrated trajectory z(t) a cause of small amplitude enters as a forcing f(t) = v(t) s(t): v the place, s its
+history. All are stepped together as columns of one linear system with the matrices of the nominal run and the steps of
+`twin.diagnose.model.integration`. The laws' own reaction is left out here, and is in the exact refit.
 """
 
 from __future__ import annotations
@@ -86,17 +84,13 @@ def respond(
 
     vectors: per run of the study, (r,) constant or (n m, r) each.
     """
-    total = sum(study.runs[k].size for k in study.fitted)
-    result = np.zeros((total, len(columns)), dtype=np.float32)
-    first = 0
-    for k in study.fitted:
-        planned, own = study.runs[k], nominal[k]
+    rows = study.rows
+    result = np.zeros((rows[-1].stop, len(columns)), dtype=np.float32)
+    for k, own in zip(study.fitted, rows, strict=True):
         acting = [c for c, column in enumerate(columns) if column.histories[k] is not None]
         for begin in range(0, len(acting), AT_ONCE):
             chosen = acting[begin : begin + AT_ONCE]
-            made = _integrated(study, k, own, vectors[k], [columns[c] for c in chosen])
-            result[first : first + planned.size, chosen] = made
-        first += planned.size
+            result[own, chosen] = _integrated(study, k, nominal[k], vectors[k], [columns[c] for c in chosen])
     return result
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import jax.numpy as jnp
 import numpy as np
@@ -71,6 +72,29 @@ class Study:
         """Name and fine step [s] of each fitted run."""
         runs = [self.runs[k].run for k in self.fitted]
         return [(run.name, float(run.drive.time[1] - run.drive.time[0])) for run in runs]
+
+    @property
+    def rows(self) -> list[slice]:
+        """Which of the m numbers of all fitted runs, one run after the other, are of each."""
+        ends = np.cumsum([0, *(self.runs[k].size for k in self.fitted)]).tolist()
+        return [slice(i, j) for i, j in pairwise(ends)]
+
+    def split(self, flat: np.ndarray) -> list[tuple[Planned, np.ndarray, np.ndarray]]:
+        """(m, ...) of all fitted runs: of each what sensors (b, s, ...) and the TCP (k, 3, ...) have."""
+        runs = [self.runs[k] for k in self.fitted]
+        return [(p, *p.split(flat[own])) for p, own in zip(runs, self.rows, strict=True)]
+
+    def joined(self, of: Callable[[Planned], tuple[object, object]]) -> np.ndarray:
+        """(m,) of what every fitted run has for its sensors and for the TCP, (b, s) and (k, 3) or broadcast to that."""
+        parts = [np.zeros(0)]
+        for planned in (self.runs[k] for k in self.fitted):
+            both = zip(of(planned), planned.shapes, strict=True)
+            parts += [np.broadcast_to(np.asarray(values), shape).ravel() for values, shape in both]
+        return np.concatenate(parts[1:] or parts)
+
+    def all_outputs(self, x: np.ndarray) -> np.ndarray:
+        """(m,) of all fitted runs at x (n,) in prior standard deviations."""
+        return np.concatenate([self.outputs(k, x) for k in self.fitted])
 
     def slots(self, k: int) -> Slots:
         """Empty slots for run k, to be filled."""

@@ -1,8 +1,7 @@
 """Outputs as a quadratic function of the parameters: exact derivatives, kept, instead of stepping the model again.
 
-Calibration needs the Jacobian where it ends, not where it began: two parameters of large and nearly equal effect are a
-weak direction only at the point where they nearly cancel, and a Jacobian that is 10 % off there turns a hundred
-standard deviations of cancelled effect into ten of misfit.
+Calibration needs the Jacobian where it ends: two parameters of large and nearly equal effect are a weak direction only
+at the point where they nearly cancel.
 
     y(t) = y0 + J t + 1/2 t^T H t,     t_j = e^u - 1 of what heats or grows, 1 - e^-u of what conducts away
 
@@ -22,6 +21,7 @@ from twin.progress import Progress, silent
 
 STEP = 0.8  # prior standard deviations between the two Jacobians of a second derivative
 STRONG = 50.0  # units of noise, summed over all rows, by which a parameter must move outputs to be bent
+UNITS = 0.05, 1e-6  # K, m: what counts
 CONDUCTS = ("film", "joint", "contact")
 
 
@@ -62,11 +62,13 @@ def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
     parameters = study.probed.parameters
     n = len(parameters)
     form = np.array([0 if p.scale == "linear" else -1 if p.kind in CONDUCTS else 1 for p in parameters])
-    y0 = np.concatenate([study.outputs(k, np.zeros(n)) for k in study.fitted])
+    y0 = study.all_outputs(np.zeros(n))
     bare = Surrogate(study.scale, form, y0, np.zeros((len(y0), n)), np.zeros((0, n, n), dtype=np.float32))
     J = jacobian_of(study, np.zeros(n)) / bare.rate(np.zeros(n))
     _refuse_nan(study, J, y0)
-    strong = np.flatnonzero(np.linalg.norm((J * bare.rate(np.zeros(n))) / _units(study)[:, None], axis=0) > STRONG)
+    strong = np.flatnonzero(
+        np.linalg.norm((J * bare.rate(np.zeros(n))) / study.joined(lambda _: UNITS)[:, None], axis=0) > STRONG
+    )
     points = [STEP * np.eye(n)[i] for i in strong]
     with progress("derivatives by the parameters", len(points)) as advance:
         made = each(jacobian_of, study, points, lambda _: advance(""))
@@ -90,12 +92,3 @@ def _refuse_nan(study: Study, J: np.ndarray, y0: np.ndarray) -> None:
             f"{what} is not finite in these runs", study.probed.base.name,
             "look for a law outside its range in these loads: twin check, twin losses --explain",
         )  # fmt: skip
-
-
-def _units(study: Study) -> np.ndarray:
-    """(m,) of what counts: 0.05 K, 1 um."""
-    parts = []
-    for k in study.fitted:
-        (b, s), (rows, _) = study.runs[k].shapes
-        parts.append(np.concatenate([np.full(b * s, 0.05), np.full(3 * rows, 1e-6)]))
-    return np.concatenate(parts)

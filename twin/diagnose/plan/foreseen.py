@@ -19,10 +19,9 @@ import scipy.linalg
 
 from twin.calibrate.fit.measured import measured
 from twin.calibrate.fit.noise import Channels
-from twin.diagnose.evidence.formal import known_forms
+from twin.diagnose.evidence.formal import known_forms, wind_columns
 from twin.diagnose.evidence.nulls import Form, form_of
 from twin.diagnose.evidence.whiten import Whitener
-from twin.diagnose.evidence.windy import wind_columns
 from twin.diagnose.faults.elements import Elements, Histories, Key, elements_of
 from twin.diagnose.faults.forms import described_forms, is_nuisance
 from twin.diagnose.faults.readings import readings_of

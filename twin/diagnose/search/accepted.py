@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.consistency import Size
 from twin.diagnose.evidence.fitter import bounds
+from twin.diagnose.evidence.settled import settle, settled_alone
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.table import fault_of
@@ -35,19 +37,13 @@ class Accepted:
 
 
 def parameter_of(study: Study, name: str) -> int | None:
-    """The parameter of this path, or the gain of this source or film, or the conductance of this contact or joint.
-
-    None where `[[parameters]]` leaves it out.
-    """
+    """The parameter of this path, or of what this is called OWN; None where `[[parameters]]` leaves it out."""
     paths = [p.path for p in study.probed.parameters]
     return next((paths.index(p) for p in (name, *(f"{name}.{own}" for own in OWN)) if p in paths), None)
 
 
 def freed(study: Study, h: Hypothesis) -> list[int]:
-    """The parameter, if any, that a cause takes the place of: it stays at its declared value.
-
-    Side by side the two would share one change.
-    """
+    """The parameter, if any, whose place a cause takes: it stays as declared, for the two would share one change."""
     if not fault_of(h).declared or h.when.windows or h.when.signal:
         return []
     j = parameter_of(study, h.name)
@@ -57,12 +53,11 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
 def jacobian(
     detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]], before: np.ndarray | None = None
 ) -> np.ndarray:
-    """(m, n) derivatives by the parameters at x (n,), with causes of these amplitudes.
+    """(m, n) derivatives by the parameters at x (n,) beside causes of these amplitudes; a number's own column is empty.
 
-    The surrogate knows nothing of causes, and a film of nine times its size changes what every other parameter does:
-    those that take a parameter's place are put there. Conductances beyond their bounds, where no surrogate holds, and
-    beside a signal that is corrected, get derivatives made anew, unless there are some from `before`. A number's own
-    column is left empty.
+    Causes that take a parameter's place are put there, for a film of nine times its size changes what every other
+    parameter does. Conductances beyond their bounds and corrected signals, of which no surrogate knows, get derivatives
+    made anew, unless there are some from `before`.
     """
     study = detector.study
     low, high = bounds(study)
@@ -71,7 +66,7 @@ def jacobian(
     anew = bool(corrected)
     for h, amplitude in causes:
         for j in freed(study, h):
-            there[j] = fault_of(h).log_change(amplitude) / study.scale[j]
+            there[j] = fault_of(h).log_change(amplitude)[0] / study.scale[j]
             held.append(j)
             anew |= fault_of(h).conducts and not low[j] <= there[j] <= high[j]
     if not anew:
@@ -90,12 +85,17 @@ def jacobian(
 
 def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
     """(amplitude, parameter) of causes that are a declared parameter beyond its tolerance."""
-    result, first = [], 0
-    for a in accepted:
-        if fault_of(a.hypothesis).parameter and (j := parameter_of(study, a.hypothesis.name)) is not None:
-            result.append((first, j))
-        first += len(a.amplitude)
-    return result
+    return [
+        (own.start, j)
+        for a, own in zip(accepted, spans(accepted), strict=True)
+        if fault_of(a.hypothesis).parameter and (j := parameter_of(study, a.hypothesis.name)) is not None
+    ]
+
+
+def spans(accepted: Sequence[Accepted]) -> list[slice]:
+    """Where the amplitudes of each cause are among those of all."""
+    ends = np.cumsum([0, *(len(a.amplitude) for a in accepted)]).tolist()
+    return [slice(i, j) for i, j in pairwise(ends)]
 
 
 def shifted(study: Study, x: np.ndarray, gains: Sequence[tuple[int, int]], amplitude: np.ndarray) -> np.ndarray:
@@ -120,10 +120,8 @@ def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
 
 
 def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(m,) white change by what acts on what is read, at its amplitude (q,); none of swapped channels.
-
-    x (n,): parameters that a clock's run is stepped with.
-    """
+    """(m,) white change by what acts on what is read, at its amplitude (q,); x (n,): parameters that a clock's
+    run has."""
     if fault_of(h).exchanges:  # `exchanged` has left nothing of it
         return np.zeros(detector.columns.raw.shape[0])
     if fault_of(h).curved:
@@ -164,15 +162,10 @@ def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.n
     """(m,) measurements y with the channels back in place that were found swapped: exact, whatever the parameters."""
     if not any(fault_of(a.hypothesis).exchanges for a in accepted):
         return y
-    parts, first = [], 0
-    for k in study.fitted:
-        planned = study.runs[k]
-        own = y[first : first + planned.size].copy()
-        (b, s), _ = planned.shapes
-        own[: b * s] = in_place(own[: b * s].reshape(b, s), planned.measured.sensors, accepted).ravel()
-        parts.append(own)
-        first += planned.size
-    return np.concatenate(parts)
+    y = y.copy()
+    for planned, T, _ in study.split(y):
+        T[:] = in_place(T, planned.measured.sensors, accepted)
+    return y
 
 
 def stepped(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
@@ -183,3 +176,29 @@ def stepped(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndar
         return study.outputs(k, x)
     amplitudes = [v for a in accepted if a.units for v in a.amplitude]
     return study.outputs(k, x, slots_with(study, detector.elements, units, k), amplitudes)
+
+
+def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> tuple[np.ndarray, np.ndarray]:
+    """The delivered calibration beside causes, whose amplitudes stay: parameters (n,) in prior standard deviations of
+    measurements y (m,), and their covariance (n, n)."""
+    if not accepted:
+        return settled_alone(detector.fitter, y)
+    study, surrogate = detector.study, detector.fitter.surrogate
+    y = exchanged(study, y, accepted)
+    reading = [a for a in accepted if not a.units and not fault_of(a.hypothesis).parameter]
+    held = [j for a in accepted for j in freed(study, a.hypothesis)]
+
+    def outputs(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        f, J = surrogate.at(with_shifts(study, accepted, x))
+        J[:, held] = 0.0
+        return f, J
+
+    def left(x: np.ndarray) -> np.ndarray:
+        there = with_shifts(study, accepted, x)
+        read = np.zeros(len(y))
+        for a in reading:
+            read += read_change(detector, a.hypothesis, a.amplitude, there)
+        exact = np.concatenate([stepped(detector, accepted, k, there) for k in study.fitted])
+        return detector.whiten(y - exact) - read
+
+    return settle(detector.fitter, outputs, left)

@@ -1,9 +1,9 @@
 """Candidates compared with the exact model before one is named.
 
 A score is exact for what adds heat. What conducts bends: a joint that lost nine tenths of its conductance moves
-temperatures nine times as far as its derivative says, and a cause that is wrong but free enough can then score more
-than the right one. So those whose response is not linear are refitted, each alone, and compared by the misfit that
-they really remove. Conductances move in t = a / (1 + a), in which temperatures are nearly linear.
+temperatures nine times as far as its derivative says. So those whose response is not linear are refitted, each alone,
+and compared by the misfit that they really remove. Conductances move in t = a / (1 + a), in which temperatures are
+nearly linear.
 """
 
 from __future__ import annotations
@@ -37,23 +37,22 @@ def misfit_of_each(detector: Detector, fitted: Fitted) -> np.ndarray:
     return np.asarray(white * fitted.projector(white))
 
 
+def _further(h: Hypothesis) -> int:
+    """Windows beyond the first one."""
+    return max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
+
+
 def worth(h: Hypothesis, policy: SearchPolicy = POLICY) -> float:
     """A statistic less the price of its freedom: how many like it were tried, amplitudes, further windows."""
     tried = len(h.batch.places) * len(h.batch.histories)
-    more = max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
-    return h.statistic - 2.0 * float(np.log(tried)) - policy.amplitude * (h.batch.q - 1) - policy.growth * more
+    price = policy.amplitude * (h.batch.q - 1) + policy.growth * _further(h)
+    return h.statistic - 2.0 * float(np.log(tried)) - price
 
 
 def proof(detector: Detector, h: Hypothesis) -> float:
     """A refitted statistic as thresholds count it: they know neither edges that are fitted nor further windows."""
-    if fault_of(h).read:
-        return h.statistic
-    more = max(len(h.when.windows) - 1, 0) if fault_of(h).grows else 0
-    return (
-        h.statistic
-        - detector.policy.edge * len(edges_of(detector.study, h))
-        - (detector.policy.growth - 2.0 * detector.policy.edge) * more
-    )
+    edges = len(edges_of(detector.study, h)) - 2 * _further(h)  # those of further windows are in their price
+    return h.statistic - detector.policy.edge * edges - detector.policy.growth * _further(h)
 
 
 def judged(
@@ -61,9 +60,9 @@ def judged(
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Candidates, most worthy first: those whose statistics are exact, and the others.
 
-    Those that are bent or have edges are refitted, until one leads all others by a share of BEHIND: by what both score
-    before they are refitted, for windows with fitted edges gain by it what others would gain, too. A candidate may have
-    several starts, of which the first has its score: it is the worthiest that they end at.
+    Those that are bent or have edges are refitted, until one leads all others by a share of `behind`, by what both
+    score before they are refitted: fitted edges are worth as much to others. Of several starts of a candidate the first
+    has its score; it is the worthiest that they end at.
     """
     worthy = partial(worth, policy=detector.policy)
     starts = {id(first): (first, *more) for first, *more in candidates}
@@ -91,9 +90,9 @@ def judged(
 def tried(
     detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
 ) -> list[Sequence[Hypothesis]]:
-    """Candidates, most worthy first, of `judged`. Where a coolant leads, it and others within SATURATES have been
-    refitted for some passes, from the last of their starts: linearity is, for a film that saturates, wrong by
-    tens of per cent, more at the wetted face than at those behind it, so that it would be left aside."""
+    """Candidates of `judged`, most worthy first. Where a coolant leads, it and others within `saturates` have been
+    refitted for some passes, from the last of their starts: a film saturates most at the wetted face, which linearity
+    would leave aside."""
     order = sorted(candidates, key=lambda starts: -worth(starts[0], detector.policy))
     if not order or not fault_of(order[0][0]).wets:
         return order
@@ -140,50 +139,41 @@ def _saturated(detector: Detector, h: Hypothesis) -> bool:
 
 def bent(detector: Detector, h: Hypothesis) -> bool:
     fault = fault_of(h)
-    return fault.bent or fault.curved or (not fault.read and bool(edges_of(detector.study, h)))
+    return fault.bent or fault.curved or bool(edges_of(detector.study, h))
 
 
 def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, passes: int = 0) -> Hypothesis:
     """A hypothesis with amplitudes, edges in time and statistic of the exact model, the parameters fitted with it.
 
-    y (m,): NaN where nothing was measured. What accepted causes do is added to what it does. passes: at most, 0 for as
-    many as its kind needs.
+    y (m,): NaN where nothing was measured. passes: at most, 0 for as many as its kind needs.
     """
-    fault = fault_of(h)
+    fault, policy = fault_of(h), detector.policy
     if fault.curved:
         return _read_anew(detector, fitted, h)
-    study, q = detector.study, h.batch.q
-    a = np.array(h.amplitude)
-    if fault.conducts:
-        a = np.clip(
-            1.0 / np.maximum(1.0 - a, 0.2) - 1.0, detector.policy.lowest_change, detector.policy.highest_change
-        )  # as if temperatures were linear in t
+    study, q, a = detector.study, h.batch.q, np.array(h.amplitude)
+    if fault.conducts:  # as if temperatures were linear in t
+        a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, policy.lowest_change, policy.highest_change)
     if h.when.bell is not None:
         h = moved(study, detector.elements, h, ())  # hours found by `growth` get their windows
-    before = misfit(detector, fitted)
-    inner = [] if fault.read else edges_of(study, h)
+    before, inner = misfit(detector, fitted), edges_of(study, h)
     read = readings_columns(detector, h) if fault.read else np.zeros((len(y), q))
-    low, high = bounds(study)
-    floor = lowest(detector, h)
+    (low, high), (mean, inverse), floor = bounds(study), fault.prior(q), lowest(detector, h)
     a = np.maximum(a, floor)
-    mean, inverse = fault.prior(q)
     if fault.wets:  # a strong film saturates: a score that takes it as linear says little
         a[0] = mean[0]
-    x0 = beginning(fitted.x, detector.policy).copy()
+    x0 = beginning(fitted.x, policy).copy()
     x0[freed(study, h)] = 0.0
     now = _Point(a, x0, h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
-    held = detector.policy.held if fault.wets else 0
-    for i in range(passes or held + (detector.policy.passes if not inner else detector.policy.window_passes)):
+    held = policy.held if fault.wets else 0
+    for i in range(passes or held + (policy.passes if not inner else policy.window_passes)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(detector, now, edges)
         J = jacobian(detector, now.x, [(h, float(now.a[0]))])
         projector = detector.fitter.projector(J, fitted.more)
         left = detector.whiten(y - fitted.beside - outputs + J @ now.x) - read @ now.a
         removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
-        arrived = i > held and abs(removed - statistic) < max(
-            detector.policy.less, detector.policy.less_share * removed
-        )
+        arrived = i > held and abs(removed - statistic) < max(policy.less, policy.less_share * removed)
         if removed <= statistic:  # too far: back, then less; parameters may do without a step
             if arrived:
                 break
@@ -197,32 +187,27 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
             best, statistic, share = now, removed, 1.0
             if arrived:
                 break
-            D = derivatives
-            D[:, q:] *= [e.per_second for e in edges]
-            D = detector.whiten(D) + np.pad(read, ((0, 0), (0, len(edges))))
+            derivatives[:, q:] *= [e.per_second for e in edges]
+            D = detector.whiten(derivatives) + np.pad(read, ((0, 0), (0, len(edges))))
             PD = projector(D)
             stiff = 1e9 * inverse if i < held else inverse
-            F = D.T @ PD + np.diag([*stiff, *(e.prior(detector.policy) ** -2.0 for e in edges)])
+            F = D.T @ PD + np.diag([*stiff, *(e.prior(policy) ** -2.0 for e in edges)])
             pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
             below = np.concatenate([floor - now.a, np.full(len(edges), -np.inf)])
             found = solved(F, PD.T @ left + pulled, below)
-            after = fault.limited(
-                study, h.name, _moved(now.a, found[:q], fault.conducts, h.batch.sign, detector.policy)
-            )
-            shifts = np.clip(found[q:], -detector.policy.edge_step, detector.policy.edge_step)
-            nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, shifts]))[: len(now.x)]
-            drift = np.clip(np.clip(nuisance, low, high) - now.x, -detector.policy.near, detector.policy.near)
-            step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, shifts, strict=True)))
-        shifted = (
-            moved(study, detector.elements, best.h, [(e, share * by) for e, by in step.edges]) if step.edges else best.h
-        )
+            after = fault.limited(study, h.name, _moved(now.a, found[:q], fault.conducts, h.batch.sign, policy))
+            later = np.clip(found[q:], -policy.edge_step, policy.edge_step)
+            nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, later]))[: len(now.x)]
+            drift = np.clip(np.clip(nuisance, low, high) - now.x, -policy.near, policy.near)
+            step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, later, strict=True)))
+        shifts = [(e, share * by) for e, by in step.edges]
+        shifted = moved(study, detector.elements, best.h, shifts) if shifts else best.h
         now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
     if fault.vanished(best.a):
         statistic = 0.0
     # what better parameters remove is not the cause's
-    plain = np.concatenate([study.outputs(k, best.x) for k in study.fitted])
     _, J = detector.fitter.surrogate.at(best.x)
-    none = detector.whiten(y - fitted.beside - plain + J @ best.x)
+    none = detector.whiten(y - fitted.beside - study.all_outputs(best.x) + J @ best.x)
     statistic += min(float(none @ detector.fitter.projector(J, fitted.more)(none)) - before, 0.0)
     return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
 
@@ -290,7 +275,7 @@ def _outputs(detector: Detector, p: _Point, edges: Sequence[Edge]) -> tuple[np.n
         if any(u.shapes[k].any() for u in units):
             slots = with_pulses(study, detector.elements, p.h, units, p.a, edges, k)
             f, D = study.by_amplitudes(k, p.x, slots, [*p.a, *np.zeros(len(edges))])
-            derivatives.append(D[:, :n])
+            derivatives.append(D)
         else:
             f = study.outputs(k, p.x)
             derivatives.append(np.zeros((len(f), n)))
@@ -301,12 +286,8 @@ def _outputs(detector: Detector, p: _Point, edges: Sequence[Edge]) -> tuple[np.n
 def _moved(a: np.ndarray, step: np.ndarray, relative: bool, sign: int, policy: SearchPolicy = POLICY) -> np.ndarray:
     if relative:
         t = a / (1.0 + a) + step / (1.0 + a) ** 2
-        bent = np.where(
-            t < policy.highest_change / (1.0 + policy.highest_change),
-            t / np.maximum(1.0 - t, 1e-9),
-            policy.highest_change,
-        )
-        return np.asarray(np.clip(bent, np.maximum(policy.lowest_change, (1.0 + a) / 5.0 - 1.0), policy.highest_change))
+        least = np.maximum(policy.lowest_change, (1.0 + a) / 5.0 - 1.0)
+        return np.asarray(np.clip(t / np.maximum(1.0 - t, 1e-9), least, policy.highest_change))
     result = np.clip(a + step, a - 2.0 * np.abs(a), a + 2.0 * np.abs(a))
     if sign:
         result[0] = sign * max(sign * result[0], 0.2 * sign * a[0])  # never through zero

@@ -1,15 +1,11 @@
 """Changes of a size that is known, judged from the description and not from where a fit has ended.
 
-A current of twice what the log says is four times the heat of a motor, and calibration finds a gain of four. Beside
-that fit the right factor explains nothing more. Nor does heat that enters at another face, all of it, when calibration
-has bent joints and capacities around it. So each of them is given a fit of its own, which begins at the description,
-and counts by how much less misfit it leaves than calibration without it.
-
-To first order that says which factors are worth a try, and not what they explain: with four times the heat a film or a
-joint near the motor counts four times as much. Those few are fitted with the model that has the corrected signal.
-Nor does it say what a bearing does that warms another face, and is as warm as that: such are told by the model with
-the heat there, whose parameters are fitted to first order. (`twin.diagnose.search.contest` fits them exactly.) And of
-two sensors with each other's name calibration makes two losses that are off, beside which putting them back is wrong.
+Of a current of twice what the log says, which is four times the heat, calibration makes a gain of four, beside which
+the right factor explains nothing more; of heat that enters elsewhere bent joints, of two sensors with each other's name
+two losses that are off. So each of them is given a fit of its own, which begins at the description, and counts by how
+much less misfit it leaves than calibration without it. To first order that says which are worth a try; as four times
+the heat makes films and joints count four times as much, the most promising factors are fitted with the model that has
+the corrected signal, and heat elsewhere counts by what it does there.
 """
 
 from __future__ import annotations
@@ -34,37 +30,39 @@ from twin.rom.drive import Drive, evaluate
 
 def declared_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Exact factors of signals that leave less misfit than the fit without a cause does, to first order."""
-    before, found = misfit(detector, fitted), []
-    for h, D in _promising(detector, y, lambda fault: fault.corrects)[: detector.policy.closely]:
-        statistic = before - _fitted_with(detector, y, D)
-        if statistic > 0.0:
-            found.append(replace(h, statistic=statistic))
-    return found
+    return _better(detector, y, fitted, lambda fault: fault.corrects, lambda _, D: _fitted_with(detector, y, D))
 
 
 def misplaced_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
-    """Likewise of sources all of whose heat is elsewhere, with what they do there beside the described machine."""
-    study, before, found = detector.study, misfit(detector, fitted), []
-    for h, _ in _promising(detector, y, lambda fault: fault.elsewhere)[: detector.policy.closely]:
-        units, x = units_of(study, h), np.zeros(len(fitted.x))
+    """The same of sources all of whose heat is elsewhere, with what they do there beside the described machine."""
+    study, x = detector.study, np.zeros(len(fitted.x))
+
+    def left(h: Hypothesis, _: np.ndarray) -> float:
+        units = units_of(study, h)
         there = [study.outputs(k, x, slots_with(study, detector.elements, units, k), h.amplitude) for k in study.fitted]
-        change = detector.whiten(np.concatenate(there) - detector.fitter.surrogate.y0)
-        statistic = before - _fitted_with(detector, y, change)
-        if statistic > 0.0:
-            found.append(replace(h, statistic=statistic))
-    return found
+        return _fitted_with(detector, y, detector.whiten(np.concatenate(there) - detector.fitter.surrogate.y0))
+
+    return _better(detector, y, fitted, lambda fault: fault.elsewhere, left)
 
 
 def swapped_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
-    """Two channels with each other's name that leave less misfit with their readings put back, to first order: what
-    calibration has made of them, such as two losses that are off by factors, is not beside it then."""
-    study, before, found = detector.study, misfit(detector, fitted), []
-    for h, _ in _promising(detector, y, lambda fault: fault.exchanges)[: detector.policy.closely]:
-        back = exchanged(study, y, [Accepted(h, (), np.ones(1), np.eye(1), 0.0, 0.0, ())])
-        statistic = before - _fitted_with(detector, back, np.zeros(len(y)))
-        if statistic > 0.0:
-            found.append(replace(h, statistic=statistic))
-    return found
+    """The same of two channels with each other's name, with their readings put back."""
+
+    def left(h: Hypothesis, _: np.ndarray) -> float:
+        back = exchanged(detector.study, y, [Accepted(h, (), np.ones(1), np.eye(1), 0.0, 0.0, ())])
+        return _fitted_with(detector, back, np.zeros(len(y)))
+
+    return _better(detector, y, fitted, lambda fault: fault.exchanges, left)
+
+
+def _better(
+    detector: Detector, y: np.ndarray, fitted: Fitted, of: Callable[[Fault], bool],
+    left: Callable[[Hypothesis, np.ndarray], float],
+) -> list[Hypothesis]:  # fmt: skip
+    """The most promising of some faults with which less misfit is left (of it and its response) than without."""
+    before, tried = misfit(detector, fitted), _promising(detector, y, of)[: detector.policy.closely]
+    found = [replace(h, statistic=before - left(h, D)) for h, D in tried]
+    return [h for h in found if h.statistic > 0.0]
 
 
 def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
@@ -127,18 +125,13 @@ def _sum(drive: Drive, more: Drive, less: Drive, moving: list[int]) -> Drive:
 def _promising(detector: Detector, y: np.ndarray, of: Callable[[Fault], bool]) -> list[tuple[Hypothesis, np.ndarray]]:
     """Those of some faults and their white responses (m,), to first order, first those that leave least beside the
     description."""
-    found = []
-    for batch in detector.columns.batches:
-        if not of(fault_of(batch)):
-            continue
+    f, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
+    projector, white, found = detector.fitter.projector(J), detector.whiten(y - f)[:, None], []
+    for batch in (b for b in detector.columns.batches if of(fault_of(b))):
         D = detector.columns.raw[:, batch.columns[:, 0]].astype(float)
-        f, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
-        left = detector.whiten(y - f)[:, None] - D
-        remains = (left * detector.fitter.projector(J)(left)).sum(axis=0)
-        found += [
-            (float(remains[i]), Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), D[:, i])
-            for i in range(len(batch.places))
-        ]
+        remains = ((white - D) * projector(white - D)).sum(axis=0)
+        always = [Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0) for i in range(len(batch.places))]
+        found += zip(remains.tolist(), always, D.T, strict=True)
     return [(h, D) for _, h, D in sorted(found, key=lambda made: made[0])]
 
 
@@ -167,15 +160,14 @@ def _fitted_by(detector: Detector, y: np.ndarray, study: Study, enough: float) -
         else:
             break
         projector = detector.fitter.projector(J)
-        white = detector.whiten(y - np.concatenate([study.outputs(k, x) for k in study.fitted]) + J @ x)
+        white = detector.whiten(y - study.all_outputs(x) + J @ x)
         left = float(white @ projector(white))
         x = np.clip(projector.most_likely(white)[: len(x)], low, high)
     return left
 
 
 def _gains(described: Study, corrected: Study) -> np.ndarray:
-    """(n,) prior standard deviations by which sources of the description would be moved to emit what they do with
-    corrected loads: parameters do there nearly what they do here."""
+    """(n,) prior standard deviations by which described sources would emit what they do with corrected loads."""
     before, after = _emitted(described), _emitted(corrected)
     result = np.zeros(len(described.probed.parameters))
     for source, was, now in zip(described.probed.base.load_model.sources, before, after, strict=True):

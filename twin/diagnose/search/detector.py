@@ -1,32 +1,31 @@
 """The detector of a study: what calibration can absorb, model discrepancy, null distribution and thresholds.
 
 Made from synthetic measurements without a cause (`nulls`), once per machine, loads, plan of measurements and
-instruments, and cached: the channels' noise and the low-rank covariance of model discrepancy from some of them, the
-null distribution of every family's best statistic from the others. Thresholds follow from a Gumbel tail per family, at
-one common tail probability chosen so that a set of measurements without a cause passes any of them in ALARM of all
-cases.
+instruments, and cached: noise and the low-rank covariance of model discrepancy from some of them, the null distribution
+of every family's best statistic from the others. Thresholds are Gumbel tails at one probability for all families,
+chosen so that ALARM of all measurements without a cause pass any of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from twin.build.workers import each
+from twin.calibrate.fit.measured import Measured
 from twin.calibrate.fit.noise import Channels, estimated
 from twin.diagnose.evidence.discretisation import Difference
-from twin.diagnose.evidence.fitter import Fitter
-from twin.diagnose.evidence.formal import known_forms, leading
+from twin.diagnose.evidence.fitter import Fitted, Fitter
+from twin.diagnose.evidence.formal import known_forms, leading, wind_columns
 from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, null
 from twin.diagnose.evidence.pulls import Pulls, gumbel
 from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.evidence.sight import Columns, sight
 from twin.diagnose.evidence.unknown import heat_of
-from twin.diagnose.evidence.whiten import Whitener, offsets
-from twin.diagnose.evidence.windy import wind_columns
+from twin.diagnose.evidence.whiten import Whitener, missing, offsets
 from twin.diagnose.faults.catalogue import Family
 from twin.diagnose.faults.context import Context
 from twin.diagnose.faults.elements import Elements, elements_of, slim
@@ -34,7 +33,7 @@ from twin.diagnose.faults.forms import clocks, described_forms
 from twin.diagnose.faults.lost import Lost, lost_conductances
 from twin.diagnose.faults.readings import readings_of
 from twin.diagnose.model.bank import Nominal, nominal_run, respond
-from twin.diagnose.model.study import Study
+from twin.diagnose.model.study import Study, with_measured
 from twin.diagnose.model.surrogate import Surrogate, make_surrogate
 from twin.progress import Progress, silent
 
@@ -53,11 +52,9 @@ Differences = Sequence[Difference]
 
 
 @dataclass(frozen=True)
-class Detector:
-    """m measured numbers, n columns (elements, then readings)."""
+class _Made:
+    """What no measured value changes; n columns (elements, then readings)."""
 
-    study: Study
-    fitter: Fitter
     elements: Elements
     nominal: tuple[Nominal, ...]
     index: dict[tuple[str, str, str], int]
@@ -66,6 +63,18 @@ class Detector:
     thresholds: dict[str, float]
     lost: Lost
     pulls: Pulls
+
+    @property
+    def made(self) -> list[Any]:
+        return [getattr(self, f.name) for f in fields(_Made)]
+
+
+@dataclass(frozen=True)
+class Detector(_Made):
+    """Of m measured numbers."""
+
+    study: Study
+    fitter: Fitter
     policy: SearchPolicy  # that it is searched with: no number of its own depends on it
     least: float = 0.0  # statistic that any cause needs, where the model is wrong in its form (`dispersion`)
     poor: bool = False  # its model discrepancy holds what the model leaves of these very runs (`slow_errors`)
@@ -81,42 +90,36 @@ class Detector:
 
 
 @dataclass(frozen=True)
-class StoredDetector:
+class StoredDetector(_Made):
     """A detector without the study, whose measurements come later: what the cache keeps."""
 
     surrogate: Surrogate
     channels: tuple[tuple[Channels, Channels], ...]
     others: np.ndarray  # (m, q) white
-    elements: Elements
-    nominal: tuple[Nominal, ...]
-    index: dict[tuple[str, str, str], int]
-    columns: Columns
-    nulls: dict[str, np.ndarray]
-    thresholds: dict[str, float]
-    lost: Lost
-    pulls: Pulls
 
     def of(self, study: Study, policy: SearchPolicy) -> Detector:
         """The detector of a study that differs from the one it was made for in its measured values alone."""
         fitter = Fitter(study, self.surrogate, Whitener(study, self.channels), self.others)
-        return Detector(
-            study, fitter, self.elements, self.nominal, self.index, self.columns, self.nulls, self.thresholds,
-            self.lost, self.pulls, policy,
-        )  # fmt: skip
+        return Detector(*self.made, study, fitter, policy)
 
 
 def stored(detector: Detector) -> StoredDetector:
     fitter = detector.fitter
-    return StoredDetector(
-        fitter.surrogate, fitter.whiten.channels, fitter.others, detector.elements, detector.nominal, detector.index,
-        detector.columns, detector.nulls, detector.thresholds, detector.lost, detector.pulls,
-    )  # fmt: skip
+    return StoredDetector(*detector.made, fitter.surrogate, fitter.whiten.channels, fitter.others)
 
 
-def _null_residual(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Differences], seed: int) -> np.ndarray:
-    """What a calibration leaves of a null (m,)."""
+_Nulls = tuple[Fitter, list[np.ndarray], Instruments, Form, Differences]  # what they are made and fitted with
+
+
+def _fitted_null(shared: _Nulls, seed: int) -> tuple[np.ndarray, Fitted]:
     fitter, J, instruments, form, differences = shared
-    fitted = fitter(null(fitter.study, J, seed, instruments, form, differences=differences))
+    y = null(fitter.study, J, seed, instruments, form, differences=differences)
+    return y, fitter(y)
+
+
+def _null_residual(shared: _Nulls, seed: int) -> np.ndarray:
+    """What a calibration leaves of a null (m,)."""
+    fitter, fitted = shared[0], _fitted_null(shared, seed)[1]
     white = fitter.whiten(fitted.residual)
     explained = fitted.projector.N @ fitted.projector.most_likely(white)
     return fitter.whiten.colour(white - explained)
@@ -131,10 +134,9 @@ class _OfNull:
     settled: np.ndarray  # (n,)
 
 
-def _of_null(shared: tuple[Fitter, list[np.ndarray], Instruments, Form, Differences, Columns], seed: int) -> _OfNull:
-    fitter, J, instruments, form, differences, columns = shared
-    y = null(fitter.study, J, seed, instruments, form, differences=differences)
-    fitted = fitter(y)
+def _of_null(shared: tuple[_Nulls, Columns], seed: int) -> _OfNull:
+    (fitter, *_), columns = shared[0], shared[1]
+    y, fitted = _fitted_null(shared[0], seed)
     seen = sight(columns, fitted.projector, fitter.whiten(fitted.residual))
     return _OfNull(seen.largest(), fitted.x, settled_alone(fitter, y)[0])
 
@@ -160,7 +162,7 @@ def make_detector(
     surrogate = make_surrogate(study, progress)
     other = differ(surrogate)
     J = surrogate.J * surrogate.rate(np.zeros(len(study.probed.parameters)))
-    J_of, y_of = _by_run(study, J), _by_run(study, surrogate.y0)
+    J_of, y_of = ([values[own] for own in study.rows] for values in (J, surrogate.y0))
     with progress("responses of elementary causes", 2) as advance:
         nominal = tuple(nominal_run(study, k) for k in range(len(study.runs)))
         elements = elements_of(study, nominal)
@@ -175,8 +177,13 @@ def make_detector(
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
     bare = np.hstack(bare_forms(study, raw, index))
     described = described_forms(study, elements, nominal, raw, form)
-    known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
-    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *_discretised(other, whiten), known]))
+
+    def fitter_of(whiten: Whitener, *modes: np.ndarray) -> Fitter:
+        discretised = [leading(whiten(o.columns(SPREAD))) for o in other]  # of each parameter, too
+        known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
+        return Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *discretised, known, *modes]))
+
+    fitter = fitter_of(whiten)
     with progress("measurements without a cause: form", counts[0]) as advance:
         shared = (fitter, J_of, instruments, form, other)
         left = np.stack(each(_null_residual, shared, list(range(counts[0])), lambda _: advance("")), axis=1)
@@ -185,8 +192,7 @@ def make_detector(
     variance = s**2 / max(counts[0], 1)
     kept = min(MODES, int(np.sum(variance > 3.0)))
     modes = U[:, :kept] * np.sqrt(np.maximum(variance[:kept] - 1.0, 0.0))
-    known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
-    fitter = Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *_discretised(other, whiten), known, modes]))
+    fitter = fitter_of(whiten, modes)
     context = Context(study, elements, index)
     batches = [b for f in families for b in f.batches(context) if b.columns.size]
     columns = Columns.of(
@@ -194,40 +200,32 @@ def make_detector(
     )
     with progress("measurements without a cause: thresholds", counts[1]) as advance:
         seeds = list(range(10_000, 10_000 + counts[1]))
-        seen = each(_of_null, (fitter, J_of, instruments, form, other, columns), seeds, lambda _: advance(""))
+        seen = each(_of_null, ((fitter, J_of, instruments, form, other), columns), seeds, lambda _: advance(""))
     names = [*(f.name for f in families), "unknown"]
     nulls = {name: np.array([of_null.largest.get(name, 0.0) for of_null in seen]) for name in names}
     pulls = Pulls.of(study.probed.parameters, np.array([o.fitted for o in seen]), np.array([o.settled for o in seen]))
     small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
     lost = lost_conductances(study, elements, whiten, progress)
-    return Detector(
-        study, fitter, slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost, pulls, policy
-    )
+    made = slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost, pulls
+    return Detector(*made, study, fitter, policy)
 
 
 def bare_forms(study: Study, raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> list[np.ndarray]:
     """Columns (m, k) of unit prior variance that no model is needed for: constant errors of channels, and lateness."""
-    return [OFFSET * offsets(study)[0], TCP_ZERO * _tcp_zero(study), _together(raw, index)]
+    return [
+        OFFSET * offsets(study)[0],
+        TCP_ZERO * (study.joined(lambda _: (-1, range(3)))[:, None] == np.arange(3)),
+        _together(raw, index),
+    ]
 
 
 def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.ndarray:
-    """(m, 1) what all clocks by LATE do, of a unit prior: a log's clock is off in its own run, and what comes early or
-    late in every run is a light part's or a sensor's time constant. (m, 0) where there is one run alone."""
+    """(m, 1) what all clocks by LATE do: what comes early or late in every run is a light part's or a sensor's time
+    constant. (m, 0) where there is one run alone."""
     own = clocks(index)
     if len(own) < 2:
         return np.zeros((len(raw), 0))
     return np.asarray(LATE * raw[:, own].astype(float).sum(axis=1, keepdims=True))
-
-
-def _discretised(differences: Differences, whiten: Whitener) -> list[np.ndarray]:
-    """White (m, k) of unit variance: the difference to each other discretisation, and of each parameter's effect."""
-    return [leading(whiten(o.columns(SPREAD))) for o in differences]
-
-
-def _by_run(study: Study, values: np.ndarray) -> list[np.ndarray]:
-    """(m, ...) of all fitted runs cut into runs."""
-    ends = np.cumsum([study.runs[k].size for k in study.fitted])
-    return np.split(values, ends[:-1])
 
 
 def _whitened(whiten: Whitener, raw: np.ndarray) -> np.ndarray:
@@ -239,10 +237,7 @@ def _whitened(whiten: Whitener, raw: np.ndarray) -> np.ndarray:
 
 
 def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[str, float]:
-    """Per family the statistic that a common tail probability allows, so that `alarm` of all nulls pass any of them.
-
-    By Gumbel tails.
-    """
+    """Per family what a common probability of Gumbel tails allows, so that `alarm` of all nulls pass any of them."""
     tails = {name: gumbel(values) for name, values in nulls.items() if len(values) and values.max() > 0.0}
     if not tails:
         return dict.fromkeys(nulls, FLOOR)
@@ -271,27 +266,14 @@ def _floors(study: Study, instruments: Instruments) -> list[tuple[np.ndarray, np
     return result
 
 
-def _tcp_zero(study: Study) -> np.ndarray:
-    """(m, 3) 1 m on one TCP component in all fitted runs."""
-    blocks = []
-    for k in study.fitted:
-        planned = study.runs[k]
-        (b, s), (rows, _) = planned.shapes
-        blocks.append(np.vstack([np.zeros((b * s, 3)), np.tile(np.eye(3), (rows, 1))]))
-    return np.vstack(blocks)
-
-
 def _channels(
     study: Study, residuals: np.ndarray, floors: list[tuple[np.ndarray, np.ndarray]]
 ) -> tuple[tuple[Channels, Channels], ...]:
     """Noise of every channel from residuals (m, sets): memory of what the modes of form will not hold, capped."""
-    result, first = [], 0
-    for k, (sensors, tcp) in zip(study.fitted, floors, strict=True):
-        planned = study.runs[k]
-        T, w = planned.split(residuals[first : first + planned.size])
-        first += planned.size
-        result.append((_pooled(T, sensors), _pooled(w, tcp)))
-    return tuple(result)
+    return tuple(
+        (_pooled(T, sensors), _pooled(w, tcp))
+        for (_, T, w), (sensors, tcp) in zip(study.split(residuals), floors, strict=True)
+    )
 
 
 def _pooled(values: np.ndarray, floor: np.ndarray) -> Channels:
@@ -301,3 +283,20 @@ def _pooled(values: np.ndarray, floor: np.ndarray) -> Channels:
     _, channels, sets = values.shape
     apart = np.concatenate([values, np.full((1, channels, sets), np.nan)])
     return estimated(apart.transpose(2, 0, 1).reshape(-1, channels), floor, cap=0.9)
+
+
+def emptied(detector: Detector, plans: list[Measured]) -> Detector:
+    """The detector where these measurements have gaps that its own do not have; thresholds stay as they are.
+
+    For campaigns: `twin diagnose` makes a new one, which takes minutes.
+    """
+    study = with_measured(detector.study, plans)
+    kept = ~missing(study)
+    if not np.any(~kept & ~missing(detector.study)):
+        return detector
+    others = np.where(kept[:, None], detector.fitter.others, 0.0)
+    raw = np.where(kept[:, None], detector.columns.raw, np.float32(0.0))
+    fitter = replace(detector.fitter, study=study, whiten=replace(detector.whiten, study=study), others=others)
+    columns = Columns.of(raw, detector.columns.batches, detector.columns.heat, others)
+    lost = replace(detector.lost, responses=np.where(kept[:, None], detector.lost.responses, 0.0))
+    return replace(detector, study=study, fitter=fitter, columns=columns, lost=lost)

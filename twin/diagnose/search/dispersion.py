@@ -4,20 +4,23 @@ Of m measured numbers with white residual r, after the named causes and the stro
 
     c = r^T Pi r / m
 
-is about 1 where noise and model discrepancy are all that is left: the expectation of r^T Pi r is m, with a standard
-deviation of (2 m)^(1/2), as Pi is the inverse of the covariance of r (the dispersion of McCullagh, Nelder, Generalized
-Linear Models, 1989, section 4.5; c-hat of Burnham, Anderson, Model Selection and Multimodel Inference, 2002, section
-2.5). More than that is an error of the model's form, and a cause explains a share of it by chance: it must explain
-more than a quarter of the excess, r^T Pi r - m.
+is 1 with a standard deviation of (2 / m)^(1/2) where noise and model discrepancy are all that is left, as Pi is the
+inverse covariance of r (dispersion: McCullagh, Nelder, Generalized Linear Models, 1989, section 4.5; c-hat: Burnham,
+Anderson, Model Selection and Multimodel Inference, 2002, section 2.5). More is an error of the model's form, of which a
+cause must explain more than a quarter. Above 3 it becomes model discrepancy of its own (slow errors, below), and a
+cause must explain more than half of what is left beside that; heat of any history is not told then.
 
-Where c is above 3 the model is too poor for that. What is left then becomes model discrepancy of its own, a slow error
-of every channel (`twin.diagnose.search.slow_errors`), and a cause must explain more than half of what is left beside
-these. Heat of any history alone is not told: a model wrong in its form leaves that. Where nothing is named, the verdict
-is "too poor", with the calibration of a search without slow errors, from which the note tells what is missing.
+To divide every statistic by c is not enough: what a form leaves lasts for hours, and one place may explain half of it.
 
-Dividing every statistic by c, as those books do, was tried and is not enough: what a form leaves lasts for hours, so
-that one place may explain half of it. Nor is "more than all that is left" without slow errors: what a single channel
-leaves is then held against every cause, and sizes that would pass are beyond what a machine can have.
+Slow errors last for hours and are far larger in some channels than in others. Of the white numbers w of a channel in a
+run, less what calibration explains, mean square and product of neighbours say
+
+    cov(w_i, w_j) = [i = j] + v rho^|i - j|,    v = <w_i^2> - 1,    v rho = <w_i w_(i+1)>
+
+a first-order autoregression beside the noise, whose leading modes become nuisances (estimated generalised least
+squares: Greene, Econometric Analysis, 2012, section 9.3; a model discrepancy that is learned from what is left:
+Kennedy, O'Hagan, J. R. Statist. Soc. B 63, 2001). A cause that is hidden in what is left makes slow errors large, and
+hides itself: so they are learned twice, the second time beside what explains most beside the first ones.
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted
@@ -34,9 +38,8 @@ from twin.diagnose.search.contest import beginning, misfit, worth
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import Search, look
-from twin.diagnose.search.policy import SearchPolicy
+from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.refit import refit
-from twin.diagnose.search.slow_errors import slow_errors, with_errors
 
 
 @dataclass(frozen=True)
@@ -100,9 +103,7 @@ def _with_errors(own: Dispersion, detector: Detector, y: np.ndarray) -> Dispersi
 
 def wrong_temperatures(found: Search) -> bool:
     """Whether temperatures alone make a model poor: then nothing can be told of what they move."""
-    study = found.detector.study
-    shapes = [study.runs[k].shapes for k in study.fitted]
-    temperatures = np.concatenate([np.repeat([True, False], [b * s, 3 * rows]) for (b, s), (rows, _) in shapes])
+    temperatures = found.detector.study.joined(lambda _: (True, False))
     return found.detector.poor or found.dispersion(temperatures) > found.detector.policy.dispersed
 
 
@@ -116,3 +117,35 @@ def raised(detector: Detector, own: Dispersion) -> Detector:
 def _closed(detector: Detector) -> Detector:
     """The detector that names nothing."""
     return replace(detector, least=math.inf, thresholds=dict.fromkeys(detector.thresholds, math.inf))
+
+
+def slow_errors(detector: Detector, fitted: Fitted) -> np.ndarray:
+    """(m, q) white, each of unit prior variance: what a fit has left, as slow errors of single channels."""
+    left = fitted.projector(detector.whiten(fitted.residual))
+    measured, blocks = np.isfinite(fitted.residual), [np.zeros((len(left), 0))]
+    for _, *numbers in detector.study.split(np.arange(len(left))):
+        for at in (channel[measured[channel]] for own in numbers for channel in own.T):
+            modes = modes_of(left[at], detector.policy)
+            block = np.zeros((len(left), modes.shape[1]))
+            block[at] = modes
+            blocks.append(block)
+    return np.hstack(blocks)
+
+
+def modes_of(left: np.ndarray, policy: SearchPolicy = POLICY) -> np.ndarray:
+    """(n, q) of the white numbers (n,) that are left of a channel in a run."""
+    n = len(left)
+    more = float(left @ left) / max(n, 1) - 1.0
+    if n < policy.slow_rows or more <= 0.0:
+        return np.zeros((n, 0))
+    rho = float(np.clip(left[1:] @ left[:-1] / ((n - 1) * more), 0.0, policy.slow_longest))
+    variance, modes = np.linalg.eigh(more * rho ** np.abs(np.subtract.outer(np.arange(n), np.arange(n))))
+    kept = variance > policy.slow_least
+    return np.asarray(modes[:, kept] * np.sqrt(variance[kept]))
+
+
+def with_errors(detector: Detector, errors: np.ndarray) -> Detector:
+    """The detector of a poor model: with slow errors (m, q) in its model discrepancy."""
+    others = np.hstack([detector.fitter.others, errors])
+    fitter = replace(detector.fitter, others=others)
+    return replace(detector, fitter=fitter, columns=detector.columns.beside(others), poor=True)

@@ -1,8 +1,8 @@
 """When a cause begins and ends, to the minute, and the course of the sun: blocks of an hour are for the search alone.
 
-A cause of two hundred standard deviations whose window is off by a quarter of an hour leaves more misfit than most
-other causes make. The derivative by an edge is the response to a pulse there; by the centre or length of a bell, to the
-difference of two bells.
+A strong cause whose window is off by a quarter of an hour leaves more misfit than most other causes make. The
+derivative by an edge is the response to a pulse there; by the centre or length of a bell, to the difference of two
+bells.
 """
 
 from __future__ import annotations
@@ -47,15 +47,15 @@ class Edge:
 
 
 def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
-    """The edges of a hypothesis that may move, those of a bell; none of instants of a reading.
+    """The edges of a hypothesis that may move, those of a bell; none of a reading.
 
     What was there before a run and stays, or lasts beyond its end, has no edge there.
     """
-    if fault_of(h).instant:
+    if fault_of(h).read:
         return []
     if h.when.bell is not None:
         return [*(Edge("centre", i) for i in range(len(h.when.bell.centres))), Edge("length")]
-    spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
+    spans = _spans(study)
     windows = h.when.windows
     whole = [w.end >= spans[w.run] - 1.0 for w in windows]
     result = []
@@ -79,7 +79,7 @@ def moved(study: Study, elements: Elements, h: Hypothesis, shifts: Sequence[tupl
         named = bells.name(bell, study.fitted_runs)
         return replace(h, when=replace(h.when, name=named, weights=weights, windows=windows, bell=bell))
     ends = list(h.when.windows)
-    spans = {study.runs[k].run.name: _span(study, k) for k in study.fitted}
+    spans = _spans(study)
     for edge, shift in shifts:
         w = ends[edge.window]
         if edge.what == "end":
@@ -103,32 +103,24 @@ def with_pulses(
     """Slots of run k: the amplitudes, then per edge a pulse there that is 1 K, 1 W, ... times the amplitudes a."""
     slots = slots_with(study, elements, units, k)
     for e, edge in enumerate(edges, start=len(units)):
-        pulse = _pulse(study, h, edge, k)
-        if pulse is None:
+        pulse, pulses = _pulse(study, h, edge, k), []
+        if not pulse.any():
             continue
-        pulses = []
         for u, v in zip(units, a, strict=True):  # a bell has an amplitude for each run, which acts in that run alone
             own = pulse if u.shapes[k].any() else np.zeros(len(pulse))
             pulses.append(replace(u, shapes=tuple(v * own if i == k else s for i, s in enumerate(u.shapes))))
         made = slots_with(study, elements, pulses, k)
-        for q in range(len(units)):
-            slots.A[e] += made.A[q]
-            slots.M[e] += made.M[q]
-            slots.gate[:, e] += made.gate[:, q]
-            slots.rise[:, :, e] += made.rise[:, :, q]
-            slots.forcing[:, :, e] += made.forcing[:, :, q]
-            slots.film[:, e] += made.film[:, q]
-            slots.joint[:, e] += made.joint[:, q]
-            slots.contact[:, e] += made.contact[:, q]
-            slots.environment[:, :, e] += made.environment[:, :, q]
+        slots.A[e] += made.A.sum(axis=0)
+        slots.M[e] += made.M.sum(axis=0)
+        for name in ("gate", "film", "joint", "contact"):
+            getattr(slots, name)[:, e] += getattr(made, name).sum(axis=1)
+        for name in ("rise", "forcing", "environment"):
+            getattr(slots, name)[:, :, e] += getattr(made, name).sum(axis=2)
     return slots
 
 
 def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarray, policy: SearchPolicy) -> list[Unit]:
-    """Units whose responses at amplitude one are what the shape of a cause leaves open, one standard deviation each.
-
-    The exponent of a logged signal, the length of a bell, the first edges of windows, what its fault says.
-    """
+    """Units whose responses at amplitude one are what the shape of a cause leaves open, one standard deviation each."""
     if (own := fault_of(h).left_open(units, a)) is not None:
         return own
     if (bell := h.when.bell) is not None:
@@ -136,18 +128,16 @@ def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarr
         for k in range(len(study.runs)):
             t = np.asarray(study.runs[k].run.drive.time)
             middle, centre = (t[:-1] + t[1:]) / 2, bell.centres[study.fitted.index(k)] if k in study.fitted else 0.0
-            changes.append(
-                bells.level(middle, centre, bell.length + policy.longer) - bells.level(middle, centre, bell.length)
-            )
+            longer, shorter = (bells.level(middle, centre, bell.length + by) for by in (policy.longer, 0.0))
+            changes.append(longer - shorter)
         return [
             replace(u, shapes=tuple(v * c * s.any() for c, s in zip(changes, u.shapes, strict=True)))
             for u, v in zip(units, a, strict=True)
         ]
     if h.when.windows:
-        return [
-            replace(u, shapes=tuple(v * _wide(study, h, edge, k, policy) for k in range(len(study.runs))))
-            for edge in edges_of(study, h) for u, v in zip(units, a, strict=True)
-        ]  # fmt: skip
+        runs, edges = range(len(study.runs)), edges_of(study, h)
+        wide = [[e.prior(policy) / PULSE * _pulse(study, h, e, k) for k in runs] for e in edges]
+        return [replace(u, shapes=tuple(v * s for s in own)) for own in wide for u, v in zip(units, a, strict=True)]
     if not h.when.signal or h.when.exponent == 0.0:
         return []
     by = policy.exponent / h.when.exponent  # d(s^e) / de = s^e ln s = (s^e ln s^e) / e
@@ -157,34 +147,26 @@ def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarr
     ]
 
 
-def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray | None:
-    """(n_fine,) the change of a shape in run k while an edge moves by PULSE; None in other runs."""
-    run = study.runs[k].run
+def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray:
+    """(n_fine,) the change of a shape in run k while an edge moves by PULSE; zero in other runs."""
+    run, by = study.runs[k].run, PULSE / 2
     t = np.asarray(run.drive.time)
     if (bell := h.when.bell) is not None:
-        i, middle, by = study.fitted.index(k), (t[:-1] + t[1:]) / 2, PULSE / 2
-        if edge.what == "centre":
-            if edge.window != i:
-                return None
-            later, sooner = (bells.level(middle, bell.centres[i] + d, bell.length) for d in (by, -by))
-            return later - sooner
-        longer, shorter = (bells.level(middle, bell.centres[i], bell.length + d) for d in (by, -by))
-        return longer - shorter
+        i, centre = study.fitted.index(k), edge.what == "centre"
+        if centre and edge.window != i:
+            return np.zeros(len(t) - 1)
+        middle, moves = (t[:-1] + t[1:]) / 2, ((by, 0.0), (-by, 0.0)) if centre else ((0.0, by), (0.0, -by))
+        later, sooner = (bells.level(middle, bell.centres[i] + c, bell.length + d) for c, d in moves)
+        return later - sooner
     w = h.when.windows[edge.window]
     if w.run != run.name:
-        return None
+        return np.zeros(len(t) - 1)
     at = w.end if edge.what == "end" else w.start
-    shape = np.clip(np.minimum(t[1:], at + PULSE / 2) - np.maximum(t[:-1], at - PULSE / 2), 0.0, None)
+    shape = np.clip(np.minimum(t[1:], at + by) - np.maximum(t[:-1], at - by), 0.0, None)
     return np.asarray(shape / (t[1] - t[0]))
 
 
-def _wide(study: Study, h: Hypothesis, edge: Edge, k: int, policy: SearchPolicy) -> np.ndarray:
-    """(n_fine,) likewise by one prior standard deviation, zero in other runs."""
-    pulse = _pulse(study, h, edge, k)
-    n = study.runs[k].run.drive.n_steps
-    return np.zeros(n) if pulse is None else pulse * edge.prior(policy) / PULSE
-
-
-def _span(study: Study, k: int) -> float:
-    time = study.runs[k].run.drive.time
-    return float(time[-1] - time[0])
+def _spans(study: Study) -> dict[str, float]:
+    """How long every fitted run is [s]."""
+    runs = [study.runs[k].run for k in study.fitted]
+    return {run.name: float(run.drive.time[-1] - run.drive.time[0]) for run in runs}

@@ -20,7 +20,7 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
-from twin.diagnose.search.accepted import Accepted, exchanged
+from twin.diagnose.search.accepted import Accepted, exchanged, settled
 from twin.diagnose.search.contest import beginning, judged, misfit_of_each, proof, tried
 from twin.diagnose.search.declared import (
     declared_candidates,
@@ -31,10 +31,9 @@ from twin.diagnose.search.declared import (
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Search, Step, cosines, look, scored
+from twin.diagnose.search.look import Search, Step, cosines, distinct, look, scored
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
-from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.strained import closed, loose_ones, strained
 
 
@@ -117,9 +116,8 @@ def _start(described: Detector, y: np.ndarray) -> _Start:
     loose = loose_ones(detector, y, fitted, x0)
     relaxed = strained(detector, y, fitted, loose, glance)
     if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
-        exact = {
-            h.name: h for h in [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
-        }
+        closer = [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
+        exact = {h.name: h for h in closer}
         # an exact fit ends where it cannot reach half a threshold: of what promises less to first order it says nothing
         told = {h.name: h for h in declared if h.statistic < 0.5 * detector.thresholds[h.family]}
         exact |= {name: told[name] for name, h in exact.items() if name in told and h.statistic <= 0.0}
@@ -132,9 +130,8 @@ def _limits(detector: Detector, accepted: Sequence[Accepted]) -> dict[str, float
     """Per family the statistic that a name needs beside the accepted ones, whose misfits look like causes."""
     policy = detector.policy
     misfits = policy.misfit * max((a.statistic for a in accepted if a.units), default=0.0)
-    return {
-        name: max((policy.later if accepted else 1.0) * value, misfits) for name, value in detector.thresholds.items()
-    }
+    times = policy.later if accepted else 1.0
+    return {name: max(times * value, misfits) for name, value in detector.thresholds.items()}
 
 
 def _passing(
@@ -145,11 +142,12 @@ def _passing(
     left = [h for h in ranked if (h.family, h.name) not in refused]
     if not any(h.statistic > limits[h.family] for h in left):
         return []
-    used = sum(len(a.units) for a in accepted)
+    used, named = sum(len(a.units) for a in accepted), [a.hypothesis for a in accepted]
+    again = {(h.family, h.name, h.when.name) for h in named}
     return [
         h for h in left
         if h.statistic > detector.policy.named * limits[h.family] and used + h.batch.q <= K
-        and not _again(h, accepted) and not _reads(detector.study, h, accepted)
+        and (h.family, h.name, h.when.name) not in again and not _reads(detector.study, h, accepted)
     ]  # fmt: skip
 
 
@@ -188,11 +186,6 @@ def _starts(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis
     return [grown(h, seen.g, block, policy), *([] if cold is None else [cold])]
 
 
-def _again(h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
-    return any(h.family == a.hypothesis.family and h.name == a.hypothesis.name and h.when.name == a.hypothesis.when.name
-               for a in accepted)  # fmt: skip
-
-
 def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
     """Whether it is the loss of a source that reads a corrected signal: what the exact factor leaves there is misfit of
     a source that emits many times as much, and no cause beside it."""
@@ -203,17 +196,13 @@ def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
 
 
 def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:
-    """Causes that switch at one part, of several families or twice at one place: together they imitate a history
-    that none has."""
-    passing = [(a, _parts(study, a.hypothesis.name)) for a in accepted if a.hypothesis.when.windows and a.units]
+    """Causes that switch at one part, of several families or twice at one place: together they imitate a history."""
+    causes = [(a, a.hypothesis) for a in accepted if a.hypothesis.when.windows and a.units]
+    passing = [(a, h, _parts(study, h.name)) for a, h in causes]
     return [
-        a for a, own in passing
-        if any(own & other and b is not a and _differ(a.hypothesis, b.hypothesis) for b, other in passing)
+        a for a, h, own in passing
+        if any(own & other and b is not a and (h.family != g.family or h.name == g.name) for b, g, other in passing)
     ]  # fmt: skip
-
-
-def _differ(a: Hypothesis, b: Hypothesis) -> bool:
-    return a.family != b.family or a.name == b.name
 
 
 def _restless(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
@@ -278,13 +267,8 @@ def _rivals(
     detector: Detector, fitted: Fitted, chosen: Hypothesis, ranked: Sequence[Hypothesis]
 ) -> tuple[tuple[Hypothesis, float], ...]:
     """Other explanations nearly as likely, with their cosines."""
-    others, seen = [], {(chosen.family, chosen.name, chosen.batch.kind)}
     near = max(detector.policy.rival, detector.policy.misfit * chosen.statistic)
-    for h in sorted(ranked, key=lambda h: -h.statistic):
-        key = (h.family, h.name, h.batch.kind)
-        if key not in seen and h.statistic > max(chosen.statistic - near, 0.5 * detector.thresholds[h.family]):
-            seen.add(key)
-            others.append(h)
-    others = others[:8]
+    likely = [h for h in ranked if h.statistic > max(chosen.statistic - near, 0.5 * detector.thresholds[h.family])]
+    others = distinct([chosen, *sorted(likely, key=lambda h: -h.statistic)])[1:9]
     cosine = cosines(detector, fitted, [chosen, *others])
     return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(others))

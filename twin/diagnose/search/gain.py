@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.faults.readings import readings_of
+from twin.diagnose.faults.readings import COMPONENTS, readings_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.accepted import in_place, stepped, with_shifts
 from twin.diagnose.search.look import Search
-
-AXES = ("dx", "dy", "dz")
 
 
 @dataclass(frozen=True)
@@ -71,9 +69,8 @@ def gains(
         result.append(gain_of(sealed.name, name, "K", errors, sealed.bin_time, affected, rng, policy.block))
     for c in range(3 if len(sealed.tcp) else 0):
         errors = [sealed.tcp[:, c] - w[:, c] for _, w in models]
-        axis = AXES[c]
         affected = bool(_moved(errors) > policy.noticed * floors[1][c])
-        result.append(gain_of(sealed.name, axis, "m", errors, sealed.tcp_time, affected, rng, policy.block))
+        result.append(gain_of(sealed.name, COMPONENTS[c], "m", errors, sealed.tcp_time, affected, rng, policy.block))
     return tuple(result)
 
 

@@ -8,22 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import RIDGE, History, Hypothesis
+from twin.diagnose.evidence.batch import RIDGE, History, Hypothesis, prepared, score
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.machine.effects.effect import Window
 
 
 def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis:
-    """A hypothesis that acts in one window, with further windows of the same size where the data ask for them.
+    """A hypothesis in one window with further windows of the same size where the data ask for them, the best first.
 
-    block (L, L): D^T Pi D among the columns of its place. Greedy: the window that brings most, then again.
+    block (L, L): D^T Pi D among the columns of its place.
     """
     if h.when.bell is not None:
         return _elsewhere(h, g, block, policy)
     if len(h.when.windows) == 0 or h.batch.fixed or not fault_of(h).grows:
         return h
-    own = g[h.batch.columns[h.place]]
+    alone = replace(h.batch, places=(h.name,), columns=h.batch.columns[h.place : h.place + 1])
     others = [w for w in h.batch.histories if w.windows]
     W = np.stack([w.weights for w in others])  # (h, q, L)
     current = h
@@ -32,33 +32,25 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy 
         free = np.flatnonzero((np.abs(W) * np.abs(now)).sum(axis=(1, 2)) == 0.0)
         if not len(free):
             break
-        union = W[free] + now
-        num = np.einsum("hql,l->hq", union, own)
-        F = np.einsum("hql,lm,hrm->hqr", union, block, union, optimize=True)
-        scale = np.trace(F, axis1=1, axis2=2)[:, None, None] * RIDGE + 1e-12
-        inverse = np.linalg.inv(F + scale * np.eye(h.batch.q))
-        a = np.einsum("hqr,hr->hq", inverse, num)
-        statistic = np.einsum("hq,hq->h", num, a)
-        statistic = np.where(np.abs(a[:, 0]) < h.batch.smallest, 0.0, statistic)
-        if h.batch.sign:
-            statistic = np.where(h.batch.sign * a[:, 0] < 0.0, 0.0, statistic)
-        k = int(np.argmax(statistic))
-        if statistic[k] < current.statistic + max(policy.growth, policy.growth_share * current.statistic):
+        unions = tuple(History("", now + W[k]) for k in free)
+        ready = prepared(replace(alone, histories=unions), block[None])
+        scores = score(ready, g)
+        k = int(np.argmax(scores.statistic))
+        statistic = float(scores.statistic[0, k])
+        if statistic < current.statistic + max(policy.growth, policy.growth_share * current.statistic):
             break
         more = others[int(free[k])]
         windows = tuple(sorted((*current.when.windows, *more.windows), key=lambda w: (w.run, w.start)))
         name = " and ".join(f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" for w in windows)
-        when = History(f"from {name}", union[k], windows=windows)
-        information = float(1.0 / max(inverse[k, 0, 0], 1e-30))
-        current = Hypothesis(h.batch, h.place, when, float(statistic[k]), tuple(map(float, a[k])), information)
+        when, a = replace(unions[k], name=f"from {name}", windows=windows), scores.amplitude[0, k]
+        current = Hypothesis(h.batch, h.place, when, statistic, tuple(map(float, a)), float(ready.information[0, k]))
     return current
 
 
 def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis | None:
     """A coolant in the windows that plain cold likes best; None where it has those, or heat explains more than cold.
 
-    A score takes a film as linear, in which cold and film cancel over hours that have neither: a window that
-    is far too long can then lead. What a coolant takes away is cold, whatever its film.
+    In a score cold and a linear film cancel over hours that have neither, and a window that is far too long can lead.
     """
     if not fault_of(h).wets or len(h.when.windows) == 0:
         return None

@@ -1,7 +1,7 @@
 """Model discrepancy of channels that get far hotter than described: it grows with the response.
 
-A detector knows the model discrepancy of the described machine. A motor that gives off twice its heat is wrong by
-twice as much wherever that heat goes, and would be called by the name of whatever looks most like the rest.
+A detector knows the model discrepancy of the described machine. A motor that gives off twice its heat is wrong by twice
+as much wherever that heat goes, and would be called by the name of whatever looks most like the rest.
 """
 
 from __future__ import annotations
@@ -28,11 +28,8 @@ def hotter(detector: Detector, x: np.ndarray) -> Detector:
 
 def _rise(study: Study, flat: np.ndarray, least: tuple[float, float]) -> np.ndarray:
     """(m,) for every number the rms rise of its channel in its run, at least `least`."""
-    parts, first = [], 0
-    for k in study.fitted:
-        planned = study.runs[k]
-        own = planned.split(flat[first : first + planned.size])
-        first += planned.size
+    parts = []
+    for _, *own in study.split(flat):
         for values, floor in zip(own, least, strict=True):
             if len(values):
                 rms = np.sqrt(((values - values[0]) ** 2).mean(axis=0))

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 
 from twin.diagnose.evidence.batch import Hypothesis, best
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight, sight
 from twin.diagnose.evidence.unknown import Heat, evidence
+from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.lost import lost_candidates
-from twin.diagnose.search.accepted import Accepted, readings_columns
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.search.accepted import Accepted, curved_change, readings_columns
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.sizes import sized_candidates
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,7 @@ class Search:
         return float(self.left[good].sum()) / max(int(good.sum()), 1)
 
 
-@dataclass(frozen=True)
-class Scored:
-    """All hypotheses that a detector has, at one fit."""
-
-    seen: Sight
-    hypotheses: tuple[Hypothesis, ...]
+Scored = tuple[Sight, list[Hypothesis]]  # all hypotheses that a detector has, at one fit
 
 
 def scored(detector: Detector, fitted: Fitted) -> Scored:
@@ -70,41 +67,57 @@ def scored(detector: Detector, fitted: Fitted) -> Scored:
     seen = sight(detector.columns, fitted.projector, white)
     lost = lost_candidates(detector.lost, detector.columns.batches, fitted.projector, white)
     sized = sized_candidates(detector, fitted.projector, white)
-    return Scored(seen, (*best(seen.ready, seen.g), *lost, *sized))
+    return seen, [*best(seen.ready, seen.g), *lost, *sized]
 
 
 def look(
     detector: Detector, fitted: Fitted, more: Sequence[Hypothesis] = (), known: Scored | None = None
 ) -> tuple[Sight, list[Hypothesis], Step]:
     """All hypotheses there and some more, the best of every family and place first. known: the scores at this fit."""
-    known = scored(detector, fitted) if known is None else known
-    seen = known.seen
-    ranked = _distinct(sorted([*known.hypotheses, *more], key=lambda h: -h.statistic))
+    seen, hypotheses = scored(detector, fitted) if known is None else known
+    ranked = distinct(sorted([*hypotheses, *more], key=lambda h: -h.statistic))
     top = ranked[:10]
     return seen, ranked, Step(tuple(top), cosines(detector, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
 
 
-def _distinct(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The best of every family, place and kind."""
-    seen: set[tuple[str, str, str]] = set()
-    result = []
+def distinct(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The first of every family, place and kind."""
+    first = dict[tuple[str, str, str], Hypothesis]()
     for h in ranked:
-        key = (h.family, h.name, h.batch.kind)
-        if key not in seen:
-            seen.add(key)
-            result.append(h)
-    return result
-
-
-def _direction(detector: Detector, h: Hypothesis) -> np.ndarray:
-    """(m,) white response at the fitted amplitudes."""
-    return np.asarray(readings_columns(detector, h) @ np.array(h.amplitude))
+        first.setdefault((h.family, h.name, h.batch.kind), h)
+    return list(first.values())
 
 
 def cosines(detector: Detector, fitted: Fitted, hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+    """(n, n) of the white responses at the fitted amplitudes."""
     if not hypotheses:
         return np.zeros((0, 0))
-    D = np.stack([_direction(detector, h) for h in hypotheses], axis=1)
+    D = np.stack([readings_columns(detector, h) @ np.array(h.amplitude) for h in hypotheses], axis=1)
     gram = D.T @ fitted.projector(D)
     size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
     return np.asarray(np.clip(gram / np.outer(size, size), -1.0, 1.0))
+
+
+def sized_candidates(detector: Detector, projector: Projector, white: np.ndarray) -> list[Hypothesis]:
+    """Plays, clocks and lags that would explain white residuals (m,), at sizes that the bank of columns does not know:
+    their responses change in shape with their size, not in height."""
+    tried = [
+        Hypothesis(batch, i, batch.histories[0], 0.0, (size,), 0.0)
+        for batch in detector.columns.batches
+        for sizes in [fault_of(batch).sizes]
+        for i in range(len(batch.places) if sizes else 0)
+        for size in sizes
+    ]
+    if not tried:
+        return []
+    D = detector.whiten(np.column_stack([curved_change(detector, h, h.amplitude[0], None) for h in tried]))
+    # all at once: N is large, and would be read twice for each of them
+    B = projector.N.T @ np.column_stack([D, white])
+    half = scipy.linalg.solve_triangular(projector.factor[0], B, lower=True)
+    explained = white @ D - half[:, -1] @ half[:, :-1]  # D^T Pi r
+    own = (D**2).sum(axis=0) - (half[:, :-1] ** 2).sum(axis=0)  # D^T Pi D
+    return [
+        replace(h, statistic=float(2.0 * g - F), information=float(F) / h.amplitude[0] ** 2)
+        for h, g, F in zip(tried, explained, own, strict=True)
+        if 2.0 * g > F
+    ]

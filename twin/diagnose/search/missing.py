@@ -1,9 +1,8 @@
 """What moves the tool may be no part of the model: members that follow what is logged (docs/members.md).
 
-Tried where displacements hold an effect that nothing in the catalogue explains, or a fault of the reading of the tool
-alone. The members are fitted beside the model as it was delivered, must halve what the model leaves otherwise, must
-predict stretches that they were not fitted to, and must not make the sealed runs worse. The description gets them as
-nodes; of a machine of parts they stand beside the parts.
+Tried where displacements hold an effect that nothing in the catalogue explains, or a fault of their own reading alone.
+Members are fitted beside the model as delivered, must halve what it leaves otherwise, must predict stretches that they
+were not fitted to, and must not make sealed runs worse. The description gets them as nodes, beside the parts if any.
 """
 
 from __future__ import annotations
@@ -19,8 +18,9 @@ from twin.calibrate.members.find import Found, beside_model, left_by, rows_besid
 from twin.calibrate.members.responses import duration
 from twin.calibrate.members.select import SURE, Joined
 from twin.diagnose.faults.missing_member import FAMILY
+from twin.diagnose.faults.readings import COMPONENTS
 from twin.diagnose.result.diagnosis import Cause, Gain
-from twin.diagnose.search.gain import AXES, gain_of, predicted
+from twin.diagnose.search.gain import gain_of, predicted
 from twin.diagnose.search.look import Search
 from twin.errors import TwinError
 from twin.logs.run import Run
@@ -78,7 +78,7 @@ def _cause(j: Joined, members: Found) -> Cause:
     own = [m for m in members.members if m.candidate.driver.column == j.name]
     weight = np.array([abs(float(m.expansion[axis])) for m in own])
     lag = float(weight @ [m.candidate.lag for m in own] / max(float(weight.sum()), 1e-30))
-    history = f"most along {AXES[axis]}, with a lag of {duration(lag)} in the mean"
+    history = f"most along {COMPONENTS[axis]}, with a lag of {duration(lag)} in the mean"
     return Cause(
         family=FAMILY.name, place=f"signals.{j.name}", parameter="", amplitude=float(j.moves[at]),
         ci95=(float("nan"), float("nan")), unit="m", statistic=2.0 * j.gain, threshold=2.0 * SURE, history=history,
@@ -88,7 +88,7 @@ def _cause(j: Joined, members: Found) -> Cause:
 def _note(members: Found, refused: str) -> str:
     s = members.selected
     figures = ", ".join(
-        f"{AXES[a]} {1e6 * after:.2g} um in place of {1e6 * before:.2g} um"
+        f"{COMPONENTS[a]} {1e6 * after:.2g} um in place of {1e6 * before:.2g} um"
         for a, before, after in zip(members.axes, s.alone, s.held_out, strict=True)
     )
     others = [j.name for j in s.joined if not j.sure]
@@ -97,13 +97,10 @@ def _note(members: Found, refused: str) -> str:
     return f"missing members: left of stretches that they were not fitted to, rms: {figures}{more}{where}"
 
 
-def _recalibrated(found: Search, k: int, m: Measured) -> np.ndarray:
-    return m.tcp - found.detector.study.runs[k].split(predicted(found, k).recalibrated)[1]
-
-
-def _left(found: Search, k: int, m: Measured) -> np.ndarray:
-    """What is left with the causes that were found, and without any where there are none."""
-    return m.tcp - found.detector.study.runs[k].split(predicted(found, k).extended)[1]
+def _left(found: Search, k: int, m: Measured, extended: bool = True) -> np.ndarray:
+    """(k, 3) m that the recalibrated model leaves of run k, with the causes that were found or without."""
+    own = predicted(found, k)
+    return m.tcp - found.detector.study.runs[k].split(own.extended if extended else own.recalibrated)[1]
 
 
 def _rms(m: Measured, error: np.ndarray, axes: Sequence[int]) -> np.ndarray:
@@ -118,16 +115,15 @@ def _gains(
     found: Search, artefact: Artefact, members: Found, plans: Sequence[Measured], runs: Sequence[Run],
     sealed: Sequence[Run], seed: int,
 ) -> tuple[Gain, ...]:  # fmt: skip
-    rng = np.random.default_rng(seed)
-    result = []
+    rng, block, result = np.random.default_rng(seed), found.detector.policy.block, list[Gain]()
     for k, run in enumerate(sealed, start=len(runs)):
         m = plans[k]
         if not len(m.tcp):
             continue
         delivered, extended = errors_of(members, artefact, run)
-        errors = [delivered, _recalibrated(found, k, m), extended]
+        errors = [delivered, _left(found, k, m, extended=False), extended]
         result += [
-            gain_of(m.name, AXES[c], "m", [e[:, c] for e in errors], m.tcp_time, True, rng, found.detector.policy.block)
+            gain_of(m.name, COMPONENTS[c], "m", [e[:, c] for e in errors], m.tcp_time, True, rng, block)
             for c in members.axes
         ]
     return tuple(result)

@@ -31,162 +31,92 @@ def _rule(value: float, origin: Origin, meaning: str, unit: str = "") -> Any:
 class SearchPolicy:
     """What a search decides by; without a unit: shares, factors, counts."""
 
-    chance: float = _rule(
-        3.0, DERIVED, "by which what is left is more than noise and model discrepancy", "standard deviations"
-    )
-    excess: float = _rule(0.25, LUMPED, "of what is left beyond them, which a cause must explain")
-    dispersed: float = _rule(
-        3.0, LUMPED, "of what is left per measured number, above which it becomes slow errors of single channels"
-    )
+    # a model that is wrong in its form, and members that it lacks
+    chance: float = _rule(3.0, DERIVED, "by which what is left is more than chance", "standard deviations")
+    excess: float = _rule(0.25, LUMPED, "of what is left beyond noise and model discrepancy: a cause must explain it")
+    dispersed: float = _rule(3.0, LUMPED, "of what is left per measured number, from which it becomes slow errors")
     beside: float = _rule(0.5, LUMPED, "of what is left beside these, which a cause must explain")
     slow_rows: int = _rule(12, JUDGED, "of a channel in a run, from which a slow error is learned")
     slow_longest: float = _rule(0.98, JUDGED, "of neighbours: four hours of 5 min, of runs of a day", "correlation")
-    slow_least: float = _rule(
-        1.0, DERIVED, "of a mode of slow errors: what has less than noise changes nothing", "variances of noise"
-    )
-    halves: float = _rule(
-        0.5,
-        JUDGED,
-        "of what the recalibrated model leaves of displacements: missing members, of many numbers, leave less",
-    )
-    predicts: float = _rule(
-        0.7, JUDGED, "of what the model alone leaves of stretches left out: missing members leave less of them"
-    )
+    slow_least: float = _rule(1.0, DERIVED, "of a mode of slow errors: less than noise is none", "variances of noise")
+    halves: float = _rule(0.5, JUDGED, "of what the recalibrated model leaves of displacements: members leave less")
+    predicts: float = _rule(0.7, JUDGED, "of what the model leaves of stretches left out: members leave less")
     rows: int = _rule(24, JUDGED, "of displacements, four hours of one in ten minutes, that missing members need")
     worst: int = _rule(3, JUDGED, "sensors that are told where a model is too poor")
+    # what is named
     causes: int = _rule(3, JUDGED, "at most that are named together")
     tries: int = _rule(3, FIVE_AXIS, "rounds of candidates that the exact model refuses")
     ahead: int = _rule(12, JUDGED, "of those that pass, how many get further windows before the best is chosen")
     named: float = _rule(0.7, FIVE_AXIS, "share of its own threshold that a name needs where another one passes")
-    stands: float = _rule(
-        0.5, FIVE_AXIS, "share of its threshold that a cause must explain beside the others, and of the least size"
-    )
+    stands: float = _rule(0.5, FIVE_AXIS, "of its threshold, and of the least size, that a cause keeps beside others")
     switches: int = _rule(
-        4,
-        FIVE_AXIS,
-        "windows in which a cause switches at one place: what does so more often has a history that no name tells",
+        4, FIVE_AXIS, "windows of a cause at one place: of more the history is one that no name tells"
     )
     few: int = _rule(2, FIVE_AXIS, "windows that a cause may have and still leave heat where it is")
     left: float = _rule(0.5, FIVE_AXIS, "of the threshold of heat of any history: what windows may leave of it")
-    misfit: float = _rule(
-        0.003, DERIVED, "of what a cause explains: a response that is wrong by a twentieth leaves 0.05^2 of it"
-    )
-    later: float = _rule(
-        2.5,
-        FIVE_AXIS,
-        "times its threshold that a cause beside another one needs: the first one's misfits look like causes",
-    )
+    misfit: float = _rule(0.003, DERIVED, "of what a cause explains: a response wrong by a twentieth leaves 0.05^2")
+    later: float = _rule(2.5, FIVE_AXIS, "times its threshold that a cause beside another needs, whose misfits look so")
     covers: float = _rule(0.9, FIVE_AXIS, "of the evidence for heat of any history that a name must explain")
     rival: float = _rule(10.0, JUDGED, "within which another explanation is a rival", "likelihood-ratio units")
     entrants: int = _rule(5, FIVE_AXIS, "candidates of a kind that are refitted")
     behind: float = _rule(0.15, FIVE_AXIS, "of the leader: who scores less cannot overtake it by being refitted")
-    saturates: float = _rule(
-        0.4, FIVE_AXIS, "of the leader, for capacities and coolants' films: the larger they are, the worse is linearity"
-    )
+    saturates: float = _rule(0.4, FIVE_AXIS, "of the leader, for capacities and coolants: linearity is worse there")
     edge: float = _rule(4.0, FIVE_AXIS, "that an edge gains where nothing is hidden", "likelihood-ratio units")
-    amplitude: float = _rule(
-        8.0, FIVE_AXIS, "that a second amplitude costs: of a coolant beside plain heat", "likelihood-ratio units"
+    amplitude: float = _rule(8.0, FIVE_AXIS, "that a second amplitude costs", "likelihood-ratio units")
+    gone: float = _rule(-0.7, JUDGED, "of a conductance that is nearly gone, and always refitted", "relative change")
+    bends: float = _rule(
+        2.5, FIVE_AXIS, "by which only something hidden moves a parameter", "prior standard deviations"
     )
-    gone: float = _rule(
-        -0.7, JUDGED, "of a conductance, linearly: it is nearly gone, and always refitted", "relative change"
-    )
-    bends: float = _rule(2.5, FIVE_AXIS, "that only something hidden moves a parameter by", "prior standard deviations")
     growth: float = _rule(12.0, JUDGED, "that another window must bring", "likelihood-ratio units")
-    growth_share: float = _rule(
-        0.05,
-        FIVE_AXIS,
-        "and the least share of what the others explain: a strong cause has misfits that windows imitate",
-    )
+    growth_share: float = _rule(0.05, FIVE_AXIS, "and of what the others explain: windows imitate a cause's misfits")
     most_windows: int = _rule(8, JUDGED, "of one cause")
-    closely: int = _rule(
-        3,
-        FIVE_AXIS,
-        "factors that are looked at again where their parameters are; those of a signal too, fitted exactly",
-    )
+    # declared numbers and signals
+    closely: int = _rule(3, FIVE_AXIS, "factors that are fitted where their parameters are; of a signal exactly")
     signals: int = _rule(2, FIVE_AXIS, "of which any factor is fitted exactly")
-    pulled: float = _rule(
-        2.5,
-        FIVE_AXIS,
-        "by which data without its tolerance must tell a number from the declared one",
-        "standard deviations",
-    )
-    beyond: float = _rule(
-        3.0,
-        FIVE_AXIS,
-        "that a number out of its tolerance keeps beside any other explanation",
-        "prior standard deviations",
-    )
+    pulled: float = _rule(2.5, FIVE_AXIS, "that data tell a number from the declared one by", "standard deviations")
+    beyond: float = _rule(3.0, FIVE_AXIS, "that a loose number keeps beside any other", "prior standard deviations")
     outside: float = _rule(1.0, DERIVED, "the declared tolerance itself", "prior standard deviations")
-    alone: float = _rule(
-        0.5, LUMPED, "of its limit that the settled calibration moves a number of which the other fit alone is sure"
-    )
-    nearly: float = _rule(
-        0.75, LUMPED, "from which the surrogate of the settled calibration says little of a size", "of a bound"
-    )
-    sure: float = _rule(
-        1.96, DERIVED, "of its own that a number without its tolerance is off: its 95 % interval", "standard deviations"
-    )
-    alike: float = _rule(
-        0.9,
-        FIVE_AXIS,
-        "of what a signal's factor and a declared number do, from which the one may be the other",
-        "cosine",
-    )
+    alone: float = _rule(0.5, LUMPED, "of its limit that settling moves a number of which the other fit alone is sure")
+    nearly: float = _rule(0.75, LUMPED, "of a bound, from which the surrogate of the settled calibration says little")
+    sure: float = _rule(1.96, DERIVED, "of its own, of a 95 % interval", "standard deviations")
+    alike: float = _rule(0.9, FIVE_AXIS, "of a signal's factor and a declared number that it may be", "cosine")
     same: float = _rule(0.998, FIVE_AXIS, "the same for a signal that nothing else reads", "cosine")
-    distant: float = _rule(
-        1.0,
-        FIVE_AXIS,
-        "of a source, beyond which derivatives of the described machine say little",
-        "logarithm of a factor",
-    )
+    distant: float = _rule(1.0, FIVE_AXIS, "of a source, beyond which derivatives say little", "logarithm of a factor")
     form: float = _rule(0.1, FIVE_AXIS, "of a source, that model discrepancy takes", "logarithm of a factor")
-    faint: float = _rule(
-        0.2, FIVE_AXIS, "of what explains most: a declared number that scores less leaves that, whatever it is freed to"
-    )
-    roughly: float = _rule(
-        2.0,
-        FIVE_AXIS,
-        "times the linear estimate of what the data determine: a number that may come out so sure is freed",
-    )
+    faint: float = _rule(0.2, FIVE_AXIS, "of what explains most: a declared number that scores less leaves that")
+    roughly: float = _rule(2.0, FIVE_AXIS, "times what data determine to first order: as sure may a freed number be")
     far: int = _rule(2, FIVE_AXIS, "numbers that are freed, each alone: the farthest may be another one's doing")
     others: int = _rule(12, JUDGED, "other explanations that are looked at")
-    hotter: float = _rule(
-        1.4, FIVE_AXIS, "times the described rise of a channel: parameters within their tolerances stay below"
-    )
+    hotter: float = _rule(1.4, FIVE_AXIS, "times the described rise of a channel: within tolerances it stays below")
+    rise_temperature: float = _rule(1.0, JUDGED, "rms of a described rise that a ratio is taken to, at least", "K")
+    rise_displacement: float = _rule(5e-6, JUDGED, "the same of the TCP", "m")
+    # verdicts, limits and gains
     apart: float = _rule(
-        10.0, JUDGED, "that LR (1 - cos^2) must exceed for two causes to be distinguished", "likelihood-ratio units"
+        10.0, JUDGED, "of LR (1 - cos^2) of two causes that are distinguished", "likelihood-ratio units"
     )
-    close: float = _rule(
-        6.0,
-        JUDGED,
-        "within which a rival of another family, or another part, makes a verdict ambiguous",
-        "likelihood-ratio units",
-    )
+    close: float = _rule(6.0, JUDGED, "within which a rival makes a verdict ambiguous", "likelihood-ratio units")
     power: float = _rule(1.645, DERIVED, "one-sided 95 %, of a detection limit", "standard deviations")
-    remainder: float = _rule(
-        0.35, JUDGED, "of the evidence for unknown heat before all names: the share that may be left beside them"
-    )
+    remainder: float = _rule(0.35, JUDGED, "of the evidence for heat before all names, that may be left beside them")
     block: float = _rule(7200.0, JUDGED, "of the bootstrap", "s")
     noticed: float = _rule(0.5, JUDGED, "of a channel's noise, by which causes must move it to count as affected")
     thermocouple: float = _rule(0.1, JUDGED, "noise of a sensor that no fitted run has", "K")
+    # iterations
     passes: int = _rule(3, SOLVER, "of an exact refit without edges")
     window_passes: int = _rule(8, SOLVER, "of one with edges")
     read_passes: int = _rule(6, SOLVER, "of what is read and not in proportion to its size")
-    held: int = _rule(
-        2, SOLVER, "in which a coolant's heat and edges are found for its usual film, before all are free"
-    )
-    trial: int = _rule(4, SOLVER, "by which coolants are compared before the best of them are refitted")
+    held: int = _rule(2, SOLVER, "passes that find a coolant's heat and edges for its usual film, before all are free")
+    trial: int = _rule(4, SOLVER, "passes by which coolants are compared before the best of them are refitted")
     enough: float = _rule(0.02, SOLVER, "that a pass moves it by when it has arrived", "of a size")
     less: float = _rule(1.0, SOLVER, "a pass that changes less is the last", "likelihood-ratio units")
     less_share: float = _rule(1e-3, SOLVER, "of a statistic, a pass that changes less is the last")
     near: float = _rule(1.0, SOLVER, "longest step of parameters in an exact refit", "prior standard deviations")
     lowest_change: float = _rule(
-        -0.97, SOLVER, "from -0.98 on the integration holds a conductance, and no derivative is left", "relative change"
+        -0.97, SOLVER, "of a conductance: at -0.98 the integration holds it", "relative change"
     )
     highest_change: float = _rule(20.0, SOLVER, "beyond the range of every conductance", "relative change")
     aside: float = _rule(0.1, SOLVER, "by which what is read and curved is moved for its derivative", "of a size")
     first_order_passes: int = _rule(4, SOLVER, "of a fit beside a change that is known")
-    exact_passes: int = _rule(3, SOLVER, "likewise of the model with a corrected signal")
+    exact_passes: int = _rule(3, SOLVER, "of a fit of the model with a corrected signal")
     wide: float = _rule(1e3, SOLVER, "that an accepted amplitude may take: as good as free", "standard deviations")
     refits: int = _rule(10, SOLVER, "passes of all causes together")
     longest: float = _rule(0.7, SOLVER, "longest step", "logarithm of a factor")
@@ -194,11 +124,8 @@ class SearchPolicy:
     refit_less: float = _rule(0.5, SOLVER, "a pass that changes less is the last", "likelihood-ratio units")
     anew: int = _rule(5, SOLVER, "passes in which derivatives beyond all bounds are made anew")
     rises: int = _rule(2, SOLVER, "passes in a row that make it worse, after which it runs away")
-    rise_temperature: float = _rule(1.0, JUDGED, "rms of a described rise that a ratio is taken to, at least", "K")
-    rise_displacement: float = _rule(5e-6, JUDGED, "likewise of the TCP", "m")
-    edge_prior: float = _rule(
-        1800.0, DERIVED, "standard deviation of an edge about the hour that the search found: half an hour's block", "s"
-    )
+    # what the shape of a cause leaves open
+    edge_prior: float = _rule(1800.0, DERIVED, "standard deviation of an edge: half an hour's block", "s")
     edge_step: float = _rule(1800.0, SOLVER, "longest step of an edge", "s")
     exponent: float = _rule(0.12, JUDGED, "standard deviation of a signal's exponent about the one of the catalogue")
     longer: float = _rule(1800.0, JUDGED, "standard deviation of the length of a bell that was fitted", "s")

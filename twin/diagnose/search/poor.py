@@ -1,7 +1,5 @@
-"""A model too poor to diagnose (`twin.diagnose.search.dispersion`): what would help.
-
-The useful answer is where the model fits worst, when, and which piece would help first: of all bodies that follow one
-logged column with one lag, the one that resembles most what is left there.
+"""A model too poor to diagnose (`twin.diagnose.search.dispersion`): where it fits worst, when, and which body that
+follows one logged column with one lag resembles most what is left there.
 """
 
 from __future__ import annotations
@@ -57,15 +55,10 @@ def poor_note(
     for k, m in enumerate(plans[: len(runs)]):
         flat = predicted(found, k).extended
         errors.append(m.temperature - found.detector.study.runs[k].split(flat)[0])
-    rms = np.nan_to_num(_rms(errors))
+    rms = np.nan_to_num(np.sqrt(np.nanmean(np.concatenate(errors) ** 2, axis=0)))  # K, of sensors over all runs
     worst = [int(i) for i in np.argsort(-rms)[: policy.worst] if rms[i] > sigma]
     pieces = [_piece(sensors[i], i, float(rms[i]), errors, plans, runs).words for i in worst]
     return f"{told}; fits worst: {'; '.join(pieces)}" if pieces else told
-
-
-def _rms(errors: Sequence[np.ndarray]) -> np.ndarray:
-    """(s,) K over all runs."""
-    return np.asarray(np.sqrt(np.nanmean(np.concatenate(errors) ** 2, axis=0)))
 
 
 def _piece(
@@ -73,13 +66,10 @@ def _piece(
 ) -> Piece:
     worst, at, hour = 0.0, 0, 0.0
     for k, (error, m) in enumerate(zip(errors, plans, strict=False)):
-        hours = ((m.bin_time - m.bin_time[0]) // 3600.0).astype(int) if len(m.bin_time) else np.zeros(0, dtype=int)
+        hours = ((m.bin_time - m.bin_time[:1]) // 3600.0).astype(int)
         for h in np.unique(hours):
-            square = (
-                float(np.nanmean(error[hours == h, column] ** 2))
-                if np.isfinite(error[hours == h, column]).any()
-                else 0.0
-            )
+            own = error[hours == h, column]
+            square = float(np.nanmean(own**2)) if np.isfinite(own).any() else 0.0
             if square > worst:
                 worst, at, hour = square, k, float(h)
     tried = [c for c in candidates(drivers_of(runs)) if c.driver.column != sensor]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Hypothesis
-from twin.diagnose.evidence.consistency import sizes
+from twin.diagnose.evidence.consistency import sizes as sizes_by_run
 from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.evidence.formal import of_channels
 from twin.diagnose.faults.acted import slots_with
@@ -26,6 +25,7 @@ from twin.diagnose.search.accepted import (
     jacobian,
     readings_columns,
     shifted,
+    spans,
 )
 from twin.diagnose.search.contest import lowest, solved
 from twin.diagnose.search.detector import Detector
@@ -33,32 +33,15 @@ from twin.diagnose.search.edges import shape_errors
 from twin.diagnose.search.policy import SearchPolicy
 
 
-@dataclass(frozen=True)
-class _Pass:
-    """A pass, at the parameters and amplitudes that it began with."""
-
-    misfit: float
-    x: np.ndarray
-    amplitude: np.ndarray
-    J: np.ndarray
-    D: np.ndarray
-    F: np.ndarray
-    errors: np.ndarray
-    residual: np.ndarray
-    f: np.ndarray
-    there: np.ndarray
-    white: np.ndarray
-
-
 def refit(
     detector: Detector, y: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted]
 ) -> tuple[Fitted, list[Accepted]]:
     """Parameters and all amplitudes with the exact model. The residual has the accepted causes in its projector."""
-    study, fitter = detector.study, detector.fitter
+    study, fitter, policy = detector.study, detector.fitter, detector.policy
     low, high = bounds(study)
     units = [u for a in accepted for u in a.units]
     open_shapes = [
-        u for a in accepted if a.units for u in shape_errors(study, a.hypothesis, a.units, a.amplitude, detector.policy)
+        u for a in accepted if a.units for u in shape_errors(study, a.hypothesis, a.units, a.amplitude, policy)
     ]
     open_shapes = open_shapes[: K - len(units)]
     slots = [slots_with(study, detector.elements, [*units, *open_shapes], k) for k in study.fitted] if units else []
@@ -68,23 +51,22 @@ def refit(
     D = np.zeros((len(y), len(amplitude)))
     y = exchanged(study, y, accepted)
     swapped = np.concatenate([np.full(len(a.amplitude), fault_of(a.hypothesis).exchanges) for a in accepted])
-    gains = gains_of(study, accepted)
+    gains, of_each = gains_of(study, accepted), spans(accepted)
     priors = [fault_of(a.hypothesis).prior(len(a.amplitude)) for a in accepted]
     mean, inverse_prior = (np.concatenate(p) for p in zip(*priors, strict=True))
     floor = np.concatenate([lowest(detector, a.hypothesis) for a in accepted])
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
     x = x.copy()
     x[held] = 0.0
-    misfit, rises = np.inf, 0
-    best: _Pass | None = None
+    misfit, rises, least = np.inf, 0, np.inf
+    best: Any = None  # the pass with the least misfit, at the parameters and amplitudes that it began with
     J = np.zeros((len(y), len(x)))
-    for i in range(detector.policy.refits):
+    for i in range(policy.refits):
         there = shifted(study, x, gains, amplitude)
-        J = jacobian(detector, x, _sizes(accepted, amplitude), None if i < detector.policy.anew else J)
-        first, bent = 0, np.zeros(len(y))
-        for a in accepted:
-            own = slice(first, first + len(a.amplitude))
-            first = own.stop
+        sizes = [(a.hypothesis, float(amplitude[own.start])) for a, own in zip(accepted, of_each, strict=True)]
+        J = jacobian(detector, x, sizes, None if i < policy.anew else J)
+        bent = np.zeros(len(y))
+        for a, own in zip(accepted, of_each, strict=True):
             fault = fault_of(a.hypothesis)
             if fault.curved:
                 size = float(amplitude[own][0])
@@ -102,10 +84,10 @@ def refit(
             parts = [study.by_amplitudes(k, there, slot, now) for k, slot in zip(study.fitted, slots, strict=True)]
             f = np.concatenate([p for p, _ in parts])
             every = np.vstack([d for _, d in parts])
-            exact, shapes = every[:, : len(units)], every[:, len(units) : len(units) + len(open_shapes)]
+            exact, shapes = every[:, : len(units)], every[:, len(units) :]
             D[:, stepped] = detector.whiten(exact)
         else:
-            f = np.concatenate([study.outputs(k, there) for k in study.fitted])
+            f = study.all_outputs(there)
             exact = shapes = np.zeros((len(y), 0))
         residual = y - f + J @ x + exact @ amplitude[stepped] + bent
         white = detector.whiten(residual)
@@ -120,60 +102,38 @@ def refit(
         step = float((np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))).max(initial=0.0))
         left = white - D @ amplitude
         before, misfit = misfit, float(left @ projector(left))
-        if best is None or misfit < best.misfit:
-            best = _Pass(misfit, x, amplitude, J, D.copy(), F, errors, residual, f, there, white)
-        x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted, detector.policy))
+        if misfit < least:
+            least, best = misfit, (x, amplitude, J, D.copy(), F, errors, residual, f, there, white)
+        x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted, policy))
         # parameters that the data hardly determine drift on for long, and nothing gets better
-        rises = rises + 1 if misfit > before + detector.policy.refit_less else 0
-        if (
-            step < detector.policy.still and misfit > before - detector.policy.refit_less
-        ) or rises == detector.policy.rises:
+        rises = rises + 1 if misfit > before + policy.refit_less else 0
+        if (step < policy.still and misfit > before - policy.refit_less) or rises == policy.rises:
             break
-    if (
-        best is not None and misfit > best.misfit + detector.policy.refit_less
-    ):  # it has not arrived: what curves strongly swings about
-        x, amplitude, J, D, F = best.x, best.amplitude, best.J, best.D, best.F
-        errors, residual, f, there = best.errors, best.residual, best.f, best.there
-        white, projector = best.white, fitter.projector(J, errors)
+    if misfit > least + policy.refit_less:  # it has not arrived: what curves strongly swings about
+        x, amplitude, J, D, F, errors, residual, f, there, white = best
+        projector = fitter.projector(J, errors)
     inverse = np.linalg.pinv(F)
-    ends = np.cumsum([0, *(len(a.amplitude) for a in accepted)]).tolist()
-    alone = sizes(projector.N, D, white, _rows(study), ends[:-1])
+    alone = sizes_by_run(projector.N, D, white, study.rows, [own.start for own in of_each])
     result = [
-        replace(a, amplitude=amplitude[i:j], covariance=inverse[i:j, i:j], by_run=of_runs)
-        for a, of_runs, (i, j) in zip(accepted, alone, pairwise(ends), strict=True)
+        replace(a, amplitude=amplitude[own], covariance=inverse[own, own], by_run=of_runs)
+        for a, of_runs, own in zip(accepted, alone, of_each, strict=True)
     ]
-    more = np.hstack([detector.policy.wide * D * np.sqrt(np.diag(inverse)), errors])
-    bare = np.concatenate([study.outputs(k, there) for k in study.fitted]) if units else f
+    more = np.hstack([policy.wide * D * np.sqrt(np.diag(inverse)), errors])
+    bare = study.all_outputs(there) if units else f
     return Fitted(x, J, residual, fitter.projector(J, more), f - bare, more), result
-
-
-def _rows(study: Study) -> list[slice]:
-    """The rows of every fitted run."""
-    ends = np.cumsum([0, *(study.runs[k].size for k in study.fitted)]).tolist()
-    return [slice(i, j) for i, j in pairwise(ends)]
 
 
 def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], amplitude: np.ndarray) -> np.ndarray:
     """(m, k) white: what channels may show of causes in the machine beside what the model says."""
-    parts, first = [np.zeros((len(D), 0))], 0
-    for a in accepted:
-        own = slice(first, first + len(a.amplitude))
-        first = own.stop
-        if a.units:
-            parts.append(of_channels(study, D[:, own] @ amplitude[own]))
-    return np.hstack(parts)
-
-
-def _sizes(accepted: Sequence[Accepted], amplitude: np.ndarray) -> list[tuple[Hypothesis, float]]:
-    """Every cause with its first amplitude."""
-    first = np.cumsum([0, *(len(a.amplitude) for a in accepted)])
-    return [(a.hypothesis, float(amplitude[i])) for a, i in zip(accepted, first, strict=False)]
+    stepped = [own for a, own in zip(accepted, spans(accepted), strict=True) if a.units]
+    return np.hstack([np.zeros((len(D), 0)), *(of_channels(study, D[:, own] @ amplitude[own]) for own in stepped)])
 
 
 def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted], policy: SearchPolicy) -> np.ndarray:
     """Amplitudes after a step; factors move by their logarithms, of which a step is no longer than LONGEST."""
-    result, first = found.copy(), 0
-    for a in accepted:
+    result = found.copy()
+    for a, own in zip(accepted, spans(accepted), strict=True):
+        first = own.start
         fault, old, new = fault_of(a.hypothesis), before[first], found[first]
         if fault.curve is Curve.RELATIVE:
             old = max(old, policy.lowest_change)  # what a score says beyond it would be an exchange the wrong way
@@ -183,5 +143,4 @@ def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted]
             result[first] = np.clip(new, old - policy.longest, old + policy.longest)
         elif fault.curved:
             result[first] = np.clip(new, old - 0.5 * abs(old), old + 0.5 * abs(old))
-        first += len(a.amplitude)
     return result

@@ -1,10 +1,9 @@
 """The sealed runs judge the headline: what names a cause in the machine must predict runs that were not looked at.
 
-It never makes a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But a cause
-of the machine that makes more of the channels that it moves worse than better, beyond chance, has explained the runs
-that were looked at and not the machine, and its name is withdrawn. Where another size that the runs that were looked
-at allow makes more of them better than worse, the run refutes the size alone: the name stays, and nothing is written
-into the description. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
+It never makes a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But causes of
+the machine that make more of the channels that they move worse than better, beyond chance, are withdrawn. Where another
+size that the data allow makes more of them better than worse, the run refutes the size alone: the name stays, and
+nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
 calibration makes of it without its tolerance. A number that calibration alone moved out of its tolerance is judged
 beside the calibration that keeps it in.
 """
@@ -21,11 +20,10 @@ from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
-from twin.diagnose.search.accepted import Accepted, freed
+from twin.diagnose.search.accepted import Accepted, freed, settled
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.gain import gains
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.settled_beside import settled
 from twin.diagnose.search.verdict import CALIBRATED
 
 
@@ -105,12 +103,11 @@ def other_sizes(found: Search, y: np.ndarray) -> Iterator[tuple[Accepted, ...]]:
     """The causes with sizes that the runs that were looked at allow besides the told ones."""
     detector = found.detector
     yield tuple(_smallest(a, detector.policy.sure) for a in found.accepted)
-    numbers = freed(detector.study, found.accepted[0].hypothesis)
-    if len(found.accepted) == 1 and numbers:
-        x, _ = settled_alone(detector.fitter, y, numbers)
-        change = float(x[numbers[0]] * detector.study.scale[numbers[0]])
-        size = np.expm1(change) if fault_of(found.accepted[0].hypothesis).conducts else change
-        yield (replace(found.accepted[0], amplitude=np.array([size])),)
+    one = found.accepted[0]
+    for j in freed(detector.study, one.hypothesis) if len(found.accepted) == 1 else ():
+        x, _ = settled_alone(detector.fitter, y, (j,))
+        size, _ = fault_of(one.hypothesis).amplitude(float(x[j] * detector.study.scale[j]))
+        yield (replace(one, amplitude=np.array([size])),)
 
 
 def _smallest(a: Accepted, sure: float) -> Accepted:

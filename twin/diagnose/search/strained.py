@@ -5,7 +5,7 @@ It is the verdict where freeing it leaves nothing, or so little that a discrepan
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,12 +19,11 @@ from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.loss_law import is_source
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns
+from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import beginning, bent, exact, misfit, misfit_of_each
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search, Step, look
 from twin.diagnose.search.refit import refit
-from twin.diagnose.search.settled_beside import settled
 
 
 def closed(
@@ -51,13 +50,11 @@ def closed(
         return None
     # both begin at the declared number: what either explains is the same but for what is left
     fits = {h.name for h in declared if h.statistic > removed - detector.policy.rival}
-    rivals = tuple(
-        (Hypothesis(batch, i, batch.histories[0], one.statistic, (1.0,), 0.0), 1.0)
-        for batch in detector.columns.batches if fault_of(batch).corrects
-        for i, name in enumerate(batch.places)
-        if _does_the_same(detector, detector.columns.raw[:, batch.columns[i, 0]].astype(float), one, name in fits)
-    )  # fmt: skip
     (j,) = freed(detector.study, one.hypothesis)
+    rivals = tuple(
+        (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in _factors(detector, j)
+        if _does_the_same(detector, one, cosine, heat, h.name in fits)
+    )  # fmt: skip
     amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
     one = replace(
         one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals,
@@ -71,12 +68,11 @@ def closed(
 
 
 def loose_ones(detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.ndarray) -> tuple[Loose, ...]:
-    """The FAR declared numbers farthest out of their tolerance, by two calibrations; settled (n,).
+    """The declared numbers farthest out of their tolerance, `far` at most, by two calibrations; settled (n,).
 
     Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
-    by the settled calibration, or by the fit that finds causes where the other goes half as far. The former takes a
-    channel of a run for one number and is sure of no film of a heavy body; the latter knows how bodies warm up and cool
-    down, and takes for that what else differs there.
+    by the settled calibration, or by the fit that finds causes where the other goes `alone` of its limit. The former is
+    sure of no film of a heavy body; the latter takes for it what else differs in how bodies warm up and cool down.
     """
     strain, by_settling = detector.pulls.strain(fitted.x, settled), detector.pulls.settled.strain(settled)
     found = []
@@ -115,84 +111,67 @@ def _signals(
 ) -> tuple[tuple[Hypothesis, float], ...]:
     """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says; with
     the source's own statistic, as they do the same."""
-    study = detector.study
-    if not is_source(study.probed.parameters[j]):
+    if not is_source(detector.study.probed.parameters[j]):
         return ()
-    n, scale = len(study.probed.parameters), float(study.scale[j])
-    own = detector.whiten(detector.fitter.surrogate.at(np.zeros(n))[1][:, j]) / scale
-    size, found = float(own @ own), []
+    policy, scale = detector.policy, float(detector.study.scale[j])
+    return tuple(
+        (replace(h, statistic=statistic), cosine) for h, cosine, heat in _factors(detector, j)
+        if abs(cosine) >= policy.same and heat > 0.0 and abs(np.log(heat) - scale * x) < policy.sure * scale * sigma
+    )  # fmt: skip
+
+
+def _factors(detector: Detector, j: int) -> Iterator[tuple[Hypothesis, float, float]]:
+    """Exact factors of signals: with the cosine of what each and a declared number do, and times what heat, were that
+    number a source's, each multiplies it by."""
+    own = detector.whiten(detector.fitter.surrogate.at(np.zeros(len(detector.study.scale)))[1][:, j])
+    own = own / detector.study.scale[j]
+    size = float(own @ own)
     for batch in detector.columns.batches:
         for i, _ in enumerate(batch.places if fault_of(batch).corrects else ()):
             signal = detector.columns.raw[:, batch.columns[i, 0]].astype(float)
             along = float(signal @ own)
             cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
-            heat = 1.0 + along / size
-            if (
-                abs(cosine) >= detector.policy.same
-                and heat > 0.0
-                and abs(np.log(heat) - scale * x) < detector.policy.sure * scale * sigma
-            ):
-                found.append((Hypothesis(batch, i, batch.histories[0], statistic, (1.0,), 0.0), float(cosine)))
-    return tuple(found)
+            yield Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), float(cosine), 1.0 + along / size
 
 
 def _size(one: Accepted, loose: Loose, detector: Detector) -> tuple[float, float]:
-    """The amplitude of a number out of its tolerance as the settled calibration has it without one, and its variance.
-
-    The fit that finds causes leaves to model discrepancy what looks like it, and frees the number to make up for that.
-    But it knows sizes beyond the parameter's bounds, where the settled one ends, and steps the exact model there; and
-    it alone knows those of which the settled one is not sure.
-    """
+    """The amplitude of a number out of its tolerance, and its variance, of the settled calibration: the other fit
+    leaves to model discrepancy what looks like it. But that knows sizes beyond the bounds, and those of which the
+    settled one is not sure."""
     study = detector.study
     scale = float(study.scale[loose.index])
     low, high = (detector.policy.nearly * float(ends[loose.index]) for ends in bounds(study))
     if not loose.settled or not low < loose.x < high:
         return float(one.amplitude[0]), float(one.covariance[0, 0])
-    change, sigma = scale * loose.x, scale * loose.sigma
-    if not fault_of(one.hypothesis).conducts:
-        return change, sigma**2
-    return float(np.expm1(change)), float(np.exp(2.0 * change) * sigma**2)
+    amplitude, sigma = fault_of(one.hypothesis).amplitude(scale * loose.x, scale * loose.sigma)
+    return amplitude, sigma**2
 
 
-def _does_the_same(detector: Detector, signal: np.ndarray, one: Accepted, fits: bool) -> bool:
+def _does_the_same(detector: Detector, one: Accepted, cosine: float, heat: float, fits: bool) -> bool:
     """Whether a factor of a signal does what a declared number does: it is read there, and nearly nowhere else.
 
-    signal (m,): its white response. Where it does not fit as it stands (fits), it may do so far from the description:
-    derivatives made there say little. It must then do just what a source does, and be of the fitted size.
+    Where it does not fit to first order (fits), it must do just what a source does (cosine, heat: see `_factors`), and
+    be of the fitted size, far from the description.
     """
-    (j,) = freed(detector.study, one.hypothesis)
-    n = len(detector.study.probed.parameters)
-    own = detector.whiten(detector.fitter.surrogate.at(np.zeros(n))[1][:, j]) / detector.study.scale[j]
-    along, size = float(signal @ own), float(own @ own)
-    if abs(along) < (detector.policy.alike if fits else detector.policy.same) * np.sqrt(size * float(signal @ signal)):
-        return False
     if fits:
-        return True
-    heat = 1.0 + along / size  # times what the source emits
+        return abs(cosine) >= detector.policy.alike
     factor = float(one.amplitude[0])
     sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), detector.policy.form * factor))
     far = fault_of(one.hypothesis).parameter and abs(factor) > detector.policy.distant
-    return far and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
+    return far and abs(cosine) >= detector.policy.same and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
 
 
 def _stays(detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[Hypothesis]) -> bool:
     """Whether a declared number is as far out of its tolerance beside any of the others, to first order."""
     (j,) = freed(detector.study, one.hypothesis)
-    white = detector.whiten(fitted.residual)
-    return all(
-        abs(
-            detector.fitter.projector(
-                fitted.J, detector.policy.wide * _unit(readings_columns(detector, h))
-            ).most_likely(white)[j]
-        )
-        > detector.policy.beyond
-        for h in others
-    )
+    policy, white = detector.policy, detector.whiten(fitted.residual)
 
+    def beside(h: Hypothesis) -> float:
+        columns = readings_columns(detector, h)
+        free = policy.wide * columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30)
+        return float(detector.fitter.projector(fitted.J, free).most_likely(white)[j])
 
-def _unit(columns: np.ndarray) -> np.ndarray:
-    """Columns (m, q) of length one."""
-    return np.asarray(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30))
+    return all(abs(beside(h)) > policy.beyond for h in others)
 
 
 def _weak(detector: Detector, ranked: Sequence[Hypothesis], misfits: float) -> bool:
@@ -204,10 +183,9 @@ def strained(
     detector: Detector, y: np.ndarray, fitted: Fitted, loose: Sequence[Loose],
     glance: tuple[Sight, list[Hypothesis], Step],
 ) -> tuple[Fitted, Accepted] | None:  # fmt: skip
-    """Of the declared numbers out of their tolerance the one that leaves least, freed of it.
-
-    None if there is none, or what was seen at a glance explains so much more that it would be left.
-    """
+    """Of the declared numbers out of their tolerance the one that leaves least, freed of it; None if there is none, or
+    what was seen at a glance explains so much more that it would be left."""
+    policy = detector.policy
     strain = {own.index: own.strain for own in loose}
     found = []
     for batch in detector.columns.batches:
@@ -216,8 +194,8 @@ def strained(
             if (j := parameter_of(detector.study, name)) is None or j not in strain:
                 continue
             always = next(h for h in batch.histories if not h.windows)
-            size = fault.amplitude(float(fitted.x[j] * detector.study.scale[j]))
-            likelihood = float((detector.policy.pulled * strain[j]) ** 2)
+            size, _ = fault.amplitude(float(fitted.x[j] * detector.study.scale[j]))
+            likelihood = float((policy.pulled * strain[j]) ** 2)
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(detector.study.scale[j] ** -2.0)))
     seen, ranked, _ = glance
     most = ranked[0].statistic if ranked else 0.0
@@ -225,15 +203,12 @@ def strained(
     for h in sorted(found, key=lambda h: -h.statistic):
         # a film many times as large scores hardly anything by its derivative, nor does what a fit has reached: that may
         # leave as much as its own discrepancy makes
-        likely = fault_of(h).faint or _scored(detector, fitted, seen, h) > detector.policy.faint * most
-        if (
-            not likely
-            and detector.policy.roughly * (1.0 - detector.policy.covers) * _told_alone(detector, fitted, h) < most
-        ):
+        likely = fault_of(h).faint or _scored(detector, fitted, seen, h) > policy.faint * most
+        if not likely and policy.roughly * (1.0 - policy.covers) * _told_alone(detector, fitted, h) < most:
             continue
         made = _freed(detector, y, fitted, h)
         if made and (
-            likely or ((1.0 - detector.policy.covers) * made[1].statistic > most and misfit(detector, made[0]) < before)
+            likely or ((1.0 - policy.covers) * made[1].statistic > most and misfit(detector, made[0]) < before)
         ):
             freed_ones.append(made)
     return min(freed_ones, key=lambda made: misfit(detector, made[0]), default=None)
@@ -256,19 +231,15 @@ def _told_alone(detector: Detector, fitted: Fitted, h: Hypothesis) -> float:
 
 
 def _freed(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
-    """The fit with a declared number at any value.
-
-    None where it has run to where it changes nothing or beyond what physics has, or where the data alone leave it
-    within its tolerance.
-    """
-    one = Accepted(
-        h, units_of(detector.study, h), np.array(h.amplitude), np.eye(1), h.statistic, detector.policy.pulled**2, ()
-    )
-    fitted, (one,) = refit(detector, y, beginning(fitted.x, detector.policy), [one])
+    """The fit with a declared number at any value; None where that changes nothing, is beyond what physics has, or lies
+    within the tolerance."""
+    policy = detector.policy
+    one = Accepted(h, units_of(detector.study, h), np.array(h.amplitude), np.eye(1), h.statistic, policy.pulled**2, ())
+    fitted, (one,) = refit(detector, y, beginning(fitted.x, policy), [one])
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
     if not sigma > 0.0 or not h.batch.possible(h.place, change):
         return None
-    if fault_of(h).conducts:  # as a logarithm: derivatives at many times a film say little of the film itself
-        change, sigma = float(np.log1p(change)), sigma / (1.0 + change)
+    # as a logarithm: derivatives at many times a film say little of the film itself
+    change, sigma = fault_of(h).log_change(change, sigma)
     statistic = (change / sigma) ** 2
     return (fitted, replace(one, statistic=statistic)) if statistic >= max(one.threshold, detector.least) else None

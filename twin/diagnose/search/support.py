@@ -1,21 +1,19 @@
 """Which channels a cause rests on: their shares of its statistic, and over how many of them it spreads.
 
-With white residual r and response d = D a of a cause, LR = d^T Pi r is a sum over rows, hence over channels. Their
-participation ratio (sum s)^2 / sum s^2 is the number of channels that carry it: one where a single sensor decides, n
-where n do alike (Bell, Dean, Discuss. Faraday Soc. 50, 1970). It decides nothing: it says how narrow a name stands.
+With white residual r and response d of a cause, LR = d^T Pi r is a sum over channels, whose participation ratio (sum
+s)^2 / sum s^2 is the number of them that carry it (Bell, Dean, Discuss. Faraday Soc. 50, 1970). It decides nothing.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from twin.diagnose.faults.readings import COMPONENTS
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.place import Support
 from twin.diagnose.search.accepted import Accepted, jacobian, read_change, readings_columns
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search
-
-COMPONENTS = ("dx", "dy", "dz")
 
 
 def support_of(found: Search) -> Support | None:
@@ -39,14 +37,9 @@ def _change(detector: Detector, a: Accepted, x: np.ndarray) -> np.ndarray:
 
 
 def _shared(study: Study, rows: np.ndarray) -> Support | None:
-    """From the terms (m,) of a statistic. Terms of both signs cancel in a sum: channels that speak against a cause
-    carry nothing of it."""
+    """From the terms (m,) of a statistic: channels that speak against a cause carry nothing of it."""
     total: dict[str, float] = {}
-    first = 0
-    for k in study.fitted:
-        planned = study.runs[k]
-        T, w = planned.split(rows[first : first + planned.size])
-        first += planned.size
+    for planned, T, w in study.split(rows):
         for names, values in ((planned.measured.sensors, T), (COMPONENTS, w)):
             for name, value in zip(names, values.sum(axis=0), strict=True):
                 total[name] = total.get(name, 0.0) + float(value)

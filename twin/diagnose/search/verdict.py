@@ -25,10 +25,7 @@ CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it
 
 
 def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
-    """A cause as reports and edits take it: factors as factors, differences as differences.
-
-    The interval counts that the model's own form is wrong (`Fault.own`).
-    """
+    """A cause as reports and edits take it. The interval counts that the model's own form is wrong (`Fault.own`)."""
     h, fault = a.hypothesis, fault_of(a.hypothesis)
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), fault.uncertain(value)))
@@ -87,11 +84,6 @@ def _reading(h: Hypothesis) -> str:
     return f"one reading of {signal} beside an instrument, or what the drive's manual says it logs"
 
 
-def _part(name: str) -> str:
-    """What a place belongs to: the first part of its name, or all of a name of the description."""
-    return Spot.read(name).owner
-
-
 def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tuple[Cause, ...]]:
     """The verdict, and the causes it rests on."""
     entries = {f.name: f for f in families}
@@ -102,28 +94,23 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     relaxed = [a.statistic for a in found.accepted if freed(found.detector.study, a.hypothesis)]
     before = max([*found.steps[0].parts.values(), *relaxed], default=0.0)
     causes = tuple(cause_of(a, found.detector.study, found.detector.policy) for a in found.accepted)
-    if (
-        left > thresholds["unknown"]
-        and (not causes or left > policy.remainder * before)
-        and not _more_alike(found, left)
-    ):
+    much = left > thresholds["unknown"] and (not causes or left > policy.remainder * before)
+    if much and not _more_alike(found, left):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
         return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
     if not causes:
         if found.poor:  # whose parameters go wherever they hide its form
             return "too_poor", ()
-        strained = strained_of(found)
-        if not strained:
+        if not (strained := strained_of(found)):
             return "nothing", ()
         return "ambiguous" if strained[0].rivals else "out_of_tolerance", strained
-    lead, chosen = causes[0], found.accepted[0]
+    chosen, lead = found.accepted[0], found.accepted[0].hypothesis
     for other, cosine in chosen.rivals:
-        more = policy.amplitude * (other.batch.q - chosen.hypothesis.batch.q)
-        near = other.statistic - more > chosen.hypothesis.statistic - policy.close
-        apart = min(chosen.hypothesis.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
-        same = other.family == lead.family and _part(other.name) == _part(chosen.hypothesis.name)
-        if same and chosen.hypothesis.when.signal and other.when.name != chosen.hypothesis.when.name:
-            same = False
+        more = policy.amplitude * (other.batch.q - lead.batch.q)
+        near = other.statistic - more > lead.statistic - policy.close
+        apart = min(lead.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
+        alike = other.family == lead.family and Spot.read(other.name).owner == Spot.read(lead.name).owner
+        same = alike and not (lead.when.signal and other.when.name != lead.when.name)
         # a number that its tolerance tells has passed no threshold, nor need what does all that it does
         least = min(thresholds[other.family], chosen.statistic) if relaxed else thresholds[other.family]
         if near and not apart and not same and other.statistic >= least:
@@ -132,17 +119,17 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     others = [c for c in causes if groups.get(c.family) != "sensor"]
     if not others:
         return "sensor", causes
-    lead = others[0]
-    if groups.get(lead.family) == "signal":
+    first = others[0]
+    if groups.get(first.family) == "signal":
         return "signal", causes
-    declared = lead.family in entries and entries[lead.family].declared and not lead.windows and not lead.signal
-    whole = Spot.read(lead.place).declared
+    declared = first.family in entries and entries[first.family].declared and not first.windows and not first.signal
+    whole = Spot.read(first.place).declared
     return ("out_of_tolerance" if declared and whole else "named"), causes
 
 
 def _more_alike(found: Search, left: float) -> bool:
-    """Whether a search ended with as many causes as it takes, all of a family that comes part by part, and one more of
-    them explains what is left: a body that was warm has more parts than that, and nothing about it is unknown."""
+    """Whether as many causes as a search takes are all of a family that comes part by part, and one more of them
+    explains what is left: nothing about a body that was warm is unknown."""
     alike = {(a.hypothesis.family, Spot.read(a.hypothesis.name).within) for a in found.accepted}
     best, policy = next(iter(found.steps[-1].ranked), None), found.detector.policy
     return (
@@ -197,11 +184,8 @@ def unknown_of(found: Search) -> Unknown | None:
 
 def _moves(change: np.ndarray, study: Study) -> tuple[np.ndarray, np.ndarray]:
     """(n,) K and (n,) m: rms over its run of the sensor, and the TCP component, that a column (m, n) changes most."""
-    T, w, first = np.zeros(change.shape[1]), np.zeros(change.shape[1]), 0
-    for k in study.fitted:
-        planned = study.runs[k]
-        of_run = planned.split(change[first : first + planned.size])
-        first += planned.size
+    T, w = np.zeros(change.shape[1]), np.zeros(change.shape[1])
+    for _, *of_run in study.split(change):
         for most, values in zip((T, w), of_run, strict=True):
             if values.size:
                 np.maximum(most, np.sqrt(np.mean(np.square(values), axis=0)).max(axis=0), out=most)
@@ -222,8 +206,7 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
     ]  # fmt: skip
     for a in found.accepted:
         change, spread = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
-        if fault_of(a.hypothesis).conducts:
-            change, spread = float(np.log1p(change)), spread / (1.0 + change)
+        change, spread = fault_of(a.hypothesis).log_change(change, spread)
         for j in freed(study, a.hypothesis):  # held at its declared value in x
             p, pull = study.probed.parameters[j], change / float(study.scale[j])
             pulls[j] = Pull(p.path, p.nominal, p.value(pull), spread / float(study.scale[j]), pull, p.unit, freed=True)
@@ -238,8 +221,8 @@ def with_faults(
 
 
 def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
-    """Of every batch whose size is free (p, h): the size that would have been named in 95 of 100 cases, as amplitudes
-    are (relative changes, logarithms of factors), at each place with each history."""
+    """Of every batch whose size is free (p, h): the amplitude that would have been named in 95 of 100 cases, at each
+    place with each history."""
     _, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
     for own in sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J))).ready:
         if not own.batch.fixed:
