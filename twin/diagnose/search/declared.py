@@ -126,7 +126,8 @@ def _promising(detector: Detector, y: np.ndarray, of: Callable[[Fault], bool]) -
     """Those of some faults and their white responses (m,), to first order, first those that leave least beside the
     description."""
     f, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
-    projector, white, found = detector.fitter.projector(J), detector.whiten(y - f)[:, None], []
+    projector, white = detector.fitter.projector(J), detector.whiten(y - f)[:, None]
+    found: list[tuple[float, Hypothesis, np.ndarray]] = []
     for batch in (b for b in detector.columns.batches if of(fault_of(b))):
         D = detector.columns.raw[:, batch.columns[:, 0]].astype(float)
         remains = ((white - D) * projector(white - D)).sum(axis=0)

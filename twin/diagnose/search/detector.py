@@ -65,8 +65,8 @@ class _Made:
     pulls: Pulls
 
     @property
-    def made(self) -> list[Any]:
-        return [getattr(self, f.name) for f in fields(_Made)]
+    def made(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(_Made)}
 
 
 @dataclass(frozen=True)
@@ -100,12 +100,14 @@ class StoredDetector(_Made):
     def of(self, study: Study, policy: SearchPolicy) -> Detector:
         """The detector of a study that differs from the one it was made for in its measured values alone."""
         fitter = Fitter(study, self.surrogate, Whitener(study, self.channels), self.others)
-        return Detector(*self.made, study, fitter, policy)
+        return Detector(**self.made, study=study, fitter=fitter, policy=policy)
 
 
 def stored(detector: Detector) -> StoredDetector:
     fitter = detector.fitter
-    return StoredDetector(*detector.made, fitter.surrogate, fitter.whiten.channels, fitter.others)
+    return StoredDetector(
+        **detector.made, surrogate=fitter.surrogate, channels=fitter.whiten.channels, others=fitter.others
+    )
 
 
 _Nulls = tuple[Fitter, list[np.ndarray], Instruments, Form, Differences]  # what they are made and fitted with
