@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[st
     found = [*_own(faults), *frozen]
     if table is not None:
         told = [(k, f.channels[0], f.first_time) for k, f in leaps if len(f.channels) == 1]
-        found += [f for f in refuted(table, told) if f.what != "leap" or _leaps(plain[f.runs[0]], f)]
+        found += filter(partial(_shown, plain), refuted(table, told))
     return Judgement(
         tuple(f for f in found if within is None or set(f.channels) & set(within)),
         tuple((k, f) for k, f in faults if f.kind == "splice"),
@@ -67,11 +68,13 @@ def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:
     return found
 
 
-def _leaps(run: Run, f: Finding) -> bool:
-    """Whether a channel leaps by as much as all others say, to KNOWN, from one reading to the next about its start: a
-    sensor that a warm nut comes to rises as far, but takes its time."""
-    assert run.temperatures is not None
-    time, values = run.temperatures.time, run.temperatures.columns[f.channels[0]]
+def _shown(runs: Sequence[Run], f: Finding) -> bool:
+    """Whether a finding is no leap, or one whose channel leaps by as much as all others say, to KNOWN, from one reading
+    to the next about its start: a sensor that a warm nut comes to rises as far, but takes its time."""
+    table = runs[f.runs[0]].temperatures
+    if f.what != "leap" or table is None:
+        return True
+    time, values = table.time, table.columns[f.channels[0]]
     known = np.flatnonzero(np.isfinite(values) & (np.abs(time - f.start) <= NEAR))
     sign = np.sign(f.size)
     steps = sign * np.diff(values[known])
