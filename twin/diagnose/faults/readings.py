@@ -23,14 +23,13 @@ from scipy.signal import lfilter
 
 from twin.diagnose.faults.elements import Key
 from twin.diagnose.model.bank import Nominal
-from twin.diagnose.model.study import Planned, Study
+from twin.diagnose.model.study import COMPONENTS, Planned, Study
 from twin.physics.play import play as follower
 from twin.rom.apply import member_mean
 
 Add = Callable[[Key, Sequence[np.ndarray]], None]  # a column in parts, one per fitted run
 
 WIDTH, NARROW = 4e-6, 0.5e-6  # m
-COMPONENTS = ("dx", "dy", "dz")
 DAY = 86400.0  # s
 SET_GAP = 600.0  # s: rows closer than that belong to one measurement
 

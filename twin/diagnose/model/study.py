@@ -21,6 +21,7 @@ from twin.run.replay import at_rest
 from twin.run.system import Layout
 
 K = 4  # amplitudes that may be active at once
+COMPONENTS = ("dx", "dy", "dz")  # of the TCP, in the order of its columns
 NEARLY_NONE = 1e-6  # cosine of two heats in a reduced basis that have no place in common: rounding
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.faults.readings import COMPONENTS, readings_of
+from twin.diagnose.faults.readings import readings_of
 from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.accepted import in_place, stepped, with_shifts
 from twin.diagnose.search.look import Search

@@ -18,7 +18,7 @@ from twin.calibrate.members.find import Found, beside_model, left_by, rows_besid
 from twin.calibrate.members.responses import duration
 from twin.calibrate.members.select import SURE, Joined
 from twin.diagnose.faults.missing_member import FAMILY
-from twin.diagnose.faults.readings import COMPONENTS
+from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Cause, Gain
 from twin.diagnose.search.gain import gain_of, predicted
 from twin.diagnose.search.look import Search

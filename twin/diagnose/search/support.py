@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.diagnose.faults.readings import COMPONENTS
-from twin.diagnose.model.study import Study
+from twin.diagnose.model.study import COMPONENTS, Study
 from twin.diagnose.result.place import Support
 from twin.diagnose.search.accepted import Accepted, jacobian, read_change, readings_columns
 from twin.diagnose.search.detector import Detector
