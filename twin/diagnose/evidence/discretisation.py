@@ -6,10 +6,6 @@ finer elements, and with an inside for each heavy node; what both measure otherw
 share.
 
     y_other(x) - y(x) = d + D x,      share ~ N(0, 1)
-
-The error of a mesh or of a bar is made where elements are large beside a source or a pad, and what it does there to
-one sensor says little of what it does to another: every channel has a share of its own. What a node's inside does
-follows from the network, and its share is one.
 """
 
 from __future__ import annotations
@@ -21,7 +17,6 @@ import numpy as np
 
 from twin.build.mesh_error import OF_LINEAR
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.evidence.whiten import labels
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.model.surrogate import Surrogate, jacobian_of
@@ -49,21 +44,10 @@ class Difference:
 
     d: np.ndarray  # (m,) K, m, at the description
     D: np.ndarray  # (m, n) by parameters in prior standard deviations
-    share: np.ndarray  # (m,) which share each number has
 
     def at(self, x: np.ndarray) -> np.ndarray:
         """(m,) at parameters x (n,)."""
         return np.asarray(self.d + self.D @ x)
-
-    def drawn(self, x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """(m,) with drawn shares."""
-        return rng.standard_normal(self.share.max(initial=0) + 1)[self.share] * self.at(x)
-
-    def columns(self, spread: float) -> np.ndarray:
-        """(m, k) of unit prior variance: d by shares, and D where parameters have that spread."""
-        return np.column_stack(
-            [*(np.where(self.share == s, self.d, 0.0) for s in np.unique(self.share)), spread * self.D]
-        )
 
 
 def differences(
@@ -77,30 +61,28 @@ def differences(
     x = np.zeros(len(parameters))
     J = surrogate.J * surrogate.rate(x)
     found = []
-    for other, share, linear, apart in _others(machine):
+    for other, share, linear in _others(machine):
         known = [_acting(p, other) for p in parameters]
         probed = make_probed_model(other, known, runs, progress, linear)
         of_other = make_study(probed, plans, study.fitted)
         d, D = of_other.all_outputs(x) - surrogate.y0, jacobian_of(of_other, x) - J
-        channels = labels(study) if apart else np.zeros(len(d), dtype=int)
-        found.append(Difference(share * d, share * D, channels))
+        found.append(Difference(share * d, share * D))
     return tuple(found)
 
 
-def _others(machine: Machine) -> Iterator[tuple[Machine, float, bool, bool]]:
-    """Other discretisations: a machine, the share of its difference that is one standard deviation, whether it has
-    linear elements, and whether every channel has a share of its own."""
+def _others(machine: Machine) -> Iterator[tuple[Machine, float, bool]]:
+    """Other discretisations: a machine, the share of its difference that is one standard deviation, linear elements."""
     if not machine.lumped:
-        yield machine, OF_LINEAR, True, True
+        yield machine, OF_LINEAR, True
     if not machine.lumped and (moving := {n: c for n, c in machine.contacts.items() if c.kind == "moving"}):
         halved = {n: c.model_copy(update={"segments": FINER * c.segments}) for n, c in moving.items()}
-        yield machine.model_copy(update={"contacts": machine.contacts | halved}), OF_SEGMENTS, False, True
+        yield machine.model_copy(update={"contacts": machine.contacts | halved}), OF_SEGMENTS, False
     if machine.bars:
         finer = {n: b.model_copy(update={"elements": round(BARS * b.elements)}) for n, b in machine.bars.items()}
-        yield machine.model_copy(update={"bars": finer}), OF_BARS, False, True
+        yield machine.model_copy(update={"bars": finer}), OF_BARS, False
     for name in machine.nodes:
         if (split := with_inside(machine, name)) is not machine:
-            yield split, 1.0, False, False
+            yield split, 1.0, False
 
 
 def with_inside(machine: Machine, name: str) -> Machine:

@@ -12,7 +12,7 @@ import numpy as np
 
 from twin.build.workers import each
 from twin.diagnose.evidence.nulls import EXPONENTS, Form, winds
-from twin.diagnose.evidence.whiten import Whitener, labels
+from twin.diagnose.evidence.whiten import Whitener
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 from twin.progress import Progress, silent
@@ -82,7 +82,7 @@ def leading(white: np.ndarray) -> np.ndarray:
 
 def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.ndarray:
     """(m, k) columns of unit prior variance: every channel's own error of a white response (m,)."""
-    label = labels(study)
+    label = _labels(study)
     columns = [np.where(label == channel, share * white, 0.0) for channel in np.unique(label)]
     kept = [c for c in columns if np.linalg.norm(c) > LEAST]
     return np.stack(kept, axis=1) if kept else np.zeros((len(white), 0))
@@ -92,7 +92,7 @@ def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list
     """Per channel the leading directions of what sources and contacts do to it, in all runs."""
     heated = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
     white = whiten(form.reading * J[:, heated] / study.scale[heated])
-    label = labels(study)
+    label = _labels(study)
     result = []
     for channel in np.unique(label):
         rows = np.flatnonzero(label == channel)
@@ -101,6 +101,11 @@ def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list
         block[rows] = own
         result.append(block)
     return result
+
+
+def _labels(study: Study) -> np.ndarray:
+    """(m,) which channel every number is of: sensors by number, TCP components -1 to -3."""
+    return study.joined(lambda p: (p.measured.column, [-1, -2, -3]))
 
 
 def wind_columns(study: Study, form: Form, progress: Progress = silent) -> np.ndarray:

@@ -134,7 +134,7 @@ def null(
         parts.append(np.concatenate([T.ravel(), w.ravel()]))
     y = np.concatenate(parts)
     for difference in differences:
-        y = y + difference.drawn(x, rng)
+        y = y + rng.standard_normal() * difference.at(x)
     return y
 
 

@@ -82,11 +82,6 @@ def measured_of(study: Study) -> np.ndarray:
     return study.joined(lambda p: (p.measured.temperature, p.measured.tcp))
 
 
-def labels(study: Study) -> np.ndarray:
-    """(m,) which channel every number of the fitted runs is of: sensors by number, then the TCP components."""
-    return study.joined(lambda p: (p.measured.column, len(study.probed.base.sensors) + np.arange(3)))
-
-
 def offsets(study: Study) -> tuple[np.ndarray, tuple[str, ...]]:
     """(m, s) 1 K on one sensor in all fitted runs, and the names of these sensors."""
     names = tuple(dict.fromkeys(s for k in study.fitted for s in study.runs[k].measured.sensors))

@@ -181,7 +181,7 @@ def make_detector(
     described = described_forms(study, elements, nominal, raw, form)
 
     def fitter_of(whiten: Whitener, *modes: np.ndarray) -> Fitter:
-        discretised = [leading(whiten(o.columns(SPREAD))) for o in other]  # of each parameter, too
+        discretised = [leading(whiten(np.column_stack([o.d, SPREAD * o.D]))) for o in other]  # of each parameter, too
         known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
         return Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *discretised, known, *modes]))
 
