@@ -19,7 +19,7 @@ from twin.logs.stuck import frozen_throughout
 # Of normal noise: how far a reading typically (median) departs from the mean of its neighbours, in standard deviations
 _DEPARTS = 0.6745 * 1.5**0.5
 KNOWN = 0.5  # K, half of a 95 % interval: the tolerance of a good sensor (class B of IEC 60751 at 40 degC)
-NEAR = 1200.0  # s about the start of a leap or a swap: two bins of the judgement
+NEAR = 1200.0  # s about the start of a swap: two bins of the judgement
 
 
 @dataclass(frozen=True)
@@ -69,15 +69,13 @@ def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:
 
 
 def _shown(runs: Sequence[Run], f: Finding) -> bool:
-    """Whether a finding is no leap, or one whose channel leaps by as much as all others say, to KNOWN, from one reading
-    to the next about its start: a sensor that a warm nut comes to rises as far, but takes its time."""
+    """Whether a finding is no leap, or its channel moves as far as all others say, to KNOWN, from one reading to the
+    next: a sensor that a warm nut comes to rises as far, but takes its time."""
     table = runs[f.runs[0]].temperatures
     if f.what != "leap" or table is None:
         return True
-    time, values = table.time, table.columns[f.channels[0]]
-    known = np.flatnonzero(np.isfinite(values) & (np.abs(time - f.start) <= NEAR))
-    sign = np.sign(f.size)
-    steps = sign * np.diff(values[known])
+    values, sign = table.columns[f.channels[0]], np.sign(f.size)
+    steps = sign * np.diff(values[np.isfinite(values)])
     return bool(steps.max(initial=0.0) >= min(sign * end for end in f.interval) - KNOWN)
 
 
