@@ -77,7 +77,7 @@ class Detector(_Made):
     fitter: Fitter
     policy: SearchPolicy  # that it is searched with: no number of its own depends on it
     least: float = 0.0  # statistic that any cause needs, where the model is wrong in its form (`dispersion`)
-    poor: bool = False  # its model discrepancy holds what the model leaves of these very runs (`slow_errors`)
+    poor: bool = False  # its model discrepancy holds what the model leaves of these very runs (`dispersion`)
 
     @property
     def no_evidence(self) -> float:
