@@ -69,8 +69,8 @@ def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:
 
 
 def _shown(runs: Sequence[Run], f: Finding) -> bool:
-    """Whether a finding is no leap, or its channel moves as far as all others say, to KNOWN, from one reading to the
-    next: a sensor that a warm nut comes to rises as far, but takes its time."""
+    """Whether a finding is no leap, or its channel moves from one reading to the next as far as the nearer end of what
+    all others say, to KNOWN: a sensor that a warm nut comes to rises as far, but takes its time."""
     table = runs[f.runs[0]].temperatures
     if f.what != "leap" or table is None:
         return True
