@@ -14,8 +14,7 @@ from twin.build.place_training import EVERY, Shared, stepped
 from twin.build.places import pruned
 from twin.build.workers import each
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.model.integration import INNER
-from twin.diagnose.model.probed_model import ProbedModel, fine_drive, make_probed_model
+from twin.diagnose.model.probed_model import ProbedModel, drive_of, make_probed_model
 from twin.diagnose.model.rich_probed_model import rich_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.inject.draw.trial import draw
@@ -43,11 +42,11 @@ def rich(shared: Shared, place: str) -> np.ndarray:
 
 
 def window(study: Study, place: int) -> np.ndarray:
-    """(n_fine + 1, r) states of the window model, likewise; -1: at none."""
+    """(n + 1, r) states of the window model, likewise; -1: at none."""
     slots, x = study.slots(RUN), np.zeros(len(study.probed.parameters))
     n = len(slots.gate)
     if place >= 0:
-        slots.forcing[:, :, 0] = history(n * INNER).reshape(n, INNER, 1) * study.probed.B[place]
+        slots.forcing[:, 0] = history(n)[:, None] * study.probed.B[place]
     return study.states(RUN, x, slots, [1.0])
 
 
@@ -70,7 +69,7 @@ def main() -> None:
     plans = [measured(probed.base, run, b.drive, b.name) for run, b in zip(runs, probed.runs, strict=True)]
     study = make_study(probed, plans, range(2))
     base = pruned(model.rich)
-    drives = tuple(fine_drive(base, run, STEP) for run in runs)
+    drives = tuple(drive_of(base, run, STEP) for run in runs)
     starts = tuple(b.start for b in probed.runs)
     shared = Shared(model.rich, base, probed.parameters, probed.places, drives, starts)
     names = ["", *(p.name for p in probed.places)]

@@ -17,7 +17,7 @@ LITTLE = {"heat": 0.5, "film": 0.05, "joint": 2e-3, "contact": 5e-3, "capacity":
 
 
 def history(key, elements, study):
-    """Per run (n_fine,) of a column."""
+    """Per run (n,) of a column."""
     column = elements.columns[elements.index[key]]
     n = [planned.run.drive.n_steps for planned in study.runs]
     return tuple(np.zeros(k) if h is None else h for h, k in zip(column.histories, n, strict=True))

@@ -9,7 +9,7 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.faults.elements import histories_of
-from twin.diagnose.model.probed_model import _means, fine_drive
+from twin.diagnose.model.probed_model import _means, drive_of
 from twin.diagnose.model.study import Study
 from twin.logs.run import Run
 
@@ -39,7 +39,7 @@ def logged(step: float) -> Run:
 
 def means(run: Run) -> dict[str, np.ndarray]:
     base = small_case.probed().base
-    return _means(base, run, fine_drive(base, run))
+    return _means(base, run, drive_of(base, run))
 
 
 def test_a_cycle_within_a_step_is_seen():
@@ -66,7 +66,7 @@ def test_gaps_hold_the_last_value():
 def test_its_history_is_searched():
     study = small_case.study()
     runs = tuple(
-        replace(p, run=replace(p.run, signals=means(logged(1.0)), drive=fine_drive(study.probed.base, logged(1.0))))
+        replace(p, run=replace(p.run, signals=means(logged(1.0)), drive=drive_of(study.probed.base, logged(1.0))))
         for p in study.runs
     )
     histories = histories_of(Study(study.probed, study.effects, runs, study.fitted))
@@ -82,7 +82,7 @@ def test_of_rows_no_finer_than_a_step_the_one_in_the_middle_is_taken(step):
     columns = {name: 1.0 + rng.random(len(v)) for name, v in run.loads.columns.items()}
     columns["shop_air"][2] = np.nan
     run = replace(run, loads=replace(run.loads, columns=columns))
-    drive = fine_drive(small_case.probed().base, run)
+    drive = drive_of(small_case.probed().base, run)
     middle = (drive.time[:-1] + drive.time[1:]) / 2
     found = means(run)
     assert set(found) == set(columns)

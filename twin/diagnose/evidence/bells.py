@@ -39,7 +39,7 @@ def by_blocks(
 ) -> tuple[np.ndarray, tuple[Window, ...]]:
     """Levels (n_runs, n_blocks), a row per fitted run, and the windows of the blocks in the bell.
 
-    runs: name and fine step [s] of each fitted run; blocks: as `elements.Histories.blocks`.
+    runs: name and step [s] of each fitted run; blocks: as `elements.Histories.blocks`.
     """
     weights = np.zeros((len(runs), len(blocks)))
     windows = []

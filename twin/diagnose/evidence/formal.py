@@ -30,7 +30,7 @@ class Described:
 
     columns: np.ndarray  # (m, k) of unit prior variance
     slow: tuple[np.ndarray, ...]  # per film the columns of its coefficient in every block, of raw
-    blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first fine step, end)
+    blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first step, end)
 
 
 def known_forms(

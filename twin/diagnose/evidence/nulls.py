@@ -15,7 +15,6 @@ from scipy.signal import lfilter
 
 from twin.build.places import beside
 from twin.diagnose.evidence.discretisation import Difference
-from twin.diagnose.model.integration import INNER
 from twin.diagnose.model.study import Study, heated_places, own_place
 from twin.diagnose.result.spot import Spot
 from twin.machine.description import Machine
@@ -99,7 +98,6 @@ def null(
         n = slots.gate.shape[0]
         run = planned.run
         films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in probed.places])
-        air = run.drive.environment.reshape(n, INNER, -1)
         mean, apart = shared_by_film(study, local)
         least = convection(run.drive, len(load.films)).min(axis=0)
         A, M = np.zeros_like(body.A0), np.zeros(body.n)
@@ -107,19 +105,19 @@ def null(
             strength = apart[p] * least[films[p]]
             A += strength * probed.A[p]
             M += strength * probed.M[p]
-        rise = air[:, :, load.surroundings] - probed.base.reference_temperature
-        slow = _smooth(rng, n, len(load.films), form.shape_time / (INNER * (run.drive.time[1] - run.drive.time[0])))
+        rise = run.drive.environment[:, load.surroundings] - probed.base.reference_temperature
+        slow = _smooth(rng, n, len(load.films), form.shape_time / (run.drive.time[1] - run.drive.time[0]))
         wobble = mean + form.shape * slow + wind * winds(study, k, exponent)
-        forcing = np.zeros((n, INNER, body.n))
+        forcing = np.zeros((n, body.n))
         for j, vector in enumerate(split):
             if vector is not None:
-                forcing += _power(study, k, j)[:, :, None] * vector
-        fluctuation = _ornstein(rng, n * INNER, len(load.environments), form.air_time / 60.0) * form.air
+                forcing += _power(study, k, j)[:, None] * vector
+        fluctuation = _ornstein(rng, n, len(load.environments), form.air_time / 60.0) * form.air
         initial = form.start * rng.standard_normal() * body.one if not run.stated_start else np.zeros(body.n)
         initial = initial + form.start_apart * _body_starts(study, rng)
-        slots.A[0], slots.M[0], slots.E[0], slots.gate[:, 0], slots.rise[:, :, 0] = A, M, E, 1.0, rise
+        slots.A[0], slots.M[0], slots.E[0], slots.gate[:, 0], slots.rise[:, 0] = A, M, E, 1.0, rise
         slots.film[:, 0], slots.joint[:, 0], slots.contact[:, 0], slots.initial[0] = wobble, joint, contact, initial
-        slots.forcing[:, :, 0], slots.environment[:, :, 0] = forcing, fluctuation.reshape(n, INNER, -1)
+        slots.forcing[:, 0], slots.environment[:, 0] = forcing, fluctuation
         m = planned.measured
         states = study.states(k, x, slots, (1.0,))
         T, w = study.read(k, states, x)
@@ -146,10 +144,12 @@ def _ornstein(rng: np.random.Generator, n: int, columns: int, memory: float) -> 
 
 
 def _smooth(rng: np.random.Generator, n: int, columns: int, memory: float) -> np.ndarray:
-    """Unit Gaussian noise (n, columns), correlated as exp(-d^2 / (2 memory^2)) over d steps."""
-    steps = np.arange(n)
-    R = np.exp(-0.5 * ((steps[:, None] - steps) / memory) ** 2)
-    return np.asarray(np.linalg.cholesky(R + 1e-6 * np.eye(n)) @ rng.standard_normal((n, columns)))
+    """Unit Gaussian noise (n, columns), correlated as exp(-d^2 / (2 memory^2)) over d steps: drawn at knots a quarter
+    of the memory apart, straight between them (which takes a hundredth of the variance there)."""
+    knots = np.linspace(0.0, n - 1.0, int(np.ceil(4.0 * n / memory)) + 2)
+    R = np.exp(-0.5 * ((knots[:, None] - knots) / memory) ** 2)
+    drawn = np.linalg.cholesky(R + 1e-6 * np.eye(len(knots))) @ rng.standard_normal((len(knots), columns))
+    return np.stack([np.interp(np.arange(n), knots, own) for own in drawn.T], axis=1) if columns else np.zeros((n, 0))
 
 
 def winds(study: Study, k: int, exponent: np.ndarray) -> np.ndarray:
@@ -157,14 +157,12 @@ def winds(study: Study, k: int, exponent: np.ndarray) -> np.ndarray:
     films that hear no speed."""
     load, run = study.probed.base.load_model, study.runs[k].run
     units = {s.name: s.unit for s in load.signals}
-    n = run.drive.n_steps // INNER
-    result = np.zeros((n, len(load.films)))
+    result = np.zeros((run.drive.n_steps, len(load.films)))
     for f, film in enumerate(load.films):
         for signal in film.use.signals.values():
             values = run.signals.get(signal)
             if units.get(signal) in ("m/s", "1/s") and values is not None and np.any(values):
-                fast = (np.abs(values) / np.abs(values).max()) ** exponent[f]
-                result[:, f] = fast.reshape(n, INNER).mean(axis=1)
+                result[:, f] = (np.abs(values) / np.abs(values).max()) ** exponent[f]
     return result
 
 
@@ -197,7 +195,7 @@ def convection(drive: Drive, films: int) -> np.ndarray:
 
 
 def _power(study: Study, k: int, source: int) -> np.ndarray:
-    """(n, m) W of a source in a run, at a winding of 30 degC where its law follows one."""
+    """(n,) W of a source in a run, at a winding of 30 degC where its law follows one."""
     drive = study.runs[k].run.drive
     if source in drive.losses.index:
         i = drive.losses.index.index(source)
@@ -205,7 +203,7 @@ def _power(study: Study, k: int, source: int) -> np.ndarray:
         power = drive.losses.value[:, i, place]
     else:
         power = drive.power[:, source]
-    return power.reshape(-1, INNER)
+    return power
 
 
 def lump_of(study: Study, place: int, form: Form) -> float:

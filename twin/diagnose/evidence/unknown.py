@@ -38,7 +38,7 @@ class Heat:
 
 def heat_of(study: Study, blocks: Sequence[tuple[int, int, int]], of_place: Mapping[str, np.ndarray]) -> Heat:
     """The unknown channel of a study, without matrices yet; of_place: columns of 1 W in every block (fitted
-    run, first fine step, end)."""
+    run, first step, end)."""
     parts = list(dict.fromkeys(m for p in study.probed.places for m in p.members))
     run = np.array([i for i, _, _ in blocks])
     when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)

@@ -28,7 +28,7 @@ def units_of(study: Study, h: Hypothesis) -> tuple[Unit, ...]:
 
 
 def _shape(study: Study, when: History, which: int, k: int) -> np.ndarray:
-    """(n_fine,) of the amplitude `which` in run k."""
+    """(n,) of the amplitude `which` in run k."""
     run = study.runs[k].run
     n, t, fitted = run.drive.n_steps, np.asarray(run.drive.time), k in study.fitted
     if when.bell is not None:  # an amplitude per run, the mean of them in others

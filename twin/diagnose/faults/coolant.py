@@ -31,7 +31,7 @@ class Wetted(Fault):
 
     def fill(self, slot: Slot) -> None:
         slot.slots.A[slot.s] = slot.study.probed.A[slot.place]  # to the reference temperature: no rise
-        slot.slots.gate[:, slot.s] = slot.gate
+        slot.slots.gate[:, slot.s] = slot.shape
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Coolant(Fault):
 
 
 def _ramp(shape: np.ndarray) -> np.ndarray:
-    """(n_fine,) from 1 to -1 over every stretch of a shape, times the shape."""
+    """(n,) from 1 to -1 over every stretch of a shape, times the shape."""
     result = np.zeros(len(shape))
     on = np.concatenate([[False], shape != 0.0, [False]])
     for start, end in zip(np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(~on[1:] & on[:-1]), strict=True):

@@ -26,7 +26,7 @@ import numpy as np
 from twin.build.places import beside
 from twin.diagnose.evidence.nulls import convection
 from twin.diagnose.model.bank import Column, Nominal
-from twin.diagnose.model.integration import INNER, gammas
+from twin.diagnose.model.integration import gammas
 from twin.diagnose.model.study import Study, own_place
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place
@@ -51,11 +51,11 @@ Key = tuple[str, str, str]  # kind, place, history
 
 @dataclass(frozen=True)
 class Histories:
-    """Named histories s(t) of order one, per run of the study (n_fine,); the sealed ones have no blocks."""
+    """Named histories s(t) of order one, per run of the study (n,); the sealed ones have no blocks."""
 
     signals: dict[str, tuple[np.ndarray, ...]]  # "spindle_speed^1.67": of losses
     speeds: dict[str, tuple[np.ndarray, ...]]  # "x_speed^0.6": of convection
-    blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first fine step, end)
+    blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first step, end)
     unit: dict[str, tuple[str, float, float]]  # history -> signal, exponent, value [SI] at which s = 1
     same: dict[str, str]  # signal -> the one of its shape that stands for it
 
@@ -65,7 +65,7 @@ class Elements:
     """All elementary causes of a study with what the time integration needs."""
 
     histories: Histories
-    vectors: tuple[tuple[np.ndarray, ...], ...]  # per run of the study: (r,) or (n_fine, r) each
+    vectors: tuple[tuple[np.ndarray, ...], ...]  # per run of the study: (r,) or (n, r) each
     columns: tuple[Column, ...]
     index: dict[Key, int]  # of the columns
     block_of: dict[tuple[str, str], np.ndarray]  # (kind, place) -> indices of its block columns
@@ -128,7 +128,7 @@ def histories_of(study: Study) -> Histories:
             add(speeds, f"{signal}^{EXPONENT:g}", signal, EXPONENT, top)
     blocks = []
     for i, run in enumerate(runs[: len(study.fitted)]):
-        per = max(INNER, round(BLOCK / (run.drive.time[1] - run.drive.time[0])))
+        per = round(BLOCK / (run.drive.time[1] - run.drive.time[0]))
         edges = list(range(0, run.drive.n_steps, per))
         if run.drive.n_steps - edges[-1] < per / 2 and len(edges) > 1:
             edges.pop()
@@ -237,7 +237,7 @@ def pivot(study: Study, e: int) -> float:
 
 
 def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:
-    """-P Gamma_c P^T z (n_fine, r) of one contact at its nominal conductance."""
+    """-P Gamma_c P^T z (n, r) of one contact at its nominal conductance."""
     probed = study.probed
     loads = study.runs[k].run.loads
     P = np.asarray(probed.system.P[0])
@@ -248,7 +248,7 @@ def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:
 
 
 def _power_of(system: System, drive: Drive, nominal: Nominal) -> np.ndarray:
-    """(n_fine, n_sources) W of all sources of a run at the nominal windings."""
+    """(n, n_sources) W of all sources of a run at the nominal windings."""
     power = drive.power.copy()
     if drive.losses.index:
         winding = float(system.reference_temperature) + nominal.states[:-1] @ np.asarray(system.source_rows).T
@@ -278,7 +278,7 @@ def _law_histories(study: Study, j: int, histories: Histories) -> dict[str, tupl
 def _signals(
     study: Study, nominal: Sequence[Nominal], powers: Sequence[np.ndarray]
 ) -> list[tuple[str, float, list[np.ndarray]]]:
-    """(signal, factor, per run (n_fine, r)): what all laws that read a signal would add, were it larger by a factor."""
+    """(signal, factor, per run (n, r)): what all laws that read a signal would add, were it larger by a factor."""
     probed, load = study.probed, study.probed.base.load_model
     (body,) = probed.base.bodies
     positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}

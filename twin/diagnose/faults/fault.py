@@ -14,7 +14,6 @@ import numpy as np
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.faults.elements import Elements
 from twin.diagnose.model.bank import Column, Nominal
-from twin.diagnose.model.integration import INNER
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
@@ -56,7 +55,7 @@ class Unit:
     fault: Fault
     place: str
     column: int  # a column of the bank of the same vector, -1 if none
-    shapes: tuple[np.ndarray, ...]  # per run of the study (n_fine,): history of unit amplitude
+    shapes: tuple[np.ndarray, ...]  # per run of the study (n,): history of unit amplitude
 
 
 @dataclass(frozen=True)
@@ -72,13 +71,8 @@ class Slot:
 
     @property
     def shape(self) -> np.ndarray:
-        """(n_fine,) the unit's history in this run."""
+        """(n,) the unit's history in this run."""
         return self.unit.shapes[self.k]
-
-    @property
-    def gate(self) -> np.ndarray:
-        """(n,) its mean in every coarse step."""
-        return np.asarray(self.shape.reshape(-1, INNER).mean(axis=1))
 
     @property
     def place(self) -> int:
@@ -91,19 +85,19 @@ class Slot:
 
     @property
     def vector(self) -> np.ndarray:
-        """(r,) or (n_fine, r) of its column."""
+        """(r,) or (n, r) of its column."""
         return self.elements.vectors[self.k][self.column.vector]
 
     def force(self, vector: np.ndarray, history: np.ndarray) -> None:
-        """With a vector (r,) or (n_fine, r) times a history (n_fine,)."""
+        """With a vector (r,) or (n, r) times a history (n,)."""
         flow = vector if vector.ndim == 2 else np.broadcast_to(vector, (len(history), len(vector)))
-        self.slots.forcing[:, :, self.s] = (flow * history[:, None]).reshape(len(self.slots.gate), INNER, -1)
+        self.slots.forcing[:, self.s] = flow * history[:, None]
 
     def film(self, A: np.ndarray, M: np.ndarray, environment: int) -> None:
         """With a film A (r, r), M (r,) to the air of an environment."""
         air = self.study.runs[self.k].run.drive.environment[:, environment]
-        self.slots.A[self.s], self.slots.M[self.s], self.slots.gate[:, self.s] = A, M, self.gate
-        self.slots.rise[:, :, self.s] = (air - self.study.probed.base.reference_temperature).reshape(-1, INNER)
+        self.slots.A[self.s], self.slots.M[self.s], self.slots.gate[:, self.s] = A, M, self.shape
+        self.slots.rise[:, self.s] = air - self.study.probed.base.reference_temperature
 
 
 @dataclass(frozen=True)
@@ -224,7 +218,7 @@ class Fault:
     def change(
         self, study: Study, nominal: Sequence[Nominal], states: Callable[[int], np.ndarray], name: str, size: float
     ) -> np.ndarray:
-        """(m,) what the fitted runs read otherwise, of what is `curved`; states: of run k, (n_fine + 1, r)."""
+        """(m,) what the fitted runs read otherwise, of what is `curved`; states: of run k, (n + 1, r)."""
         raise NotImplementedError(f"{self.kind} is in proportion to its size")
 
     def read_in(

@@ -38,7 +38,7 @@ class Group(Fault):
 
     def fill(self, slot: Slot) -> None:
         films = [f.name for f in slot.study.probed.base.load_model.films]
-        slot.slots.film[:, slot.s, films.index(slot.unit.place)] = slot.gate
+        slot.slots.film[:, slot.s, films.index(slot.unit.place)] = slot.shape
 
 
 def environment_at(study: Study, p: int) -> int:

@@ -18,7 +18,7 @@ class Conductance(Fault):
     def fill(self, slot: Slot) -> None:
         load = slot.study.probed.base.load_model
         names = [j.name for j in load.joints] if self.kind == "joint" else load.contacts
-        getattr(slot.slots, self.kind)[:, slot.s, names.index(slot.unit.place)] = slot.gate
+        getattr(slot.slots, self.kind)[:, slot.s, names.index(slot.unit.place)] = slot.shape
 
 
 FAULTS = tuple(

@@ -184,7 +184,7 @@ def play(study: Study, nominal: Sequence[Nominal], name: str, width: float) -> n
 def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.ndarray:
     """(m,) what the fitted runs read more where a clock is late by `seconds` [s], per second.
 
-    states: (n_fine + 1, r) of the runs, by their number, that this clock has stamped.
+    states: (n + 1, r) of the runs, by their number, that this clock has stamped.
     """
     (body,) = study.probed.base.bodies
     by = seconds if abs(seconds) > 1.0 else 1.0
@@ -205,7 +205,7 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
 def lagged(study: Study, states: Mapping[int, np.ndarray], sensor: str, seconds: float) -> np.ndarray:
     """(m,) what the fitted runs read more where a sensor follows with a time constant of `seconds` [s], per second.
 
-    states: (n_fine + 1, r) of the runs, by their number. A run begins with the sensor as warm as what it sits on.
+    states: (n + 1, r) of the runs, by their number. A run begins with the sensor as warm as what it sits on.
     """
     (body,) = study.probed.base.bodies
     parts = []
@@ -223,7 +223,7 @@ def lagged(study: Study, states: Mapping[int, np.ndarray], sensor: str, seconds:
 
 
 def _state(states: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """(k, r) states (n + 1, r) between fine steps; the first one before the start."""
+    """(k, r) states (n + 1, r) between steps; the first one before the start."""
     at = np.clip(at, 0.0, len(states) - 1.0)
     step = np.minimum(at.astype(int), len(states) - 2)
     share = (at - step)[:, None]

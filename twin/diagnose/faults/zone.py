@@ -10,7 +10,6 @@ from twin.diagnose.evidence.batch import Batch
 from twin.diagnose.faults.context import Context, always, of_stretches, single, stretches
 from twin.diagnose.faults.elements import pivot
 from twin.diagnose.faults.fault import Described, Family, Fault, Slot
-from twin.diagnose.model.integration import INNER
 from twin.diagnose.model.study import Study
 
 WARMEST = 20.0  # K: a hall in winter with its door open
@@ -22,7 +21,7 @@ class Air(Fault):
 
     def fill(self, slot: Slot) -> None:
         environments = [e.name for e in slot.study.probed.base.load_model.environments]
-        slot.slots.environment[:, :, slot.s, environments.index(slot.unit.place)] = slot.shape.reshape(-1, INNER)
+        slot.slots.environment[:, slot.s, environments.index(slot.unit.place)] = slot.shape
 
 
 @dataclass(frozen=True)

@@ -27,18 +27,18 @@ AT_ONCE = 700  # columns
 
 @dataclass(frozen=True)
 class Nominal:
-    """The nominal run k as the linear integration needs it; n coarse steps of m fine ones, in fine steps (n m)."""
+    """The nominal run k as the linear integration needs it; n steps."""
 
-    states: np.ndarray  # (n m + 1, r)
-    total: np.ndarray  # (n m, n_films) W/(m^2 K), radiation included
-    convection: np.ndarray  # (n m, n_films)
-    outer: np.ndarray  # (n m, n_films) K above the reference temperature
-    inverse: np.ndarray  # (n m, r, r) of S, float32
-    rate: float  # 1/s, of fine steps
+    states: np.ndarray  # (n + 1, r)
+    total: np.ndarray  # (n, n_films) W/(m^2 K), radiation included
+    convection: np.ndarray  # (n, n_films)
+    outer: np.ndarray  # (n, n_films) K above the reference temperature
+    inverse: np.ndarray  # (n, r, r) of S, float32
+    rate: float  # 1/s
 
     @property
     def middle(self) -> np.ndarray:
-        """(n m, r) states that the two stages of a step see in the mean."""
+        """(n, r) states that the two stages of a step see in the mean."""
         return 0.5 * (self.states[:-1] + self.states[1:])
 
 
@@ -46,32 +46,29 @@ def nominal_run(study: Study, k: int) -> Nominal:
     """Trajectory and matrices of run k at nominal parameters."""
     probed = study.probed
     states = study.states(k, np.zeros(len(probed.parameters)))
-    system, layout, loads = jax.tree.map(np.asarray, probed.system), probed.layout, study.runs[k].run.loads
-    n, m = loads.environment.shape[:2]
-    n_films = layout.n_films
+    system, loads = (jax.tree.map(np.asarray, own) for own in (probed.system, study.runs[k].run.loads))
+    layout = probed.layout
+    n, n_films = len(loads.rate), layout.n_films
     plan, T_ref = system.film_plan, float(system.reference_temperature)
     P, A0, A = system.P[0], system.A0[0], system.A[0]
-    theta, environment, position = (np.asarray(v) for v in (loads.theta, loads.environment, loads.position))
-    rate = float(np.asarray(loads.rate)[0])
-    total, convection, outer = (np.zeros((n * m, n_films)) for _ in range(3))
-    inverse = np.zeros((n * m, *A0.shape), dtype=np.float32)
+    rate = float(loads.rate[0])
+    total, convection, outer = (np.zeros((n, n_films)) for _ in range(3))
+    inverse = np.zeros((n, *A0.shape), dtype=np.float32)
     gamma = gammas(probed.contacts, loads, np.ones(probed.contacts.n_contacts))
     for i in range(n):
-        fine = slice(i * m, (i + 1) * m)
-        told = Tabulated(theta[i, :n_films], layout.following_films, np.asarray(loads.film_table)[i])
-        films = film_loads(np, plan, told, system.surfaces(states[i * m]), environment[i], position[i], 1.0)
-        total[fine], convection[fine], outer[fine] = films.total, films.convection, films.outer - T_ref
-        coefficients = np.concatenate([films.total.mean(axis=0), theta[i, n_films:]])
+        told = Tabulated(loads.theta[i, :n_films], layout.following_films, loads.film_table[i])
+        films = film_loads(np, plan, told, system.surfaces(states[i]), loads.environment[i], loads.position[i], 1.0)
+        total[i], convection[i], outer[i] = films.total, films.convection, films.outer - T_ref
+        coefficients = np.concatenate([films.total, loads.theta[i, n_films:]])
         S = rate / SDIRK2.diagonal * np.eye(len(A0)) + A0 + np.tensordot(coefficients - system.nominal, A, 1)
-        for j in range(i * m, (i + 1) * m):
-            factor = scipy.linalg.cho_factor(S + P @ gamma[j] @ P.T, lower=True)
-            inverse[j] = scipy.linalg.cho_solve(factor, np.eye(len(S)))
+        factor = scipy.linalg.cho_factor(S + P @ gamma[i] @ P.T, lower=True)
+        inverse[i] = scipy.linalg.cho_solve(factor, np.eye(len(S)))
     return Nominal(states, total, convection, outer, inverse, rate)
 
 
 @dataclass(frozen=True)
 class Column:
-    """A forcing: vector of a place or flow (n m, r) times a history (n m,), per run of the study."""
+    """A forcing: vector of a place or flow (n, r) times a history (n,), per run of the study."""
 
     vector: int  # index of the vector
     histories: tuple[np.ndarray | None, ...]  # per run of the study; None: not in that run
@@ -82,7 +79,7 @@ def respond(
 ) -> np.ndarray:
     """(m, n_columns) responses of all measured quantities of the fitted runs, float32.
 
-    vectors: per run of the study, (r,) constant or (n m, r) each.
+    vectors: per run of the study, (r,) constant or (n, r) each.
     """
     rows = study.rows
     result = np.zeros((rows[-1].stop, len(columns)), dtype=np.float32)
@@ -99,14 +96,14 @@ def _integrated(
 ) -> np.ndarray:
     planned = study.runs[k]
     (body,) = study.probed.base.bodies
-    fine, r = len(nominal.states) - 1, body.n
+    n_steps, r = len(nominal.states) - 1, body.n
     C = body.C[planned.measured.column].astype(np.float32)
     used = sorted({c.vector for c in columns})
     place = {v: j for j, v in enumerate(used)}
     which = np.array([place[c.vector] for c in columns])
-    S = np.stack([np.asarray(c.histories[k], dtype=np.float32) for c in columns], axis=1)  # (fine, n)
+    S = np.stack([np.asarray(c.histories[k], dtype=np.float32) for c in columns], axis=1)  # (n_steps, n)
     X = np.zeros((r, len(columns)), dtype=np.float32)
-    T = np.zeros((fine + 1, len(C), len(columns)), dtype=np.float32)
+    T = np.zeros((n_steps + 1, len(C), len(columns)), dtype=np.float32)
     step, share = planned.rows.step, planned.rows.share
     needed = {int(s) for s in step} | {int(s) + 1 for s in step}
     kept = {0: X}
@@ -120,7 +117,7 @@ def _integrated(
         X = nominal.inverse[t] @ right
         return X, X
 
-    for t in range(fine):
+    for t in range(n_steps):
         for j, vector in changing:
             V[:, j] = vector[t]
         known = V[:, which] * S[t]

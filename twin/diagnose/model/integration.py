@@ -1,10 +1,9 @@
 """The window model stepped through a run with hypotheses switched on: states and exact derivatives.
 
-As `twin.calibrate.fit.integration`, with three differences. Loads and moving contacts keep their own fine steps (60 s)
-inside a coarse one (300 s) of films and joints: contacts held for 300 s put nuts and the TCP off by more than the
-noise. A fine step is a two-stage SDIRK step (Alexander, SIAM J. Numer. Anal. 14, 1977: second order, L-stable, one
-matrix for both stages), as implicit Euler of 60 s is a tenth of a kelvin off beside nuts and motors. And K slots hold
-what the description lacks, each times an amplitude a_k that is differentiated like a parameter:
+As `twin.calibrate.fit.integration`, with two differences. A step is a two-stage SDIRK step (Alexander, SIAM J. Numer.
+Anal. 14, 1977: second order, L-stable, one matrix for both stages), as implicit Euler of 60 s is a tenth of a kelvin
+off beside nuts and motors. And K slots hold what the description lacks, each times an amplitude a_k that is
+differentiated like a parameter:
 
     (E + sum a_k E_k) x' = -(A(theta (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
                            + (B + sum a_k B_k) P + ... + sum a_k (gate_k rise_k M_k + forcing_k),
@@ -23,11 +22,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
+from jax.scipy.linalg import cho_solve
 
 from twin.calibrate.fit.effects import Effects, Factors, factors_at
 from twin.calibrate.fit.integration import Rows, displacements, temperatures
-from twin.diagnose.model.ports_first import Basis, Factor, basis, factor, held, turned, within
-from twin.diagnose.model.ports_first import solved as by_factor
+from twin.diagnose.model.ports_first import Basis, basis, turned, within
 from twin.diagnose.model.slots import Slots
 from twin.rom.contact_matrix import ContactEntries, ContactPlaces, dense, entries_by_contact, product, scaled
 from twin.rom.drive import Drive
@@ -37,57 +36,46 @@ from twin.rom.tableau import SDIRK2
 from twin.run.integrator import integrate, solved
 from twin.run.system import Array, Layout, System
 
-INNER = 5  # fine steps in a coarse one
-
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class NestedLoads:
-    """A run; n coarse steps of m fine ones."""
+class ProbedLoads:
+    """A run of n steps."""
 
-    rate: Array  # (n,) 1/s of the fine steps
+    rate: Array  # (n,) 1/s
     theta: Array  # (n, n_theta) W/(m^2 K): convection of films that read the log alone, then joints
     film_table: Array  # (n, k, 65) W/(m^2 K) over DIFFERENCES
-    contacts: ContactEntries  # (n, m, ...), each contact on its own
-    environment: Array  # (n, m, n_environments) degC
+    contacts: ContactEntries  # each contact on its own
+    environment: Array  # (n, n_environments) degC
     position: Array  # (n, axes) m, means
-    power: Array  # (n, m, n_sources) W
-    power_table: Array  # (n, m, l, 121) W over TEMPERATURES
-    contact_heat: Array  # (n, m, s, r) W, projected
+    power: Array  # (n, n_sources) W
+    power_table: Array  # (n, l, 121) W over TEMPERATURES
+    contact_heat: Array  # (n, s, r) W, projected
 
 
-def loads_for(model: MachineModel, drive: Drive, m: int = INNER) -> NestedLoads:
-    """The loads of a run, from a drive of fine steps whose number is a multiple of m, for a model of one body."""
+def loads_for(model: MachineModel, drive: Drive) -> ProbedLoads:
+    """The loads of a run, for a model of one body."""
     (body,) = model.bodies
-    n = drive.n_steps // m
-
-    def mean(values: np.ndarray) -> np.ndarray:
-        return values.reshape(n, m, *values.shape[1:]).mean(axis=1)
-
-    def inner(values: np.ndarray) -> np.ndarray:
-        return values.reshape(n, m, *values.shape[1:])
-
-    apart = entries_by_contact(model.load_model, drive)
-    return NestedLoads(
-        rate=np.full(n, 1.0 / (drive.time[1] - drive.time[0])),
-        theta=mean(drive.theta),
-        film_table=mean(drive.films.value),
-        contacts=ContactEntries(inner(apart.diagonal), inner(apart.neighbour), inner(apart.weight)),
-        environment=inner(drive.environment),
-        position=mean(drive.mean_position),
-        power=inner(drive.power),
-        power_table=inner(drive.losses.value),
-        contact_heat=inner(drive.contact_heat @ body.P.T),
+    return ProbedLoads(
+        rate=np.full(drive.n_steps, 1.0 / (drive.time[1] - drive.time[0])),
+        theta=drive.theta,
+        film_table=drive.films.value,
+        contacts=entries_by_contact(model.load_model, drive),
+        environment=drive.environment,
+        position=drive.mean_position,
+        power=drive.power,
+        power_table=drive.losses.value,
+        contact_heat=drive.contact_heat @ body.P.T,
     )
 
 
-def gammas(places: ContactPlaces, loads: NestedLoads, contact: np.ndarray) -> np.ndarray:
-    """Gamma (n m, n_ports, n_ports) W/K of all fine steps of a run, with the contacts scaled by contact (c,)."""
-    steps = int(np.prod(np.shape(loads.contacts.diagonal)[:2]))
+def gammas(places: ContactPlaces, loads: ProbedLoads, contact: np.ndarray) -> np.ndarray:
+    """Gamma (n, n_ports, n_ports) W/K of all steps of a run, with the contacts scaled by contact (c,)."""
     if not places.n_ports:
-        return np.zeros((steps, 0, 0))
-    flat = jax.tree.map(lambda v: np.asarray(v).reshape(steps, *v.shape[2:]), loads.contacts)
-    return np.asarray(jax.jit(jax.vmap(lambda one: dense(jnp, places, scaled(jnp, places, one, contact))))(flat))
+        return np.zeros((len(loads.rate), 0, 0))
+    return np.asarray(
+        jax.jit(jax.vmap(lambda one: dense(jnp, places, scaled(jnp, places, one, contact))))(loads.contacts)
+    )
 
 
 @jax.tree_util.register_dataclass
@@ -95,14 +83,14 @@ def gammas(places: ContactPlaces, loads: NestedLoads, contact: np.ndarray) -> np
 class _Fixed:
     """What derivatives of a solve take as it is."""
 
-    factor: Factor  # of S = c + P Gamma P^T
+    factor: jax.Array  # (r, r) Cholesky factor of S = c + P Gamma P^T
     terms: jax.Array  # (q, r, r), many: c is their combination
     contacts: ContactEntries
     P: jax.Array  # (r, n_ports)
 
 
 def _by_factor(fixed: _Fixed, right: jax.Array, near: jax.Array) -> jax.Array:
-    return by_factor(fixed.factor, right)
+    return jnp.asarray(cho_solve((fixed.factor, True), right))
 
 
 def _change(places: ContactPlaces, many: bool) -> Callable[[_Fixed, tuple[jax.Array, jax.Array], jax.Array], jax.Array]:
@@ -150,32 +138,30 @@ class Operators:
 
 def _step(
     layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
-    fixed: Operators, z: jax.Array, now: tuple[NestedLoads, Slots],
+    fixed: Operators, z: jax.Array, now: tuple[ProbedLoads, Slots],
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
-    """The state after one coarse step, and those after its fine ones (m, r)."""
+    """The state (r,) after a step, twice."""
     loads, slots = now
     n, T_ref = layout.n_films, system.reference_temperature
     losing = np.array(layout.following_losses, dtype=int)
-    environment = jnp.asarray(loads.environment) + f.environment + jnp.einsum("k,mke->me", a, slots.environment)
+    environment = jnp.asarray(loads.environment) + f.environment + a @ jnp.asarray(slots.environment)
     film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
-    # films follow the state and the mean air at the step's start
+    # films and losses follow the state at the step's start
     convection = Tabulated(jnp.asarray(loads.theta)[:n], layout.following_films, loads.film_table)
     surfaces, position = system.surfaces(z), jnp.asarray(loads.position)
     films = film_loads(jnp, system.film_plan, convection, surfaces, environment, position, 1.0, film_factor)
-    total, rise = films.total.mean(axis=0), films.outer - T_ref
     joint_factor = f.joint * jnp.maximum(1.0 + a @ jnp.asarray(slots.joint), 0.02)
     joints = jnp.asarray(loads.theta)[n:] * joint_factor
     contact = f.contact * jnp.maximum(1.0 + a @ jnp.asarray(slots.contact), 0.02)
     P, rate = jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / SDIRK2.diagonal
     gate = a * jnp.asarray(slots.gate)
-    coefficients = jnp.concatenate([jnp.concatenate([total, joints]) - jnp.asarray(system.nominal), gate])
+    coefficients = jnp.concatenate([jnp.concatenate([films.total, joints]) - jnp.asarray(system.nominal), gate])
     valued = lax.stop_gradient(coefficients) if many else coefficients
     matrix = rate * fixed.E + jnp.asarray(system.A0[0]) + jnp.tensordot(valued, fixed.A, 1)
     if many:
         c, terms = jnp.concatenate([coefficients, rate * fixed.factors]), jnp.concatenate([fixed.A, fixed.terms])
     else:
         c, terms = matrix, jnp.zeros(())
-    kept = held(lax.stop_gradient(matrix), P.shape[1])
 
     def capacity(x: jax.Array) -> jax.Array:
         if not many:
@@ -183,37 +169,33 @@ def _step(
         change = fixed.factors - lax.stop_gradient(fixed.factors)
         return rate * (fixed.E @ x + change @ (fixed.terms @ lax.stop_gradient(x)))
 
-    tables = jnp.asarray(loads.power_table) * f.source[losing][:, None]
-    winding = T_ref + fixed.reads @ z
-
+    told = Tabulated(
+        jnp.asarray(loads.power) * f.source, layout.following_losses,
+        jnp.asarray(loads.power_table) * f.source[losing][:, None],
+    )  # fmt: skip
+    power = source_powers(jnp, told, T_ref + fixed.reads @ z)
+    ports = jnp.tensordot(f.source[np.array(places.sources, dtype=int)], jnp.asarray(loads.contact_heat), 1)
+    forcing = system.M @ (films.total * (films.outer - T_ref)) + system.H @ films.lift.ravel()
+    forcing = forcing + fixed.B @ power + ports
+    forcing = forcing + (gate * jnp.asarray(slots.rise)) @ fixed.M + a @ jnp.asarray(slots.forcing)
+    gamma = dense(jnp, places, scaled(jnp, places, loads.contacts, lax.stop_gradient(contact)))
+    factor = jnp.linalg.cholesky(fixed.ports.joined(lax.stop_gradient(matrix), gamma))
+    known = _Fixed(factor, terms, loads.contacts, P)
     change = _change(places, many)
 
-    def fine(x: jax.Array, i: jax.Array) -> tuple[jax.Array, jax.Array]:
-        told = Tabulated(jnp.asarray(loads.power)[i] * f.source, layout.following_losses, tables[i])
-        ports = jnp.tensordot(f.source[np.array(places.sources, dtype=int)], jnp.asarray(loads.contact_heat)[i], 1)
-        power = source_powers(jnp, told, winding)
-        forcing = system.M @ (total * rise[i]) + system.H @ films.lift.ravel() + fixed.B @ power + ports
-        forcing = forcing + (gate * jnp.asarray(slots.rise)[i]) @ fixed.M + a @ jnp.asarray(slots.forcing)[i]
-        apart = jax.tree.map(lambda v: jnp.asarray(v)[i], loads.contacts)
-        gamma = dense(jnp, places, scaled(jnp, places, apart, lax.stop_gradient(contact)))
-        known = _Fixed(factor(kept, fixed.ports.across(gamma)), terms, apart, P)
+    def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
+        y = solved(_by_factor, change, known, (c, contact), right, near)
+        return y, y
 
-        def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
-            y = solved(_by_factor, change, known, (c, contact), right, near)
-            return y, y
-
-        after, *_ = integrate(SDIRK2, 1, solve, capacity, x, jnp.asarray(forcing))
-        return after, after
-
-    m = loads.environment.shape[0]
-    return lax.scan(fine, z, jnp.arange(m))
+    after, *_ = integrate(SDIRK2, 1, solve, capacity, z, jnp.asarray(forcing))
+    return after, after
 
 
 def trajectory(
-    layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, loads: NestedLoads,
+    layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, loads: ProbedLoads,
     slots: Slots, start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
-    """States (n m + 1, r) at the fine steps from start (r,); v: parameters u of the machine, then amplitudes a (K,)."""
+    """States (n + 1, r) from start (r,); v: parameters u of the machine, then amplitudes a (K,)."""
     n = effects.source.shape[1]
     v = jnp.asarray(v)
     u, a = v[:n], v[n:]
@@ -231,12 +213,12 @@ def trajectory(
     )  # fmt: skip
     one = partial(_step, layout, places, many, system, effects, f, a, fixed)
     _, states = lax.scan(one, jnp.linalg.solve(T, z0), (loads, steps))
-    return jnp.concatenate([z0[None], states.reshape(-1, z0.shape[0]) @ T.T])
+    return jnp.concatenate([z0[None], states @ T.T])
 
 
 def outputs_of(
     layout: Layout, places: ContactPlaces, many: bool, from_first: bool, system: System, effects: Effects,
-    loads: NestedLoads, slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
+    loads: ProbedLoads, slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
     """Means of sensors over bins (b s,) [degC], then TCP rows (k 3,) [m]."""
     states = trajectory(layout, places, many, system, effects, loads, slots, start, v)
@@ -258,7 +240,7 @@ def jacobian(layout: Layout, places: ContactPlaces, from_first: bool, *rest: obj
 
 @partial(jax.jit, static_argnums=(0, 1, 2))
 def by_amplitudes(
-    layout: Layout, places: ContactPlaces, from_first: bool, system: System, effects: Effects, loads: NestedLoads,
+    layout: Layout, places: ContactPlaces, from_first: bool, system: System, effects: Effects, loads: ProbedLoads,
     slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, u: Array, a: Array,
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     """Derivatives (b s + k 3, K) of `outputs_of` by the amplitudes alone, and the outputs."""

@@ -1,16 +1,12 @@
-"""Coordinates in which contacts touch as few states as they have ports, and the factors of fine steps in them.
+"""Coordinates in which contacts touch as few states as they have ports.
 
-With z = T y, T^T P = [R; 0], a matrix of a fine step becomes
+With z = T y, T^T P = [R; 0], the matrix of a step becomes
 
     T^T (c + P Gamma P^T) T = [c_pp + R Gamma R^T   c_pf]
                               [c_fp                 c_ff]
 
-where only the first block follows the contacts. So c_ff and the Schur complement c_pp - c_pf c_ff^-1 c_fp are factored
-once for all fine steps of a coarse one, and every fine step factors a matrix of the size of the ports
-(Golub, Van Loan, Matrix Computations, 4th ed. 2013, chapters 3 to 5).
-
 The first states are the temperatures of the ports, so that R = 1 and Gamma is added as it is: two products of matrices
-less in every fine step. Ports that move together, or nearly so, have no such coordinates; they keep an R.
+less in every step. Ports that move together, or nearly so, have no such coordinates; they keep an R.
 """
 
 from __future__ import annotations
@@ -22,7 +18,6 @@ import twin.run.jax_setup  # noqa: F401  isort: skip
 import jax
 import jax.numpy as jnp
 from jax import lax
-from jax.scipy.linalg import cho_solve, solve_triangular
 
 from twin.run.system import Array, System
 
@@ -38,11 +33,14 @@ class Basis:
     R: jax.Array  # (p, n_ports)
     plain: jax.Array  # bool: R = 1
 
-    def across(self, gamma: jax.Array) -> jax.Array:
-        """R Gamma R^T (p, p)."""
-        if self.R.shape[0] != self.R.shape[1]:
-            return self.R @ gamma @ self.R.T
-        return jnp.asarray(lax.cond(self.plain, lambda g: g, lambda g: self.R @ g @ self.R.T, gamma))
+    def joined(self, c: jax.Array, gamma: jax.Array) -> jax.Array:
+        """c + P Gamma P^T (r, r)."""
+        p, ports = self.R.shape
+        across = self.R @ gamma @ self.R.T if p != ports else lax.cond(self.plain, lambda g: g, self._across, gamma)
+        return c.at[:p, :p].add(across)
+
+    def _across(self, gamma: jax.Array) -> jax.Array:
+        return self.R @ gamma @ self.R.T
 
 
 def basis(P: Array) -> Basis:
@@ -73,49 +71,3 @@ def turned(system: System, T: jax.Array) -> System:
         M=T.T @ system.M, H=T.T @ system.H, B=T.T @ system.B,
         source_rows=system.source_rows @ T, film_rows=system.film_rows @ T,
     )  # fmt: skip
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Held:
-    """Of a coarse step: what contacts do not change. p states that contacts touch, f others."""
-
-    L: jax.Array  # (f, f) of c_ff
-    Y: jax.Array  # (f, p) L^-1 c_fp
-    S: jax.Array  # (p, p) Schur complement
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Factor:
-    """Of a fine step."""
-
-    held: Held
-    L: jax.Array  # (p, p) of S + R Gamma R^T
-
-
-def held(c: jax.Array, ports: int) -> Held:
-    """c (r, r), symmetric and positive definite."""
-    p = min(ports, len(c))
-    if p == len(c):
-        return Held(jnp.zeros((0, 0)), jnp.zeros((0, p)), c)
-    L = jnp.linalg.cholesky(c[p:, p:])
-    Y = solve_triangular(L, c[p:, :p], lower=True)
-    return Held(L, Y, c[:p, :p] - Y.T @ Y)
-
-
-def factor(held: Held, contacts: jax.Array) -> Factor:
-    """contacts (p, p): R Gamma R^T."""
-    return Factor(held, jnp.linalg.cholesky(held.S + contacts) if len(held.S) else held.S)
-
-
-def solved(factor: Factor, b: jax.Array) -> jax.Array:
-    """(c + P Gamma P^T)^-1 b, b (r,)."""
-    held, p = factor.held, len(factor.L)
-    if p == len(b):
-        return jnp.asarray(cho_solve((factor.L, True), b))
-    rest = solve_triangular(held.L, b[p:], lower=True)
-    if not p:
-        return jnp.asarray(solve_triangular(held.L, rest, trans=1, lower=True))
-    first = cho_solve((factor.L, True), b[:p] - held.Y.T @ rest)
-    return jnp.concatenate([first, solve_triangular(held.L, rest - held.Y @ first, trans=1, lower=True)])

@@ -17,7 +17,7 @@ from twin.build.places import DISPLACED, Place, pruned
 from twin.calibrate.fit.measured import tcp_positions
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
-from twin.diagnose.model.integration import INNER, NestedLoads, loads_for
+from twin.diagnose.model.integration import ProbedLoads, loads_for
 from twin.diagnose.model.rich_probed_model import RichProbedModel, rich_probed_model
 from twin.errors import LogError
 from twin.logs.run import Run
@@ -33,7 +33,7 @@ from twin.rom.sampling import Intervals, cut
 from twin.rom.tcp import at_positions
 from twin.run.system import Layout, System, prepare
 
-FINE = 60.0  # s, steps of loads and of the truth beside them
+STEP = 60.0  # s
 TRAINING_STEP = 120.0  # s
 TAIL = 6e-7  # share of the squared trajectories, in units of the noise, that is left out
 LARGEST = 220  # states
@@ -46,11 +46,11 @@ class ProbedRun:
     """A run without its measurements."""
 
     name: str
-    drive: Drive  # of the description, steps of FINE
+    drive: Drive  # of the description, steps of STEP
     signals: dict[str, np.ndarray]  # (n_steps,) means over the drive's steps, currents as rms, SI
     start: float  # degC
     stated_start: bool
-    loads: NestedLoads
+    loads: ProbedLoads
     rested: bool = False  # it starts in equilibrium with its surroundings, `start` being those of the machine
 
 
@@ -73,17 +73,16 @@ class ProbedModel:
     reduction: tuple[float, float]  # K, m: rms of what the window leaves of held-out trajectories at the worst output
 
 
-def fine_drive(model: MachineModel, run: Run, dt: float = FINE) -> Drive:
-    """A drive whose fine steps fill coarse ones: the last minutes of a log are held to the end of its coarse step.
+def drive_of(model: MachineModel, run: Run, dt: float = STEP) -> Drive:
+    """A drive of the whole log: its last row is held to the end of its step.
 
     Raises LogError for a log shorter than an hour.
     """
     load = model.load_model
     span = float(run.loads.time[-1] - run.loads.time[0])
-    n = int(np.ceil(span / (dt * INNER) - 1e-9)) * INNER
     if span < LEAST:
         raise LogError(f"the log covers {span / 60:.0f} min", str(run.folder), "a diagnosis needs an hour at least")
-    return evaluate(load, run.loads.time, signal_values(run, load.signals), dt, n)
+    return evaluate(load, run.loads.time, signal_values(run, load.signals), dt, int(np.ceil(span / dt - 1e-9)))
 
 
 def drive_arrays(drive: Drive) -> tuple[np.ndarray, ...]:
@@ -104,7 +103,7 @@ def make_probed_model(
     base = pruned(rich.rich)
     load = base.load_model
     names = run_names(runs)
-    drives = [fine_drive(base, run) for run in runs]
+    drives = [drive_of(base, run) for run in runs]
     starts = [
         run.initial_temperature if run.initial_temperature is not None
         else float(measured_air(load, drive)[0, load.surroundings])
@@ -113,7 +112,7 @@ def make_probed_model(
     known = tuple((p.path, p.nominal, p.sigma, p.low, p.high) for p in parameters)
 
     def make() -> tuple[np.ndarray, tuple[float, float]]:
-        coarse = tuple(fine_drive(base, run, TRAINING_STEP) for run in runs)
+        coarse = tuple(drive_of(base, run, TRAINING_STEP) for run in runs)
         shared = Shared(rich.rich, base, tuple(parameters), rich.places, coarse, tuple(starts))
         described, drawn, heated = snapshots(shared, progress=progress)
         held = drawn[-len(runs) :]

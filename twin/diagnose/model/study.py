@@ -12,7 +12,7 @@ import numpy as np
 from twin.calibrate.fit.effects import Effects, effects_of
 from twin.calibrate.fit.integration import Rows, displacements
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.model.integration import INNER, by_amplitudes, jacobian, outputs, states_of
+from twin.diagnose.model.integration import by_amplitudes, jacobian, outputs, states_of
 from twin.diagnose.model.probed_model import ProbedModel, ProbedRun
 from twin.diagnose.model.slots import Slots, first_slots, no_slots
 from twin.errors import TwinError
@@ -70,7 +70,7 @@ class Study:
 
     @property
     def fitted_runs(self) -> list[tuple[str, float]]:
-        """Name and fine step [s] of each fitted run."""
+        """Name and step [s] of each fitted run."""
         runs = [self.runs[k].run for k in self.fitted]
         return [(run.name, float(run.drive.time[1] - run.drive.time[0])) for run in runs]
 
@@ -99,8 +99,7 @@ class Study:
 
     def slots(self, k: int) -> Slots:
         """Empty slots for run k, to be filled."""
-        run = self.runs[k].run
-        return no_slots(run.drive.n_steps // INNER, INNER, K, self.probed.base.n, self.probed.base)
+        return no_slots(self.runs[k].run.drive.n_steps, K, self.probed.base.n, self.probed.base)
 
     def outputs(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """(size,) of run k at x (n,) in prior standard deviations, with hypotheses of amplitudes a."""
@@ -119,7 +118,7 @@ class Study:
         return np.asarray(y), np.asarray(D)
 
     def states(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
-        """z (n_fine + 1, r) of run k."""
+        """z (n + 1, r) of run k."""
         system, effects, loads, filled, _, _, z0 = self._arguments(k, slots)
         layout, contacts, _ = self._fixed(k)
         return np.asarray(states_of(layout, contacts, False, system, effects, loads, filled, z0, self._v(x, a)))

@@ -3,14 +3,15 @@
 Calibration needs the Jacobian where it ends: two parameters of large and nearly equal effect are a weak direction only
 at the point where they nearly cancel.
 
-    y(t) = y0 + J t + 1/2 t^T H t,     t_j = e^u - 1 of what heats or grows, 1 - e^-u of what conducts away
+    y(t) = y0 + J t + 1/2 t^T H t,     t_j = (e^u - 1) / (1 + s_j (e^u - 1))
 
-in which temperatures are nearly linear: of source powers exactly, of resistances roughly.
+in which temperatures are nearly linear: where a share s of the conductance by which heat leaves is the parameter's, its
+rise goes with 1 / (1 - s + s e^u). Powers and expansions have s = 0.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from twin.progress import Progress, silent
 STEP = 0.8  # prior standard deviations between the two Jacobians of a second derivative
 STRONG = 50.0  # units of noise, summed over all rows, by which a parameter must move outputs to be bent
 UNITS = 0.05, 1e-6  # K, m: what counts
-CONDUCTS = ("film", "joint", "contact")
+CONDUCTS = ("film", "joint", "contact")  # kinds that have a share
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Surrogate:
     """m outputs of the fitted runs, n parameters x in prior standard deviations."""
 
     scale: np.ndarray  # (n,) u = scale x
-    form: np.ndarray  # (n,) 1: e^u - 1, -1: 1 - e^-u, 0: u
+    log: np.ndarray  # (n,) bool: u is a logarithm, else t = u
+    share: np.ndarray  # (n,) s
     y0: np.ndarray  # (m,)
     J: np.ndarray  # (m, n) by t
     H: np.ndarray  # (m, n, n) float32, by t
@@ -38,12 +40,13 @@ class Surrogate:
     def t(self, x: np.ndarray) -> np.ndarray:
         """(n,) coordinates in which outputs are nearly linear."""
         u = self.scale * x
-        return np.where(self.form > 0, np.expm1(u), np.where(self.form < 0, -np.expm1(-u), u))
+        change = np.expm1(np.where(self.log, u, 0.0))
+        return np.where(self.log, change / (1.0 + self.share * change), u)
 
     def rate(self, x: np.ndarray) -> np.ndarray:
         """(n,) dt/dx."""
-        u = self.scale * x
-        return self.scale * np.where(self.form > 0, np.exp(u), np.where(self.form < 0, np.exp(-u), 1.0))
+        change = np.expm1(np.where(self.log, self.scale * x, 0.0))
+        return self.scale * (1.0 + change) / (1.0 + self.share * change) ** 2
 
     def at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Outputs (m,) and their Jacobian (m, n) by x."""
@@ -59,16 +62,13 @@ def jacobian_of(study: Study, x: np.ndarray) -> np.ndarray:
 
 def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
     """From exact Jacobians: the nominal one, and one per parameter that moves outputs far."""
-    parameters = study.probed.parameters
-    n = len(parameters)
-    form = np.array([0 if p.scale == "linear" else -1 if p.kind in CONDUCTS else 1 for p in parameters])
-    y0 = study.all_outputs(np.zeros(n))
-    bare = Surrogate(study.scale, form, y0, np.zeros((len(y0), n)), np.zeros((0, n, n), dtype=np.float32))
-    J = jacobian_of(study, np.zeros(n)) / bare.rate(np.zeros(n))
+    n = len(study.probed.parameters)
+    y0, J = study.all_outputs(np.zeros(n)), jacobian_of(study, np.zeros(n)) / study.scale
     _refuse_nan(study, J, y0)
-    strong = np.flatnonzero(
-        np.linalg.norm((J * bare.rate(np.zeros(n))) / study.joined(lambda _: UNITS)[:, None], axis=0) > STRONG
-    )
+    log = np.array([p.scale != "linear" for p in study.probed.parameters], dtype=bool)
+    unit = study.joined(lambda _: UNITS)
+    bare = Surrogate(study.scale, log, _shares(study, y0, J, unit), y0, J, np.zeros((0, n, n), dtype=np.float32))
+    strong = np.flatnonzero(np.linalg.norm(J * study.scale / unit[:, None], axis=0) > STRONG)
     points = [STEP * np.eye(n)[i] for i in strong]
     with progress("derivatives by the parameters", len(points)) as advance:
         made = each(jacobian_of, study, points, lambda _: advance(""))
@@ -80,7 +80,18 @@ def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:
         H[:, strong, i] = H[:, i, strong]
     both = np.ix_(np.arange(len(y0)), strong, strong)
     H[both] = (H[both] + H[both].transpose(0, 2, 1)) / 2
-    return Surrogate(study.scale, form, y0, J, H)
+    return replace(bare, H=H)
+
+
+def _shares(study: Study, y0: np.ndarray, J: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """(n,) s, of outputs at STEP: they change by t J, t = c / (1 + s c) with c = e^u - 1, so that s = 1 / t - 1 / c."""
+    shares = np.zeros(len(study.scale))
+    for i in (i for i, p in enumerate(study.probed.parameters) if p.kind in CONDUCTS and p.scale != "linear"):
+        x = STEP * np.eye(len(shares))[i]
+        along, c = J[:, i] / unit, np.expm1(STEP * study.scale[i])
+        t = along @ ((study.all_outputs(x) - y0) / unit) / max(along @ along, 1e-300)
+        shares[i] = np.clip(1.0 / t - 1.0 / c, 0.0, 1.0) if t > 0.0 else 0.0
+    return shares
 
 
 def _refuse_nan(study: Study, J: np.ndarray, y0: np.ndarray) -> None:

@@ -22,7 +22,7 @@ from twin.rom.load_model import LoadModel, Signal
 
 SENSOR = "plan:"  # before the place of a sensor that is not there yet; no name of a description holds a colon
 AGAIN = "again"  # name of the experiment that changes nothing
-SAMPLING = 10.0  # s, of the loads of an experiment: six rows in each fine step
+SAMPLING = 10.0  # s, of the loads of an experiment: six rows in each step of 60 s
 SPEED = (
     0.5  # of its top, at which an axis goes to and fro for hours; at its top a ball screw's threshold was nine times
 )

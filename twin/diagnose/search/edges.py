@@ -112,10 +112,8 @@ def with_pulses(
         made = slots_with(study, elements, pulses, k)
         slots.A[e] += made.A.sum(axis=0)
         slots.M[e] += made.M.sum(axis=0)
-        for name in ("gate", "film", "joint", "contact"):
+        for name in ("gate", "film", "joint", "contact", "rise", "forcing", "environment"):
             getattr(slots, name)[:, e] += getattr(made, name).sum(axis=1)
-        for name in ("rise", "forcing", "environment"):
-            getattr(slots, name)[:, :, e] += getattr(made, name).sum(axis=2)
     return slots
 
 
@@ -148,7 +146,7 @@ def shape_errors(study: Study, h: Hypothesis, units: Sequence[Unit], a: np.ndarr
 
 
 def _pulse(study: Study, h: Hypothesis, edge: Edge, k: int) -> np.ndarray:
-    """(n_fine,) the change of a shape in run k while an edge moves by PULSE; zero in other runs."""
+    """(n,) the change of a shape in run k while an edge moves by PULSE; zero in other runs."""
     run, by = study.runs[k].run, PULSE / 2
     t = np.asarray(run.drive.time)
     if (bell := h.when.bell) is not None:
