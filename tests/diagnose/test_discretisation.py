@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.evidence.discretisation import _acting, _others, differences, inside_of, with_inside
+from twin.diagnose.evidence.discretisation import SEGMENTS, _acting, _others, differences, inside_of, with_inside
 from twin.diagnose.evidence.pulls import Pulls
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import make_study
@@ -69,16 +69,19 @@ def test_the_difference_follows_the_parameters(both):
     assert np.linalg.norm(exact - both[1].at(x)) < np.linalg.norm(exact - both[1].d)
 
 
-def test_rails_in_segments_of_half_the_length_are_another_discretisation():
+def test_rails_in_more_segments_are_other_discretisations():
     machine = load_machine(Path(__file__).parents[1] / "machines" / "slide")
     moving = {n: c.segments for n, c in machine.contacts.items() if c.kind == "moving"}
-    (same, _, linear), (other, share, quadratic) = _others(machine)
+    (same, _, linear), *others = _others(machine)
     assert same is machine
-    assert (linear, quadratic) == (True, False)
+    assert linear
     assert moving
-    assert {n: other.contacts[n].segments for n in moving} == {n: 2 * s for n, s in moving.items()}
-    assert all(other.contacts[n] == c for n, c in machine.contacts.items() if n not in moving)
-    assert share == 2.0  # what enters a half too far off is off by twice as much as it moves to a quarter
+    assert len(others) == len(SEGMENTS)
+    for times, (other, share, quadratic) in zip(SEGMENTS, others, strict=True):
+        assert not quadratic
+        assert {n: other.contacts[n].segments for n in moving} == {n: round(times * s) for n, s in moving.items()}
+        assert all(other.contacts[n] == c for n, c in machine.contacts.items() if n not in moving)
+        assert share * (1.0 - 1.0 / times) == pytest.approx(1.0)  # the error goes with the length
     assert all(o.contacts.keys() >= small_case.machine().contacts.keys() for o, _, _ in _others(small_case.machine()))
 
 

@@ -5,7 +5,7 @@ the machine that make more of the channels that they move worse than better, bey
 size that the data allow makes more of them better than worse, the run refutes the size alone: the name stays, and
 nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
 calibration makes of it without its tolerance. A number that calibration alone moved out of its tolerance is judged
-beside the calibration that keeps it in.
+beside the calibration that keeps it in, and needs this confirmation where only the fit behind the scores is sure of it.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ def judged(
     opened: Sequence[Measured], seed: int,
 ) -> Judged:  # fmt: skip
     """The headline of a search in y (m,), held against the measurements of the sealed runs, the last of its study."""
-    kept = tuple(c for c in causes if c.history != CALIBRATED or _worth(_freed(found, y, c, opened, seed)) >= 0)
+    kept = tuple(c for c in causes if c.history != CALIBRATED or _stays(found, y, c, opened, seed))
     if len(kept) < len(causes):
         gone = " and ".join(f"{c.family.replace('_', ' ')} at {c.place}" for c in causes if c not in kept)
-        note = f"withdrawn: {gone}. Without its tolerance calibration predicts the sealed run worse"
+        note = f"withdrawn: {gone}. Without its tolerance calibration predicts the sealed run no better"
         left = verdict if any(c.history == CALIBRATED for c in kept) else "sensor" if kept else "nothing"
         return Judged(left, kept, (), _gains(found, opened, seed), note)
     entries = {f.name: f for f in families}
@@ -84,13 +84,15 @@ def _gains(found: Search, opened: Sequence[Measured], seed: int) -> tuple[Gain, 
     )  # fmt: skip
 
 
-def _freed(found: Search, y: np.ndarray, cause: Cause, opened: Sequence[Measured], seed: int) -> tuple[Gain, ...]:
-    """The same of a calibration in which a number has the value that it has without its tolerance."""
+def _stays(found: Search, y: np.ndarray, cause: Cause, opened: Sequence[Measured], seed: int) -> bool:
+    """Whether the sealed runs allow a number that calibration alone moved: of a calibration in which it has the value
+    that it has without its tolerance. Without a sealed run it stays."""
     known = [p.path for p in found.detector.study.probed.parameters]
     own = next(own for own in found.loose if known[own.index] == cause.parameter)
     x, _ = settled_alone(found.detector.fitter, y, (own.index,))
     x[own.index] = own.x
-    return _gains(replace(found, x=x), opened, seed)
+    worth = _worth(_gains(replace(found, x=x), opened, seed))
+    return worth > 0 or (worth == 0 and (own.settled or not opened))
 
 
 def _worth(table: Sequence[Gain]) -> int:
