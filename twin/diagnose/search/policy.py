@@ -17,10 +17,11 @@ class Origin(Enum):
     JUDGED = "a judgement before any result"
     FIVE_AXIS = "chosen on campaigns of effects hidden in five_axis (docs/campaign.md)"
     LUMPED = "chosen on one case of a lumped machine, held against drawn networks"
+    PARTS = "chosen on even seeds of the shipped machines of parts (docs/campaign.md)"
     SOLVER = "how an iteration goes on and ends"
 
 
-DERIVED, JUDGED, FIVE_AXIS, LUMPED, SOLVER = Origin
+DERIVED, JUDGED, FIVE_AXIS, LUMPED, PARTS, SOLVER = Origin
 
 
 def _rule(value: float, origin: Origin, meaning: str, unit: str = "") -> Any:
@@ -76,6 +77,7 @@ class SearchPolicy:
     pulled: float = _rule(2.5, FIVE_AXIS, "that data tell a number from the declared one by", "standard deviations")
     beyond: float = _rule(3.0, FIVE_AXIS, "that a loose number keeps beside any other", "prior standard deviations")
     outside: float = _rule(1.0, DERIVED, "the declared tolerance itself", "prior standard deviations")
+    alone: float = _rule(0.25, PARTS, "of its limit that settling moves a number of which the other fit alone is sure")
     nearly: float = _rule(0.75, LUMPED, "of a bound, from which the surrogate of the settled calibration says little")
     sure: float = _rule(1.96, DERIVED, "of its own, of a 95 % interval", "standard deviations")
     alike: float = _rule(0.9, FIVE_AXIS, "of a signal's factor and a declared number that it may be", "cosine")

@@ -71,13 +71,15 @@ def loose_ones(detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.nd
     """The declared numbers farthest out of their tolerance, `far` at most, by two calibrations; settled (n,).
 
     Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
-    by the settled calibration, or by the fit that finds causes. The former is sure of no film of a heavy body.
+    by the settled calibration, or by the fit that finds causes where the other goes `alone` of its limit. The former is
+    sure of no film of a heavy body; the latter takes for it what another mesh makes of a joint.
     """
-    strain, found = detector.pulls.strain(fitted.x, settled), []
+    strain, by_settling = detector.pulls.strain(fitted.x, settled), detector.pulls.settled.strain(settled)
+    found = []
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
         x, covariance = settled_alone(detector.fitter, y, (j,))
         estimates = ((float(x[j]), float(np.sqrt(covariance[j, j])), True), (*_untied(fitted, j), False))
-        for value, sigma, by_settled in estimates:
+        for value, sigma, by_settled in estimates[: 2 if by_settling[j] >= detector.policy.alone else 1]:
             sure = max(detector.policy.sure, np.sqrt(detector.least))
             if np.sign(fitted.x[j]) * value > max(detector.policy.outside, sure * sigma):
                 rivals = _signals(detector, j, value, sigma, float(strain[j]) ** 2)
