@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.evidence.discretisation import SEGMENTS, _acting, _others, differences, inside_of, with_inside
+from twin.diagnose.evidence.discretisation import _acting, _others, differences, inside_of, with_inside
 from twin.diagnose.evidence.pulls import Pulls
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import make_study
@@ -76,12 +76,13 @@ def test_rails_in_more_segments_are_other_discretisations():
     assert same is machine
     assert linear
     assert moving
-    assert len(others) == len(SEGMENTS)
-    for times, (other, share, quadratic) in zip(SEGMENTS, others, strict=True):
+    assert len(others) > 1
+    for other, share, quadratic in others:
         assert not quadratic
+        times = share / (share - 1.0)  # the error goes with the length: it is share times what 1 / times of it leaves
         assert {n: other.contacts[n].segments for n in moving} == {n: round(times * s) for n, s in moving.items()}
+        assert all(other.contacts[n].segments > s for n, s in moving.items())
         assert all(other.contacts[n] == c for n, c in machine.contacts.items() if n not in moving)
-        assert share * (1.0 - 1.0 / times) == pytest.approx(1.0)  # the error goes with the length
     assert all(o.contacts.keys() >= small_case.machine().contacts.keys() for o, _, _ in _others(small_case.machine()))
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.model.surrogate import CONDUCTS, UNITS, Surrogate, make_surrogate
+from twin.diagnose.model.surrogate import CONDUCTS, Surrogate, make_surrogate
 
 FAR = 2.5  # prior standard deviations
+UNITS = 0.05, 1e-6  # K, m: noise
 
 
 @cache
