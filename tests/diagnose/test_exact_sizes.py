@@ -158,7 +158,7 @@ def test_a_liquid_is_found_with_its_film_and_its_temperature_while_the_air_drift
     n = len(slots.gate)
     slots.A[0], slots.M[0] = probed.A[p], probed.M[p]
     slots.gate[n // 4 : 3 * n // 4, 0] = 1.0  # for two hours
-    slots.rise[:, :, 0] = degrees - probed.base.reference_temperature
+    slots.rise[:, 0] = degrees - probed.base.reference_temperature
     x = 0.5 * np.random.default_rng(9).standard_normal(len(study.probed.parameters))
     wet = study.outputs(k, x, slots, (film,)) - study.outputs(k, x)
     verdict, causes = verdict_of(

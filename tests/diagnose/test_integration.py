@@ -45,9 +45,9 @@ def test_without_slots_it_is_the_integration_of_a_calibration(spread):
     planned = study.runs[0]
     x = spread * np.random.default_rng(1).standard_normal(len(probed.parameters))
     v = np.concatenate([x * study.scale, np.zeros(2)])
-    empty = no_slots(planned.run.drive.n_steps, 1, 2, model.n, model)
+    empty = no_slots(planned.run.drive.n_steps, 2, model.n, model)
     got = states_of(probed.layout, probed.contacts, False, probed.system, study.effects,
-                    loads_for(model, planned.run.drive, 1), empty, planned.z0, v)  # fmt: skip
+                    loads_for(model, planned.run.drive), empty, planned.z0, v)  # fmt: skip
     loads = plain.loads_for(model, planned.run.drive, 40)
     wanted = plain.trajectory(
         probed.layout, probed.contacts, False, probed.system, study.effects, loads, planned.z0, x * study.scale

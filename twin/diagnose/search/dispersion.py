@@ -7,7 +7,7 @@ Of m measured numbers with white residual r, after the named causes and the stro
 is 1 with a standard deviation of (2 / m)^(1/2) where noise and model discrepancy are all that is left, as Pi is the
 inverse covariance of r (dispersion: McCullagh, Nelder, Generalized Linear Models, 1989, section 4.5; c-hat: Burnham,
 Anderson, Model Selection and Multimodel Inference, 2002, section 2.5). More is an error of the model's form, of which a
-cause must explain more than a quarter. Above 3 it becomes model discrepancy of its own (slow errors, below), and a
+cause must explain more than half. Above 3 it becomes model discrepancy of its own (slow errors, below), and a
 cause must explain more than half of what is left beside that; heat of any history is not told then.
 
 To divide every statistic by c is not enough: what a form leaves lasts for hours, and one place may explain half of it.
@@ -60,7 +60,7 @@ class Dispersion:
     def least(self, policy: SearchPolicy) -> float:
         """What a cause must explain at least; 0 where noise and model discrepancy are all that is left."""
         if self.errors is not None:
-            return policy.beside * self.beside
+            return policy.excess * self.beside
         excess = self.left - self.measured
         return policy.excess * excess if excess > policy.chance * math.sqrt(2.0 * self.measured) else 0.0
 

@@ -34,9 +34,8 @@ class SearchPolicy:
 
     # a model that is wrong in its form, and members that it lacks
     chance: float = _rule(3.0, DERIVED, "by which what is left is more than chance", "standard deviations")
-    excess: float = _rule(0.25, LUMPED, "of what is left beyond noise and model discrepancy: a cause must explain it")
+    excess: float = _rule(0.5, PARTS, "of what is left beyond noise, discrepancy and slow errors: a cause must explain it")
     dispersed: float = _rule(3.0, LUMPED, "of what is left per measured number, from which it becomes slow errors")
-    beside: float = _rule(0.5, LUMPED, "of what is left beside these, which a cause must explain")
     slow_rows: int = _rule(12, JUDGED, "of a channel in a run, from which a slow error is learned")
     slow_longest: float = _rule(0.98, JUDGED, "of neighbours: four hours of 5 min, of runs of a day", "correlation")
     slow_least: float = _rule(1.0, DERIVED, "of a mode of slow errors: less than noise is none", "variances of noise")
@@ -77,7 +76,7 @@ class SearchPolicy:
     pulled: float = _rule(2.5, FIVE_AXIS, "that data tell a number from the declared one by", "standard deviations")
     beyond: float = _rule(3.0, FIVE_AXIS, "that a loose number keeps beside any other", "prior standard deviations")
     outside: float = _rule(1.0, DERIVED, "the declared tolerance itself", "prior standard deviations")
-    alone: float = _rule(0.25, PARTS, "of its limit that settling moves a number of which the other fit alone is sure")
+    alone: float = _rule(0.5, LUMPED, "of its limit that settling moves a number of which the other fit alone is sure")
     nearly: float = _rule(0.75, LUMPED, "of a bound, from which the surrogate of the settled calibration says little")
     sure: float = _rule(1.96, DERIVED, "of its own, of a 95 % interval", "standard deviations")
     alike: float = _rule(0.9, FIVE_AXIS, "of a signal's factor and a declared number that it may be", "cosine")

@@ -44,7 +44,7 @@ def poor_note(
     if dispersion.share > policy.dispersed:
         told = (
             f"the model is too poor: even the best explanation leaves {variance}, and a cause must explain "
-            f"{policy.beside:.0%} of what is left beside slow errors of single channels"
+            f"{policy.excess:.0%} of what is left beside slow errors of single channels"
         )
     else:
         told = f"even the best explanation leaves {variance}: a cause must explain {policy.excess:.0%} of the excess"
