@@ -231,7 +231,7 @@ def test_what_comes_early_in_every_run_is_no_clock():
     x = 0.5 * np.random.default_rng(8).standard_normal(len(study.probed.parameters))
     y = clean(x) + noise(8)
     for k in study.fitted:
-        y -= 90.0 * late(study, {k: study.states(k, x)}, -90.0)
+        y -= 75.0 * late(study, {k: study.states(k, x)}, -75.0)
     _, causes = verdict_of(search(small_case.made_detector(), y), FAMILIES)
     assert "clock" not in [c.history for c in causes]
 
