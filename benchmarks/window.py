@@ -42,7 +42,7 @@ def rich(shared: Shared, place: str) -> np.ndarray:
 
 
 def window(study: Study, place: int) -> np.ndarray:
-    """(n + 1, r) states of the window model, likewise; -1: at none."""
+    """(n + 1, r) states of the window model, with heat at a place; -1: at none."""
     slots, x = study.slots(RUN), np.zeros(len(study.probed.parameters))
     n = len(slots.gate)
     if place >= 0:
