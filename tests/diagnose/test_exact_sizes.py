@@ -225,13 +225,16 @@ def test_sizes_scored_together_are_scored_as_each_alone():
         assert h.information == pytest.approx(float(P @ change) / h.amplitude[0] ** 2, rel=1e-6)
 
 
-def test_what_comes_early_in_every_run_is_no_clock():
+@pytest.mark.parametrize(
+    "early", [75.0, pytest.param(90.0, marks=pytest.mark.xfail(strict=True, reason="its curvature is no nuisance yet"))]
+)
+def test_what_comes_early_in_every_run_is_no_clock(early):
     """A log's clock is off in its own run; the same in all is how fast a part or its sensor responds."""
     study = small_case.study()
     x = 0.5 * np.random.default_rng(8).standard_normal(len(study.probed.parameters))
     y = clean(x) + noise(8)
     for k in study.fitted:
-        y -= 75.0 * late(study, {k: study.states(k, x)}, -75.0)
+        y -= early * late(study, {k: study.states(k, x)}, -early)
     _, causes = verdict_of(search(small_case.made_detector(), y), FAMILIES)
     assert "clock" not in [c.history for c in causes]
 
