@@ -164,7 +164,7 @@ def _visible_heat(study: Study, nominal: Sequence[np.ndarray], place: str) -> fl
     for k, y in enumerate(nominal):
         slots = study.slots(k)
         forcing = np.array(slots.forcing)
-        forcing[:, :, 0] = study.probed.B[at]
+        forcing[:, 0] = study.probed.B[at]
         found = max(found, _times(study, k, study.outputs(k, x, replace(slots, forcing=forcing), (1.0,)) - y))
     return found
 

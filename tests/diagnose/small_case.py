@@ -12,7 +12,7 @@ import numpy as np
 
 from tests.calibrate import lumped_case
 from twin.calibrate.fit.measured import measured
-from twin.diagnose.evidence.nulls import Form, form_of
+from twin.diagnose.evidence.nulls import form_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.elements import Elements, elements_of
 from twin.diagnose.model.bank import Nominal, nominal_run, respond
@@ -127,7 +127,7 @@ def responses(linear: bool = False) -> np.ndarray:
 def made_detector() -> Detector:
     """From few synthetic measurements: thresholds are rough."""
     instruments = instruments_of(study(), NOISE, TCP_NOISE)
-    form = Form(steep=form_of(machine()).steep)  # a lumped machine, with contacts as uncertain as a mesh's
+    form = replace(form_of(machine()), contact=0.5)  # with contacts more uncertain than those of other machines
     return make_detector(study(), FAMILIES, instruments, POLICY, form, counts=(24, 40))
 
 

@@ -8,11 +8,25 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.evidence.discretisation import _acting, _others, differences, inside_of, with_inside
+from twin.build.simulate import simulate_run
+from twin.calibrate.fit.measured import measured
+from twin.diagnose.evidence.discretisation import (
+    Difference,
+    _acting,
+    _others,
+    differences,
+    inside_of,
+    with_inside,
+    with_segments,
+)
 from twin.diagnose.evidence.pulls import Pulls
 from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.rich_probed_model import Mesh
 from twin.diagnose.model.study import make_study
 from twin.diagnose.model.surrogate import make_surrogate
+from twin.inject.machines.loads import loads_of_run
+from twin.logs.read import read_run
+from twin.logs.run import Run
 from twin.machine.check_lumped import node_capacity, total_capacity
 from twin.machine.description import Machine
 from twin.machine.load import load_machine
@@ -48,7 +62,7 @@ def test_bars_of_finer_elements_tell_the_error_of_the_described_ones(both):
     machine = small_case.machine()
     bars = {n: b.model_copy(update={"elements": 8 * b.elements}) for n, b in machine.bars.items()}
     error = outputs(machine.model_copy(update={"bars": bars})) - outputs(machine)
-    d = both[0].d
+    d = both[0].known[:, 0]
     assert np.linalg.norm(error - d) < 0.35 * np.linalg.norm(
         error
     )  # the nut heats within an element: less than second order
@@ -65,25 +79,55 @@ def test_the_difference_follows_the_parameters(both):
     acting = [_acting(p, split) for p in known]
     other = make_study(make_probed_model(split, acting, small_case.runs()), plans, study.fitted)
     exact = np.concatenate([other.outputs(k, x) - study.outputs(k, x) for k in study.fitted])
-    assert np.linalg.norm(exact - both[1].at(x)) < 0.2 * np.linalg.norm(exact)
-    assert np.linalg.norm(exact - both[1].at(x)) < np.linalg.norm(exact - both[1].d)
+    told = both[1].real[:, 0] + both[1].D @ x
+    assert np.linalg.norm(exact - told) < 0.2 * np.linalg.norm(exact)
+    assert np.linalg.norm(exact - told) < np.linalg.norm(exact - both[1].real[:, 0])
 
 
-def test_rails_in_more_segments_are_other_discretisations():
+def test_meshes_and_rails_in_more_segments_are_other_discretisations():
     machine = load_machine(Path(__file__).parents[1] / "machines" / "slide")
     moving = {n: c.segments for n, c in machine.contacts.items() if c.kind == "moving"}
-    (same, _, linear), *others = _others(machine)
-    assert same is machine
-    assert linear
+    (mesh,), rails = _others(machine)
+    assert mesh.machine is machine
+    assert mesh.mesh is Mesh.FINER
     assert moving
-    assert len(others) > 1
-    for other, share, quadratic in others:
-        assert not quadratic
-        times = share / (share - 1.0)  # the error goes with the length: it is share times what 1 / times of it leaves
-        assert {n: other.contacts[n].segments for n in moving} == {n: round(times * s) for n, s in moving.items()}
-        assert all(other.contacts[n].segments > s for n, s in moving.items())
-        assert all(other.contacts[n] == c for n, c in machine.contacts.items() if n not in moving)
-    assert all(o.contacts.keys() >= small_case.machine().contacts.keys() for o, _, _ in _others(small_case.machine()))
+    more = [[other.machine.contacts[n].segments for n in moving] for other in rails]
+    assert all(np.diff([list(moving.values()), *more], axis=0).ravel() >= 0)
+    assert more[0] > list(moving.values())
+    assert more[-1] == [2 * s for s in moving.values()]
+    for other in rails:
+        assert other.mesh is Mesh.DESCRIBED
+        assert all(other.machine.contacts[n] == c for n, c in machine.contacts.items() if n not in moving)
+    lumped = [other for others in _others(small_case.machine()) for other in others]
+    assert all(other.machine.contacts.keys() >= small_case.machine().contacts.keys() for other in lumped)
+
+
+def test_a_mesh_too_large_to_be_halved_has_linear_elements_instead(monkeypatch):
+    machine = load_machine(Path(__file__).parents[1] / "machines" / "slide")
+    monkeypatch.setattr("twin.diagnose.evidence.discretisation.finer_fits", lambda _: False)
+    (mesh,), _ = _others(machine)
+    assert mesh.mesh is Mesh.LINEAR
+    assert mesh.machine is machine
+
+
+def test_what_a_real_division_shows_is_one_that_is_not_known():
+    """Measurements are one of the real ones, each channel with a sign of its own; the columns know the others."""
+    rng = np.random.default_rng(2)
+    known, real = rng.standard_normal((60, 3)), rng.standard_normal((60, 2))
+    share = np.repeat(np.arange(4), 15)
+    difference = Difference(known, real, np.zeros((60, 5)), share)
+    seen = set()
+    for _ in range(200):
+        y = difference.drawn(rng, np.zeros(5))
+        one = next(k for k in range(2) if np.allclose(np.abs(y), np.abs(real[:, k])))
+        signs = [np.unique(np.sign(y * real[:, one])[share == s]) for s in range(4)]
+        assert all(len(own) == 1 for own in signs)
+        seen.add((one, *(float(own[0]) for own in signs)))
+    assert len(seen) == 2 * 2**4
+    columns = difference.columns(lambda v: 100.0 * v, 0.6)
+    assert all(len(np.unique(share[np.flatnonzero(c)])) == 1 for c in columns.T)
+    mean = sum(np.outer(d, d) for d in 100.0 * known.T) * (share[:, None] == share)
+    np.testing.assert_allclose(columns @ columns.T, mean, atol=1.0)
 
 
 def test_an_inside_takes_half_of_a_node_and_nothing_is_lost():
@@ -115,3 +159,36 @@ def test_a_parameter_is_out_of_its_tolerance_where_few_synthetic_measurements_mo
     assert strain[named] > 1.0
     assert strain[other] == 0.0  # a capacity is no cause
     assert pulls.strain(far, -far)[named] == 0.0  # the calibrations contradict each other
+
+
+def simulated(machine: Machine, seed: int, folder: Path) -> Run:
+    """Two hours by the full model, without noise."""
+    loads_of_run(machine, seed, folder.name, 2.0, 60.0, {}).write(folder)
+    return simulate_run(machine, read_run(folder), tcp_every=600.0)[0]
+
+
+@pytest.mark.long
+def test_a_machine_of_parts_knows_its_mesh_and_its_rails_at_every_sensor(tmp_path):
+    """Of a division that nothing was made with the known ones tell some."""
+    machine = load_machine(Path(__file__).parents[1] / "machines" / "slide")
+    known, runs = parameters(machine), [simulated(machine, seed, tmp_path / f"{seed}") for seed in (1, 2)]
+    probed = make_probed_model(machine, known, runs)
+    plans = [measured(probed.base, run, b.drive, b.name) for run, b in zip(runs, probed.runs, strict=True)]
+    study = make_study(probed, plans, range(len(runs)))
+    mesh, rails = differences(machine, study, make_surrogate(study), known, runs, plans)
+    x = np.zeros(len(known))
+    base = make_study(make_probed_model(machine, known, runs, nominal_alone=True), plans, study.fitted).all_outputs(x)
+    np.testing.assert_allclose(base, study.all_outputs(x), atol=0.05)  # noise of single readings is 0.1 K
+    other = with_segments(machine, 3.0)
+    more = (
+        make_study(make_probed_model(other, known, runs, nominal_alone=True), plans, study.fitted).all_outputs(x) - base
+    )
+    for own in np.unique(rails.share):
+        rows = rails.share == own
+        if np.sqrt(np.mean(more[rows] ** 2)) > 0.02:
+            columns = np.hstack([rails.known[rows], rails.real[rows]])
+            left = more[rows] - columns @ np.linalg.lstsq(columns, more[rows], rcond=None)[0]
+            assert np.linalg.norm(left) < 0.7 * np.linalg.norm(more[rows])
+    assert np.abs(mesh.known).max() > 0.01
+    assert not mesh.D.any()
+    assert not rails.D.any()

@@ -11,10 +11,14 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.pulls import Loose
+from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Gain
+from twin.diagnose.search.accepted import Accepted, settled
 from twin.diagnose.search.forward import search
+from twin.diagnose.search.gain import gains
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.sealed import judged, other_sizes
 from twin.diagnose.search.verdict import strained_of, verdict_of
@@ -32,7 +36,7 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
         """gain: share of a sensor's error that the cause takes from it in the sealed run; smaller: a smaller one."""
 
         def table(of: Search, *_: object) -> tuple[Gain, ...]:
-            own = gain if of is found or smaller is None else smaller
+            own = gain if of.accepted is found.accepted or smaller is None else smaller
             return (Gain("sealed", "housing", "K", 1.0, 1.0, 1.0 - own, (own - 0.1, own + 0.1), True),)
 
         monkeypatch.setattr(sys.modules[judged.__module__], "gains", table)
@@ -82,3 +86,42 @@ def test_other_sizes_are_the_smallest_and_that_of_the_settled_calibration():
     assert settled.amplitude[0] == pytest.approx(4.5 * detector.study.scale[small_case.source_off(4.5)[0]], rel=0.05)
     unsure = replace(found, accepted=(replace(one, covariance=1e6 * one.covariance),))
     assert next(other_sizes(unsure, y))[0].amplitude[0] == 0.0
+
+
+def test_a_declared_number_is_judged_beside_a_calibration_of_all_others():
+    """The calibration without a cause moves the number itself and predicts as well as the model that is told."""
+    detector = small_case.made_detector()
+    j, y = small_case.source_off(4.5)
+    study, x = detector.study, np.zeros(len(detector.study.scale))
+    found = search(detector, y)
+    assert found.x0[j] > 2.0
+    x[j] = 4.5
+    T, w = study.runs[2].split(study.outputs(2, x))
+    opened = [replace(study.runs[2].measured, temperature=T, tcp=w)]
+    told = judged(found, y, *verdict_of(found, FAMILIES), FAMILIES, opened, 1)
+    held = settled(found.detector, y, [replace(a, amplitude=np.zeros(1)) for a in found.accepted])[0]
+    assert held[j] == 0.0
+    at = study.runs[2].split(study.outputs(2, held))[0]
+    for i, name in enumerate(study.runs[2].measured.sensors):
+        own = next(g for g in told.gains if g.channel == name)
+        assert own.recalibrated == pytest.approx(float(np.sqrt(np.mean((T[:, i] - at[:, i]) ** 2))))
+    assert len(told.extension) == 1
+    assert sum(g.ci95[0] > 0.0 for g in told.gains if g.affected) > sum(
+        g.ci95[1] < 0.0 for g in told.gains if g.affected
+    )
+
+
+def test_an_expansion_is_not_judged_by_temperatures():
+    """They differ between both calibrations, and no expansion moves them."""
+    detector = small_case.made_detector()
+    study = detector.study
+    _, y = small_case.source_off(4.5)
+    batch = next(b for b in detector.columns.batches if b.family == "expansion")
+    h = Hypothesis(batch, 0, batch.histories[0], 50.0, (0.3,), 1.0)
+    one = Accepted(h, units_of(study, h), np.array([0.3]), np.eye(1), 50.0, 36.0, ())
+    found = replace(search(detector, y), accepted=(one,))
+    m = study.runs[2].measured
+    T, w = study.runs[2].split(study.outputs(2, found.x))
+    table = gains(found, 2, replace(m, temperature=T, tcp=w), 1, (np.full(len(m.sensors), 0.01), np.full(3, 1e-8)))
+    assert {g.unit for g in table if g.affected} == {"m"}
+    assert any(abs(g.recalibrated - g.extended) > 0.01 for g in table if g.unit == "K")

@@ -80,7 +80,7 @@ def mesh_part(
     """
     refuse_lumped(machine)
     free = MEMORY_SHARE * available_memory() if memory is None else memory
-    needed, unknowns = refined_bytes(full.bodies), 3 * max(map(_refined_nodes, full.bodies))
+    needed, unknowns = refined_bytes(full.bodies), refined_unknowns(full.bodies)
     finer = needed <= free and unknowns <= LARGEST
     coarse, places = _at_one_pose(full.thermal), np.vstack([full.thermal.poses, positions])
     one = {axis: (float(grid[0]),) for axis, grid in zip(coarse.pose_axes, full.thermal.pose_grid, strict=True)}
@@ -110,6 +110,11 @@ def refined_bytes(bodies: Sequence[BodyMesh]) -> float:
     elastic = predicted_bytes(3 * largest, 3 * largest * ELASTIC_ROW)
     thermal = sum(predicted_bytes(n, n * THERMAL_ROW) for n in sizes)
     return max(elastic, PROCESSES * KEPT * thermal) + PER_NODE * sum(sizes)
+
+
+def refined_unknowns(bodies: Sequence[BodyMesh]) -> int:
+    """Elastic unknowns of the largest body on a mesh of half the size."""
+    return 3 * max(map(_refined_nodes, bodies))
 
 
 def _refined_nodes(body: BodyMesh) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class Shared:
     places: tuple[Place, ...]
     drives: tuple[Drive, ...]  # per run, of the description
     starts: tuple[float, ...]  # degC
+    every: int = EVERY
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def drawn(places: Sequence[Place], drive: Drive, air: Sequence[float], seed: int
 
 
 def trajectory(shared: Shared, draw: Draw) -> np.ndarray:
-    """States (N, m) of one run at one draw, every third step."""
+    """States (N, m) of one run at one draw."""
     values = values_of(shared.parameters, draw.seed)
     drive = shared.drives[draw.run]
     acting = drawn(shared.places, drive, drive.environment.mean(axis=1), draw.seed)
@@ -113,7 +114,7 @@ def stepped(
     first = [x + by * b.one for x, b, by in zip(stepper.uniform(start), there.bodies, warmer, strict=True)]
     states = [np.concatenate(first)]
     for k, x, _ in stepper.run(with_acting(own, there.load_model, acting), first):
-        if k % EVERY == EVERY - 1:
+        if k % shared.every == shared.every - 1:
             states.append(np.concatenate(x))
     return np.column_stack(states)
 
@@ -131,3 +132,9 @@ def snapshots(shared: Shared, draws: int = DRAWS, progress: Progress = silent) -
         made = each(trajectory, shared, items, lambda d: advance(f"run {d.run + 1}, draw {d.seed}"))
         heated = each(alone, shared, names, advance)
     return made[: len(runs)], made[len(runs) :], [X - made[0] for X in heated]
+
+
+def nominal(shared: Shared) -> list[np.ndarray]:
+    """(N, m) of every run at the nominal values, at every step."""
+    items = [Draw(run, 0) for run in range(len(shared.drives))]
+    return each(trajectory, replace(shared, every=1), items)

@@ -16,6 +16,7 @@ from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.traces import traces_of_run
 from twin.diagnose.evidence.discretisation import Difference, differences
+from twin.diagnose.evidence.film_laws import with_film_laws
 from twin.diagnose.evidence.nulls import form_of
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import VERSION
@@ -113,7 +114,8 @@ def prepare(
     plans = [measured(probed.base, run, own.drive, own.name, exclude=settings.exclude)
              for run, own in zip(every, probed.runs, strict=True)]  # fmt: skip
     closed = [*plans[: len(runs)], *(_closed(m) for m in plans[len(runs) :])]
-    study = make_study(probed, closed, range(len(runs)))
+    form = form_of(machine)
+    study = with_film_laws(make_study(probed, closed, range(len(runs))), form)
     if sum(m.n_temperature + len(m.tcp) for m in plans[: len(runs)]) < LEAST:
         raise LogError(
             "too few measurements to diagnose", str(runs[0].folder),
@@ -131,7 +133,7 @@ def prepare(
     asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)
     names = tuple((f.name, f.number, f.file) for f in settings.families)
     tolerance = tuple((p.path, p.nominal, p.sigma) for p in known)
-    counts, form = (settings.form, settings.nulls), form_of(machine)
+    counts = settings.form, settings.nulls
 
     def differ(surrogate: Surrogate) -> tuple[Difference, ...]:
         return differences(machine, study, surrogate, known, every, closed, progress)
@@ -143,7 +145,7 @@ def prepare(
         "detector", make_detector.__module__, inputs,
         lambda: stored(make_detector(study, families, instruments, policy, form, counts, progress, differ)),
     )  # fmt: skip
-    return probed, study, detector.of(study, policy), plans
+    return study.probed, study, detector.of(study, policy), plans
 
 
 def _closed(m: Measured) -> Measured:

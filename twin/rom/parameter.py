@@ -12,8 +12,9 @@ from typing import Any, Literal
 
 from twin.rom.from_json import filled
 
-Kind = Literal["source", "film", "joint", "contact", "capacity", "expansion", "environment"]
+Kind = Literal["source", "film", "joint", "contact", "capacity", "expansion", "environment", "exponent", "wind"]
 Scale = Literal["log", "linear"]
+OF_LAWS: tuple[Kind, ...] = ("exponent", "wind")  # of films, which no description has and a diagnosis alone varies
 
 
 @dataclass(frozen=True)

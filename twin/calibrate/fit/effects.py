@@ -33,6 +33,8 @@ class Effects:
     joint: Array  # (n_joints, n)
     contact: Array  # (n_contacts, n)
     environment: Array  # (n_environments, n) K per K
+    exponent: Array  # (n_films, n) of the rise of a surface above its air; what a diagnosis alone varies
+    wind: Array  # (n_films, n) per unit of what a film hears of speed; likewise
     E: Array  # (n_c, r, r) J/K: shares in E of the members that capacities act on
     capacity: Array  # (n_c, n)
     G: Array  # (n_e, n_poses * 3, r) m/K: shares in G of the members that expansions act on
@@ -69,6 +71,8 @@ def effects_of(model: MachineModel, parameters: Sequence[Parameter], starts: Seq
         "joint": [j.name for j in load.joints],
         "contact": list(load.contacts),
         "environment": [e.name for e in load.environments],
+        "exponent": [f.name for f in load.films],
+        "wind": [f.name for f in load.films],
         "capacity": list(body.members),
         "expansion": list(body.members),
     }
@@ -93,6 +97,8 @@ def effects_of(model: MachineModel, parameters: Sequence[Parameter], starts: Seq
         joint=acts["joint"],
         contact=acts["contact"],
         environment=acts["environment"],
+        exponent=acts["exponent"],
+        wind=acts["wind"],
         E=_shares(body.E_members, some["capacity"], (r, r)),
         capacity=acts["capacity"][some["capacity"]],
         G=_shares(body.G_members, some["expansion"], (len(model.poses), 3, r)).reshape(-1, 3 * len(model.poses), r),
@@ -127,6 +133,8 @@ class Factors:
     joint: jax.Array
     contact: jax.Array
     environment: jax.Array
+    exponent: jax.Array
+    wind: jax.Array
     capacity: jax.Array
 
 
@@ -138,5 +146,7 @@ def factors_at(effects: Effects, u: jax.Array) -> Factors:
         factors(effects.joint, u),
         factors(effects.contact, u),
         jnp.asarray(effects.environment) @ u,
+        jnp.asarray(effects.exponent) @ u,
+        jnp.asarray(effects.wind) @ u,
         factors(effects.capacity, u),
     )

@@ -1,23 +1,26 @@
 """What another discretisation of the same machine would show: model discrepancy that is this machine's own.
 
 Two sensors beside one rail differ by 0.1 K between two meshes: no drawn coefficient looks like that, and a joint does.
-So the machine is described once more, with linear elements, with rails in more segments, with bars of finer
+So the machine is described once more, with elements of half the size, with rails in more segments, with bars of finer
 elements, and with an inside for each heavy node; what both measure otherwise is known in shape and unknown in its
-share.
+share, which every channel of a machine of parts has for itself.
 
-    y_other(x) - y(x) = d + D x,      share ~ N(0, 1)
+    y_real(x) - y(x) = share (d + D x),      share ~ N(0, 1)
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.build.mesh_error import OF_LINEAR
+from twin.build.mesh import load_body_meshes
+from twin.build.mesh_error import LARGEST, OF_FINER, OF_LINEAR, refined_bytes, refined_unknowns
 from twin.calibrate.fit.measured import Measured
+from twin.diagnose.evidence.leading import channel_of, leading_of_each
 from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.rich_probed_model import Mesh
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.model.surrogate import Surrogate, jacobian_of
 from twin.logs.run import Run
@@ -31,11 +34,11 @@ from twin.rom.parameter import Parameter
 # (Hurwitz' theorem; Hardy, Wright, An Introduction to the Theory of Numbers, 5th ed. 1979, 11.8)
 BARS = (1.0 + 5.0**0.5) / 2.0
 OF_BARS = 1.0 / (1.0 - BARS**-2)  # of the difference: the error of linear elements goes with the square of their size
-# times the segments of a rail: what its sensors show depends on where in a segment they sit, otherwise in every
-# division; its error goes with the length, 1 / (1 - 1 / times) of the difference. Chosen on the ball-screw axis with
-# six other divisions of its screw: twice as many alone leave 1.19 times the variance that they should, both 1.09, and
-# with 1.62 times as many 1.02, for another two minutes on a machine as large as five_axis
-SEGMENTS = (BARS**0.5, 2.0)
+# times the segments of a rail. What its sensors show depends on where in a segment they sit, otherwise in every
+# division, and no few of them span what another one does (of the screw of the shipped axis six leave a third): two of
+# three are known, and synthetic measurements come from the others
+SEGMENTS = tuple(2.0 ** (k / 9.0) for k in range(1, 10))
+BYTES = 10e9  # of a machine on a mesh of half the size: what a computer of 16 GB has to spare
 DIFFUSIVITY = 1.3e-5  # m^2/s, of steel and cast iron (VDI Heat Atlas, 2nd ed., D6.1)
 LONG = 2.0  # times the edge of a cube of its capacity that a node's heat has to go: machine parts are no cubes
 SPLIT_FROM = 120.0  # s, of a node's inside behind its surface: two steps of 60 s
@@ -43,14 +46,23 @@ SPLIT_FROM = 120.0  # s, of a node's inside behind its surface: two steps of 60 
 
 @dataclass(frozen=True)
 class Difference:
-    """m measurements, n parameters: another discretisation minus the described one, by one standard deviation."""
+    """m measurements, n parameters: other discretisations minus the described one, by one standard deviation."""
 
-    d: np.ndarray  # (m,) K, m, at the description
-    D: np.ndarray  # (m, n) by parameters in prior standard deviations
+    known: np.ndarray  # (m, k) K, m, at the description
+    real: np.ndarray  # (m, l) the same of those that a real machine may be like
+    D: np.ndarray  # (m, n) by the numbers of the description in prior standard deviations
+    share: np.ndarray  # (m,) 0, 1, ...: which of the shares every measurement has
 
-    def at(self, x: np.ndarray) -> np.ndarray:
-        """(m,) at parameters x (n,)."""
-        return np.asarray(self.d + self.D @ x)
+    def drawn(self, rng: np.random.Generator, x: np.ndarray) -> np.ndarray:
+        """(m,) at parameters x (n,), with shares drawn; of several real ones it is one of them, with signs drawn."""
+        shares, several = int(self.share.max()) + 1, self.real.shape[1]
+        size = rng.choice([-1.0, 1.0], shares) if several > 1 else rng.standard_normal(shares)
+        one = int(rng.integers(several)) if several > 1 else 0
+        return np.asarray(size[self.share] * (self.real[:, one] + self.D @ x[: self.D.shape[1]]))
+
+    def columns(self, white: Callable[[np.ndarray], np.ndarray], spread: float) -> np.ndarray:
+        """(m, k) of unit prior variance, at parameters of a spread of prior standard deviations."""
+        return leading_of_each(self.share, white(np.hstack([self.known, spread * self.D])))
 
 
 def differences(
@@ -62,31 +74,63 @@ def differences(
     plans: without numbers. Raises ModelError and DescriptionError as assembling the machine does.
     """
     x = np.zeros(len(parameters))
-    J = surrogate.J * surrogate.rate(x)
+    J = surrogate.J[:, : len(x)] * surrogate.rate(np.zeros(len(surrogate.scale)))[: len(x)]
+    # elements err about each sensor by itself: refined at once, a bearing in a coarse box would hide the castings
+    apart = np.zeros(len(J), dtype=int) if machine.lumped else np.unique(channel_of(study), return_inverse=True)[1]
+
+    def study_of(other: _Other) -> Study:
+        known = [_acting(p, other.machine) for p in parameters]
+        probed = make_probed_model(other.machine, known, runs, progress, other.mesh, not machine.lumped)
+        return make_study(probed, plans, study.fitted)
+
+    # two windows made alike are off alike
+    y = surrogate.y0 if machine.lumped else study_of(_Other(machine)).all_outputs(x)
     found = []
-    for other, share, linear in _others(machine):
-        known = [_acting(p, other) for p in parameters]
-        probed = make_probed_model(other, known, runs, progress, linear)
-        of_other = make_study(probed, plans, study.fitted)
-        d, D = of_other.all_outputs(x) - surrogate.y0, jacobian_of(of_other, x) - J
-        found.append(Difference(share * d, share * D))
+    for others in _others(machine):
+        studies = [study_of(other) for other in others]
+        d = np.stack([o.share * (own.all_outputs(x) - y) for o, own in zip(others, studies, strict=True)], axis=1)
+        D = others[0].share * (jacobian_of(studies[0], x) - J) if machine.lumped else np.zeros_like(J)
+        real = np.arange(len(others)) % 3 == 1
+        found.append(Difference(d[:, ~real], d[:, real], D, apart) if real.any() else Difference(d, d, D, apart))
     return tuple(found)
 
 
-def _others(machine: Machine) -> Iterator[tuple[Machine, float, bool]]:
-    """Other discretisations: a machine, the share of its difference that is one standard deviation, linear elements."""
+@dataclass(frozen=True)
+class _Other:
+    """Another discretisation."""
+
+    machine: Machine
+    share: float = 1.0  # of its difference that is one standard deviation
+    mesh: Mesh = Mesh.DESCRIBED
+
+
+def _others(machine: Machine) -> Iterator[list[_Other]]:
+    """Other discretisations, by what is divided otherwise."""
     if not machine.lumped:
-        yield machine, OF_LINEAR, True
-    if not machine.lumped and (moving := {n: c for n, c in machine.contacts.items() if c.kind == "moving"}):
-        for times in SEGMENTS:
-            finer = {n: c.model_copy(update={"segments": round(times * c.segments)}) for n, c in moving.items()}
-            yield machine.model_copy(update={"contacts": machine.contacts | finer}), 1.0 / (1.0 - 1.0 / times), False
+        finer = finer_fits(machine)
+        yield [_Other(machine, OF_FINER, Mesh.FINER) if finer else _Other(machine, OF_LINEAR, Mesh.LINEAR)]
+        if any(c.kind == "moving" for c in machine.contacts.values()):
+            yield [_Other(with_segments(machine, times)) for times in SEGMENTS]
     if machine.bars:
         bars = {n: b.model_copy(update={"elements": round(BARS * b.elements)}) for n, b in machine.bars.items()}
-        yield machine.model_copy(update={"bars": bars}), OF_BARS, False
+        yield [_Other(machine.model_copy(update={"bars": bars}), OF_BARS)]
     for name in machine.nodes:
         if (split := with_inside(machine, name)) is not machine:
-            yield split, 1.0, False
+            yield [_Other(split)]
+
+
+def with_segments(machine: Machine, times: float) -> Machine:
+    """The machine with rails and screws in so many times the segments, in one more at least."""
+    moving = {n: c for n, c in machine.contacts.items() if c.kind == "moving"}
+    more = {n: max(round(times * c.segments), c.segments + 1) for n, c in moving.items()}
+    contacts = machine.contacts | {n: c.model_copy(update={"segments": more[n]}) for n, c in moving.items()}
+    return machine.model_copy(update={"contacts": contacts})
+
+
+def finer_fits(machine: Machine) -> bool:
+    """Whether the machine on a mesh of half the size is made in minutes, in the memory of an ordinary computer."""
+    bodies = load_body_meshes(machine)
+    return refined_bytes(bodies) <= BYTES and refined_unknowns(bodies) <= LARGEST
 
 
 def with_inside(machine: Machine, name: str) -> Machine:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.build.workers import each
+from twin.diagnose.evidence.leading import LEAST, channel_of, leading, leading_of_each
 from twin.diagnose.evidence.nulls import EXPONENTS, Form, winds
 from twin.diagnose.evidence.whiten import Whitener
 from twin.diagnose.model.bank import Nominal
@@ -19,7 +20,6 @@ from twin.progress import Progress, silent
 
 CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
 READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
-LEAST = 0.7  # standard deviations over all its rows that a direction of a channel's readings must have
 SPREAD = 12.0**-0.5  # standard deviation of a uniform law of width 1
 BENT = 2.0**-0.5  # and of half a squared standard normal
 
@@ -41,7 +41,7 @@ def known_forms(
     columns = np.hstack([described.columns, _aside(study, nominal, len(J), form)])
     parts = [whiten(np.hstack([columns, wind]))] if columns.shape[1] else []
     parts += _wobbles(study, described, raw, whiten, form)
-    return np.hstack([*parts, *_readings(study, J, whiten, form)]) if parts else np.zeros((len(J), 0))
+    return np.hstack([*parts, _readings(study, J, whiten, form)]) if parts else np.zeros((len(J), 0))
 
 
 def _aside(study: Study, nominal: tuple[Nominal, ...], m: int, form: Form) -> np.ndarray:
@@ -73,39 +73,19 @@ def _wobbles(study: Study, described: Described, raw: np.ndarray, whiten: Whiten
     return [leading(whiten(form.shape * raw[:, own].astype(float) @ root)) for own in described.slow]
 
 
-def leading(white: np.ndarray) -> np.ndarray:
-    """(m, k) the leading directions of white columns (m, n) of unit prior variance: nearly the same covariance."""
-    U, s, _ = np.linalg.svd(white, full_matrices=False)
-    kept = s > LEAST
-    return np.asarray(U[:, kept] * s[kept])
-
-
 def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.ndarray:
     """(m, k) columns of unit prior variance: every channel's own error of a white response (m,)."""
-    label = _labels(study)
+    label = channel_of(study)
     columns = [np.where(label == channel, share * white, 0.0) for channel in np.unique(label)]
     kept = [c for c in columns if np.linalg.norm(c) > LEAST]
     return np.stack(kept, axis=1) if kept else np.zeros((len(white), 0))
 
 
-def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
+def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> np.ndarray:
     """Per channel the leading directions of what sources and contacts do to it, in all runs."""
     heated = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
     white = whiten(form.reading * J[:, heated] / study.scale[heated])
-    label = _labels(study)
-    result = []
-    for channel in np.unique(label):
-        rows = np.flatnonzero(label == channel)
-        own = leading(white[rows])
-        block = np.zeros((len(white), own.shape[1]))
-        block[rows] = own
-        result.append(block)
-    return result
-
-
-def _labels(study: Study) -> np.ndarray:
-    """(m,) which channel every number is of: sensors by number, TCP components -1 to -3."""
-    return study.joined(lambda p: (p.measured.column, [-1, -2, -3]))
+    return leading_of_each(channel_of(study), white)
 
 
 def wind_columns(study: Study, form: Form, progress: Progress = silent) -> np.ndarray:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from twin.diagnose.evidence.fitter import CLOSE, Fitter, bounds
+from twin.rom.parameter import OF_LAWS
 
 PASSES, INNER = 3, 6
 LONGEST = 1.0  # prior standard deviations, of a step
@@ -39,22 +40,24 @@ def settle(
 
     outputs: x -> (m,), (m, n), nearly; left: x -> (m,) white, exactly. The covariance counts model discrepancy as
     what it is: A (P + J^T W (1 + N N^T) W J) A with A = (P + J^T W J)^-1 (White, Econometrica 48, 1980, on
-    such sandwiches).
+    such sandwiches). Laws of films stay as described: what they do otherwise is model discrepancy here.
     """
     study, whiten = fitter.study, fitter.whiten
     low, high = bounds(study)
-    N = fitter.others
+    x = np.zeros(len(low))
+    laws = [i for i, p in enumerate(study.probed.parameters) if p.kind in OF_LAWS]
+    N = np.hstack([fitter.others, whiten(outputs(x)[1][:, laws])])
     rows = study.joined(lambda p: (p.shapes[0][0], p.shapes[1][0]))  # that the channel of each number has in its run
     W = 1.0 / (1.0 + rows * (N**2).sum(axis=1))
     precision = np.ones(len(low))
     precision[list(free)] = ANY**-2.0
     P = np.diag(precision)
-    x = np.zeros(len(low))
     for _ in range(PASSES):
         before = x
         white_left, there = left(x), outputs(x)[0]
         for _ in range(INNER):
             f, J = outputs(x)
+            J[:, laws] = 0.0
             white = whiten(J)
             A = np.linalg.inv(P + white.T @ (W[:, None] * white))
             found = A @ (white.T @ (W * (white_left + whiten(there - f + J @ x))))

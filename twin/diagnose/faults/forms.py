@@ -8,11 +8,8 @@ from twin.diagnose.evidence.formal import Described
 from twin.diagnose.evidence.nulls import Form, convection, lump_of
 from twin.diagnose.faults.elements import EXPONENT, Elements, Key
 from twin.diagnose.faults.signal import CLOCK
-from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study, heated_places
 
-LITTLE = 0.5  # K, of a surface above the air: convection of the room's own draught is left below it
-FREE = 25.0  # W/(m^2 K), the most that free convection in a gas is (Incropera, DeWitt, 6th ed. 2007, table 1.1)
 # Kinds that `described_forms` makes nuisances of: with every history, or the one named
 NUISANCE = {"film": "always", "group_film": "", "capacity": "", "moved": "", "start": "", "joint": "", "contact": "",
             "group": "", "air": ""}  # fmt: skip
@@ -24,9 +21,7 @@ def is_nuisance(key: Key) -> bool:
     return kind in NUISANCE and NUISANCE[kind] in ("", history)
 
 
-def described_forms(
-    study: Study, elements: Elements, nominal: tuple[Nominal, ...], raw: np.ndarray, form: Form
-) -> Described:
+def described_forms(study: Study, elements: Elements, raw: np.ndarray, form: Form) -> Described:
     """Of raw (m, n) responses in physical units."""
     load, probed = study.probed.base.load_model, study.probed
     films = [f.name for f in load.films]
@@ -60,36 +55,9 @@ def described_forms(
     for environment in load.environments:
         for c in elements.block_of.get(("air", environment.name), ()):
             columns.append(form.air * raw[:, c].astype(float))
-    if form.steep > 0.0:
-        columns += _steeper(study, elements, nominal, raw, form)
     slow = tuple(own for (kind, _), own in elements.block_of.items() if kind == "group")
     made = np.stack(columns, axis=1) if columns else np.zeros((len(raw), 0))
     return Described(made, slow, elements.histories.blocks)
-
-
-def _steeper(
-    study: Study, elements: Elements, nominal: tuple[Nominal, ...], raw: np.ndarray, form: Form
-) -> list[np.ndarray]:
-    """Per film (m,) outputs of another exponent of the rise of its surface above the air: form.steep (ln rise - mean).
-
-    A coefficient that is too large for free convection has it in the share that free convection may be.
-    """
-    load = study.probed.base.load_model
-    (body,) = study.probed.base.bodies
-    M = np.asarray(study.probed.system.M)[:, : len(load.films)]
-    blocks = elements.histories.blocks
-    wide = np.array([b - a for _, a, b in blocks], dtype=float)
-    result = []
-    for f, film in enumerate(load.films):
-        own, area = elements.block_of.get(("group", film.name)), float(M[:, f] @ body.one)
-        if own is None or not area > 0.0:
-            continue
-        rise = {k: np.abs(nominal[k].middle @ M[:, f] / area - nominal[k].outer[:, f]) for k in study.fitted}
-        told = np.array([np.log(np.maximum(rise[i][a:b], LITTLE)).mean() for i, a, b in blocks])
-        most = max(float(nominal[k].convection[:, f].mean()) for k in study.fitted)
-        size = form.steep * min(1.0, FREE / max(most, 1e-30))
-        result.append(size * (raw[:, own].astype(float) @ (told - wide @ told / wide.sum())))
-    return result
 
 
 def clocks(index: dict[Key, int]) -> list[int]:

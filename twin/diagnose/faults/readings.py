@@ -51,7 +51,8 @@ def readings_of(
     plans = [study.runs[k] for k in study.fitted]
     scale = study.scale
     for i, p in enumerate(study.probed.parameters):
-        add(("gain", p.path, "always"), [jac[:, i] / scale[i] for jac in J])
+        if p.kind != "exponent":
+            add(("gain", p.path, "always"), [jac[:, i] / scale[i] for jac in J])
     _sensors(study, plans, outputs, add, swaps)
     if any(len(plan.measured.tcp) for plan in plans):
         _tcp(study, plans, nominal, add)

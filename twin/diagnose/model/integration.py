@@ -5,9 +5,9 @@ Anal. 14, 1977: second order, L-stable, one matrix for both stages), as implicit
 off beside nuts and motors. And K slots hold what the description lacks, each times an amplitude a_k that is
 differentiated like a parameter:
 
-    (E + sum a_k E_k) x' = -(A(theta (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
+    (E + sum a_k E_k) x' = -(A(theta law (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
                            + (B + sum a_k B_k) P + ... + sum a_k (gate_k rise_k M_k + forcing_k),
-    T_air + sum a_k environment_k
+    T_air + sum a_k environment_k,      law = (rise / usual)^e exp(w wind)
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ from twin.rom.tableau import SDIRK2
 from twin.run.integrator import integrate, solved
 from twin.run.system import Array, Layout, System
 
+LITTLE = 0.5  # K, of a surface above its air: the room's own draught is left below it
+
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class ProbedLoads:
     power: Array  # (n, n_sources) W
     power_table: Array  # (n, l, 121) W over TEMPERATURES
     contact_heat: Array  # (n, s, r) W, projected
+    usual: Array  # (n, n_films) K: the rise at which films of another exponent have the described coefficient
+    wind: Array  # (n, n_films): what films hear of speed
 
 
 def loads_for(model: MachineModel, drive: Drive) -> ProbedLoads:
@@ -66,6 +70,8 @@ def loads_for(model: MachineModel, drive: Drive) -> ProbedLoads:
         power=drive.power,
         power_table=drive.losses.value,
         contact_heat=drive.contact_heat @ body.P.T,
+        usual=np.ones((drive.n_steps, len(model.load_model.films))),
+        wind=np.zeros((drive.n_steps, len(model.load_model.films))),
     )
 
 
@@ -145,11 +151,14 @@ def _step(
     n, T_ref = layout.n_films, system.reference_temperature
     losing = np.array(layout.following_losses, dtype=int)
     environment = jnp.asarray(loads.environment) + f.environment + a @ jnp.asarray(slots.environment)
-    film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
     # films and losses follow the state at the step's start
     convection = Tabulated(jnp.asarray(loads.theta)[:n], layout.following_films, loads.film_table)
     surfaces, position = system.surfaces(z), jnp.asarray(loads.position)
+    rise = jnp.maximum(jnp.abs(surfaces - system.film_plan.air(environment, position)), LITTLE)
+    law = (rise / jnp.asarray(loads.usual)) ** f.exponent * jnp.exp(f.wind * jnp.asarray(loads.wind))
+    film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
     films = film_loads(jnp, system.film_plan, convection, surfaces, environment, position, 1.0, film_factor)
+    films = replace(films, total=films.total * law, lift=films.lift * law)
     joint_factor = f.joint * jnp.maximum(1.0 + a @ jnp.asarray(slots.joint), 0.02)
     joints = jnp.asarray(loads.theta)[n:] * joint_factor
     contact = f.contact * jnp.maximum(1.0 + a @ jnp.asarray(slots.contact), 0.02)

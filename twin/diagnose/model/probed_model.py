@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.cache import arrays_hash, cached, machine_hash
-from twin.build.place_training import Shared, snapshots
+from twin.build.place_training import Shared, nominal, snapshots
 from twin.build.places import DISPLACED, Place, pruned
 from twin.calibrate.fit.measured import tcp_positions
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
 from twin.diagnose.model.integration import ProbedLoads, loads_for
-from twin.diagnose.model.rich_probed_model import RichProbedModel, rich_probed_model
+from twin.diagnose.model.rich_probed_model import Mesh, RichProbedModel, rich_probed_model
 from twin.errors import LogError
 from twin.logs.run import Run
 from twin.logs.signals import signal_values
@@ -36,6 +36,7 @@ from twin.run.system import Layout, System, prepare
 STEP = 60.0  # s
 TRAINING_STEP = 120.0  # s
 TAIL = 6e-7  # share of the squared trajectories, in units of the noise, that is left out
+OF_NOMINAL = 1e-8  # the same of a window that knows nominal values alone
 LARGEST = 220  # states
 MEAN_OF = {"A": 2.0, "W": 1.0, "m/s": 1.0, "1/s": 1.0, "1": 1.0}  # by unit: e of |s|^e, which acts; else s
 LEAST = 3600.0  # s, of a log
@@ -95,10 +96,13 @@ def drive_arrays(drive: Drive) -> tuple[np.ndarray, ...]:
 
 def make_probed_model(
     machine: Machine, parameters: Sequence[Parameter], runs: Sequence[Run], progress: Progress = silent,
-    linear: bool = False,
+    mesh: Mesh = Mesh.DESCRIBED, nominal_alone: bool = False,
 ) -> ProbedModel:  # fmt: skip
-    """The probed model of a machine and the loads of runs, cached by both; linear: with linear elements."""
-    rich = rich_probed_model(machine, progress, linear)
+    """The probed model of a machine and the loads of runs, cached by both; mesh: of which elements it is.
+
+    nominal_alone: it knows these runs at nominal values, and nothing of other values and of heat at places.
+    """
+    rich = rich_probed_model(machine, progress, mesh)
     rich = replace(rich, rich=at_positions(rich.rich, tcp_positions(rich.rich, runs)))
     base = pruned(rich.rich)
     load = base.load_model
@@ -114,11 +118,15 @@ def make_probed_model(
     def make() -> tuple[np.ndarray, tuple[float, float]]:
         coarse = tuple(drive_of(base, run, TRAINING_STEP) for run in runs)
         shared = Shared(rich.rich, base, tuple(parameters), rich.places, coarse, tuple(starts))
-        described, drawn, heated = snapshots(shared, progress=progress)
-        held = drawn[-len(runs) :]
+        if nominal_alone:
+            train = held = nominal(shared)
+        else:
+            described, drawn, heated = snapshots(shared, progress=progress)
+            held = drawn[-len(runs) :]
+            train = [*described, *drawn[: -len(runs)], *heated]
         rows = _rows(rich.rich)
-        train = [*described, *drawn[: -len(runs)], *heated]
-        V = window_basis(rich.rich, train, np.zeros((rich.rich.n, 0)), 0.05, rows, TAIL, LARGEST)
+        tail = OF_NOMINAL if nominal_alone else TAIL
+        V = window_basis(rich.rich, train, np.zeros((rich.rich.n, 0)), 0.05, rows, tail, LARGEST)
         X = np.column_stack(held)
         left = rows @ (X - V @ (V.T @ X))
         n = len(rich.rich.sensors)
@@ -129,7 +137,7 @@ def make_probed_model(
         V, reduction = np.eye(rich.rich.n), (0.0, 0.0)
     else:
         logged = (*_logged(load, runs), rich.rich.poses)
-        inputs = (machine_hash(machine), linear, known, tuple(starts), arrays_hash(logged))
+        inputs = (machine_hash(machine), mesh.name, nominal_alone, known, tuple(starts), arrays_hash(logged))
         V, reduction = cached("window", __name__, inputs, make)
     return _assembled(rich, V, parameters, runs, names, drives, starts, reduction)
 

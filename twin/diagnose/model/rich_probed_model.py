@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 
 from twin.build.cache import cached, machine_hash
 from twin.build.full_model import FullModel, assemble, assemble_unrestricted
 from twin.build.linear import from_vertices_and_tanks, linear_body
-from twin.build.mesh import load_body_meshes
+from twin.build.mesh import body_mesh, load_body_meshes
 from twin.build.places import Place, places_of, with_displaced_sensors, with_places
 from twin.build.project import project
+from twin.build.refine import refined
 from twin.build.rich_basis import RichOptions, rich_basis
 from twin.build.scenario import theta_bounds
 from twin.machine.description import Machine
@@ -19,6 +21,14 @@ from twin.progress import Progress, silent
 from twin.rom.model import MachineModel
 
 RICH = RichOptions(samples=10, tolerance=2e-2)
+
+
+class Mesh(Enum):
+    """Of which elements the parts of a machine are made."""
+
+    DESCRIBED = "as described"
+    LINEAR = "the described tetrahedra with linear elements"
+    FINER = "every tetrahedron in eight"
 
 
 @dataclass(frozen=True)
@@ -30,14 +40,19 @@ class RichProbedModel:
     height: tuple[np.ndarray, ...]  # per body (n, n_films of the description): A_k @ height [m^3]
 
 
-def rich_probed_model(machine: Machine, progress: Progress = silent, linear: bool = False) -> RichProbedModel:
-    """The rich model with places, cached by description and meshes; linear: with linear elements on these."""
+def rich_probed_model(
+    machine: Machine, progress: Progress = silent, mesh: Mesh = Mesh.DESCRIBED
+) -> RichProbedModel:  # fmt: skip
+    """The rich model with places, cached by description and meshes; mesh: lumped machines have that described alone."""
+    linear = mesh is Mesh.LINEAR
 
     def make() -> RichProbedModel:
         if machine.lumped:
             full = assemble(machine, progress)
         else:
             meshes = load_body_meshes(machine)
+            if mesh is Mesh.FINER:
+                meshes = tuple(body_mesh(body.name, tuple(map(refined, body.parts))) for body in meshes)
             full = assemble_unrestricted(with_displaced_sensors(machine, meshes), meshes, progress, linear)
         places = places_of(machine, full)
         model = with_places(full, places)
@@ -61,7 +76,7 @@ def rich_probed_model(machine: Machine, progress: Progress = silent, linear: boo
             heights.append(V.T @ h[:, :n_films])
         return RichProbedModel(replace(model, bodies=tuple(bodies)), places, tuple(heights))
 
-    return cached("probed", __name__, (machine_hash(machine), linear), make)
+    return cached("probed", __name__, (machine_hash(machine), mesh.name), make)
 
 
 def _heights(machine: Machine, full: FullModel, model: MachineModel) -> list[np.ndarray]:

@@ -19,6 +19,7 @@ import scipy.linalg
 
 from twin.calibrate.fit.measured import measured
 from twin.calibrate.fit.noise import Channels
+from twin.diagnose.evidence.film_laws import with_film_laws
 from twin.diagnose.evidence.formal import known_forms, wind_columns
 from twin.diagnose.evidence.nulls import Form, form_of
 from twin.diagnose.evidence.whiten import Whitener
@@ -33,6 +34,7 @@ from twin.diagnose.search.detector import Detector, bare_forms
 from twin.logs.run import Run
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
+from twin.rom.parameter import OF_LAWS
 from twin.run.system import prepare
 
 AT = "sensor at "  # and its place: the name of what adds a sensor
@@ -70,13 +72,14 @@ def foreseen(
     """
     today = detector.study
     n = len(runs)
-    probed = make_probed_model(machine, today.probed.parameters, [*runs, *(e.run for e in experiments)], progress)
+    described = [p for p in today.probed.parameters if p.kind not in OF_LAWS]
+    probed = make_probed_model(machine, described, [*runs, *(e.run for e in experiments)], progress)
     probed = _with_sensors(probed, list(dict.fromkeys(p for e in experiments for p in e.places)))
     plans = [
         measured(probed.base, run, own.drive, own.name, exclude=_left_out(today, run))
         for run, own in zip([*runs, *(e.run for e in experiments)], probed.runs, strict=True)
     ]
-    study = make_study(probed, plans, range(len(plans)))
+    study = with_film_laws(make_study(probed, plans, range(len(plans))), form_of(machine))
     known = [_at_nominal(study, k) for k in range(n)]
     channels = [_channels(detector, study.runs[k], k, noise) for k in range(n)]
     of_new = longest_of(runs)
@@ -145,7 +148,7 @@ def _compared(
     place = {c: i for i, c in enumerate(chosen)}
     raw = respond(study, nominal, elements.vectors, narrow.columns)
     wind = wind_columns(study, form)
-    described = described_forms(study, narrow, nominal, raw, form)
+    described = described_forms(study, narrow, raw, form)
     known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
     D = np.zeros((len(J), 2 * len(wanted)))
     for i, (now, new, reading, factor) in enumerate(wanted):

@@ -96,7 +96,8 @@ def _corrected(study: Study, planned: Planned, signal: str, factor: float) -> Pl
     signals = {n: values * (factor if n == signal else 1.0) for n, values in run.signals.items()}
     more, less = (_evaluated(study, run.drive, values) for values in (signals, run.signals))
     drive = _sum(run.drive, more, less, list(base.load_model.contact_sources))
-    return replace(planned, run=replace(run, drive=drive, signals=signals, loads=loads_for(base, drive)))
+    loads = replace(loads_for(base, drive), usual=run.loads.usual, wind=run.loads.wind)  # films stay as they are fitted
+    return replace(planned, run=replace(run, drive=drive, signals=signals, loads=loads))
 
 
 def _evaluated(study: Study, drive: Drive, signals: dict[str, np.ndarray]) -> Drive:

@@ -19,7 +19,7 @@ from twin.calibrate.fit.measured import Measured
 from twin.calibrate.fit.noise import Channels, estimated
 from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.evidence.fitter import Fitted, Fitter
-from twin.diagnose.evidence.formal import known_forms, leading, wind_columns
+from twin.diagnose.evidence.formal import known_forms, wind_columns
 from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, null
 from twin.diagnose.evidence.pulls import Pulls, gumbel
 from twin.diagnose.evidence.settled import settled_alone
@@ -178,10 +178,10 @@ def make_detector(
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
     bare = np.hstack(bare_forms(study, raw, index))
-    described = described_forms(study, elements, nominal, raw, form)
+    described = described_forms(study, elements, raw, form)
 
     def fitter_of(whiten: Whitener, *modes: np.ndarray) -> Fitter:
-        discretised = [leading(whiten(np.column_stack([o.d, SPREAD * o.D]))) for o in other]  # of each parameter, too
+        discretised = [o.columns(whiten, SPREAD) for o in other]
         known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
         return Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *discretised, known, *modes]))
 
@@ -202,7 +202,8 @@ def make_detector(
     )
     with progress("measurements without a cause: thresholds", counts[1]) as advance:
         seeds = list(range(10_000, 10_000 + counts[1]))
-        seen = each(_of_null, ((fitter, J_of, instruments, form, other), columns), seeds, lambda _: advance(""))
+        shared = (fitter, J_of, instruments, form, other)
+        seen = each(_of_null, (shared, columns), seeds, lambda _: advance(""))
     names = [*(f.name for f in families), "unknown"]
     nulls = {name: np.array([of_null.largest.get(name, 0.0) for of_null in seen]) for name in names}
     pulls = Pulls.of(study.probed.parameters, np.array([o.fitted for o in seen]), np.array([o.settled for o in seen]))

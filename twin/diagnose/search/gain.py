@@ -57,29 +57,35 @@ def _read(found: Search, k: int) -> np.ndarray:
 def gains(
     found: Search, k: int, sealed: Measured, seed: int, floors: tuple[np.ndarray, np.ndarray]
 ) -> tuple[Gain, ...]:
-    """Per channel of the sealed run k; its measurements are opened here. floors: noise of sensors (s,) and TCP (3,)."""
+    """Per channel of the sealed run k; its measurements are opened here. floors: noise of sensors (s,) and TCP (3,).
+
+    A channel is affected that causes move, and that the extended model predicts otherwise than the recalibrated one: an
+    expansion is not judged by temperatures that a calibration beside it has shifted.
+    """
     study, policy = found.detector.study, found.detector.policy
     planned = study.runs[k]
     models = [planned.split(v) for v in vars(predicted(found, k)).values()]
+    bare = planned.split(study.outputs(k, found.x if found.accepted else found.x0))  # without its causes
     rng = np.random.default_rng(seed)
     readings = sealed.temperature, sealed.temperature, in_place(sealed.temperature, sealed.sensors, found.accepted)
     result = []
     for i, name in enumerate(sealed.sensors):
         errors = [read[:, i] - T[:, i] for read, (T, _) in zip(readings, models, strict=True)]
-        affected = bool(_moved(errors) > policy.noticed * floors[0][i])
+        alone = readings[1][:, i] - bare[0][:, i]
+        affected = _rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * floors[0][i]
         result.append(gain_of(sealed.name, name, "K", errors, sealed.bin_time, affected, rng, policy.block))
     for c in range(3 if len(sealed.tcp) else 0):
         errors = [sealed.tcp[:, c] - w[:, c] for _, w in models]
-        affected = bool(_moved(errors) > policy.noticed * floors[1][c])
+        alone = sealed.tcp[:, c] - bare[1][:, c]
+        affected = _rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * floors[1][c]
         result.append(gain_of(sealed.name, COMPONENTS[c], "m", errors, sealed.tcp_time, affected, rng, policy.block))
     return tuple(result)
 
 
-def _moved(errors: Sequence[np.ndarray]) -> float:
-    """By how much (rms) causes change what is left of a channel."""
-    change = errors[2] - errors[1]
-    good = np.isfinite(change)
-    return float(np.sqrt(np.mean(change[good] ** 2))) if good.any() else 0.0
+def _rms(changes: Sequence[np.ndarray]) -> float:
+    """Of the smallest of changes of a channel (n,), where it was measured."""
+    measured = [change[np.isfinite(change)] for change in changes]
+    return min(float(np.sqrt(np.mean(change**2))) if len(change) else 0.0 for change in measured)
 
 
 def gain_of(

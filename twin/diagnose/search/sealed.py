@@ -4,7 +4,8 @@ It never makes a name: a sensor fault, or an event of the runs that were looked 
 the machine that make more of the channels that they move worse than better, beyond chance, are withdrawn. Where another
 size that the data allow makes more of them better than worse, the run refutes the size alone: the name stays, and
 nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
-calibration makes of it without its tolerance. A number that calibration alone moved out of its tolerance is judged
+calibration makes of it without its tolerance. What is told of a declared number is judged beside a calibration of all
+others. A number that calibration alone moved out of its tolerance is judged
 beside the calibration that keeps it in, and needs this confirmation where only the fit behind the scores is sure of it.
 """
 
@@ -50,6 +51,7 @@ def judged(
         note = f"withdrawn: {gone}. Without its tolerance calibration predicts the sealed run no better"
         left = verdict if any(c.history == CALIBRATED for c in kept) else "sensor" if kept else "nothing"
         return Judged(left, kept, (), _gains(found, opened, seed), note)
+    found = _beside_declared(found, y)
     entries = {f.name: f for f in families}
     named = verdict in ("named", "out_of_tolerance", "ambiguous", "signal")
     extension = tuple(
@@ -57,7 +59,8 @@ def judged(
         if named and c.history != CALIBRATED and c.family in entries and entries[c.family].changes(c)
     )  # fmt: skip
     table = _gains(found, opened, seed)
-    if not extension or _worth(table) >= 0:
+    by_fit = _told_by_fit(found)
+    if not extension or _worth(table) >= (1 if by_fit and opened else 0):
         return Judged(verdict, tuple(causes), extension, table)
     names = " and ".join(dict.fromkeys(f"{c.family.replace('_', ' ')} at {c.place}" for c in extension))
     for accepted in other_sizes(found, y):
@@ -67,6 +70,12 @@ def judged(
             told = f"{fault_of(lead.hypothesis).curve.told(float(lead.amplitude[0])):.3g} {lead.hypothesis.batch.unit}"
             note = f"not written: {names}, since the sealed run speaks for another size, such as {told}"
             return Judged(verdict, tuple(causes), (), table, size=note)
+    if by_fit:
+        rest = tuple(c for c in causes if c not in extension)
+        note = (
+            f"withdrawn: {names}. Only the fit behind the scores is sure of it, and predicts the sealed run no better"
+        )
+        return Judged("sensor" if rest else "nothing", rest, (), table, note)
     moved = [g for g in table if g.affected]
     worse = sum(g.ci95[1] < 0.0 for g in moved)
     note = (
@@ -74,6 +83,20 @@ def judged(
         f"the {len(moved)} channels that it moves worse beyond chance"
     )
     return Judged("unknown", tuple(c for c in causes if c not in extension), (), table, note)
+
+
+def _beside_declared(found: Search, y: np.ndarray) -> Search:
+    """The search beside a calibration that has the declared numbers which were named as they are declared: one that
+    moves them itself predicts as well as the model that was told."""
+    study = found.detector.study
+    named = [replace(a, amplitude=np.zeros_like(a.amplitude)) for a in found.accepted if freed(study, a.hypothesis)]
+    return replace(found, x0=settled(found.detector, y, named)[0]) if named else found
+
+
+def _told_by_fit(found: Search) -> bool:
+    """Whether the cause is a declared number out of its tolerance of which only the fit behind the scores is sure."""
+    unsettled = {own.index for own in found.loose if not own.settled}
+    return any(j in unsettled for a in found.accepted[:1] for j in freed(found.detector.study, a.hypothesis))
 
 
 def _gains(found: Search, opened: Sequence[Measured], seed: int) -> tuple[Gain, ...]:

@@ -22,7 +22,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import beginning, bent, exact, misfit, misfit_of_each
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.look import Search, Step, look
+from twin.diagnose.search.look import Search, Step, cosines, look
 from twin.diagnose.search.refit import refit
 
 
@@ -32,7 +32,7 @@ def closed(
     loose: tuple[Loose, ...],
 ) -> Search | None:  # fmt: skip
     """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
-    something else that was seen before (glance) explains more. Signals that explain as much are its rivals."""
+    something else that was seen before (glance) explains more. What explains nearly as much is its rival."""
     fitted, one = relaxed
     _, ranked, first = glance
     seen, left, last = look(detector, fitted)
@@ -55,6 +55,14 @@ def closed(
         (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in _factors(detector, j)
         if _does_the_same(detector, one, cosine, heat, h.name in fits)
     )  # fmt: skip
+    # a material grows too much where one of its parts, or of another's, does: beside that it hardly moves
+    family = [h for h in ranked if h.family == one.hypothesis.family and h.name != one.hypothesis.name]
+    most = detector.policy.stands * abs(float(before.x[j]))
+    near = [
+        h for h in family
+        if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
+    ]  # fmt: skip
+    rivals += tuple((h, float(cosines(detector, before, [one.hypothesis, h])[0, 1])) for h in near)
     amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
     one = replace(
         one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals,
@@ -164,14 +172,14 @@ def _does_the_same(detector: Detector, one: Accepted, cosine: float, heat: float
 def _stays(detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[Hypothesis]) -> bool:
     """Whether a declared number is as far out of its tolerance beside any of the others, to first order."""
     (j,) = freed(detector.study, one.hypothesis)
-    policy, white = detector.policy, detector.whiten(fitted.residual)
+    return all(abs(_beside(detector, fitted, j, h)) > detector.policy.beyond for h in others)
 
-    def beside(h: Hypothesis) -> float:
-        columns = readings_columns(detector, h)
-        free = policy.wide * columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30)
-        return float(detector.fitter.projector(fitted.J, free).most_likely(white)[j])
 
-    return all(abs(beside(h)) > policy.beyond for h in others)
+def _beside(detector: Detector, fitted: Fitted, j: int, h: Hypothesis) -> float:
+    """A parameter beside a hypothesis, to first order."""
+    columns = readings_columns(detector, h)
+    free = detector.policy.wide * columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30)
+    return float(detector.fitter.projector(fitted.J, free).most_likely(detector.whiten(fitted.residual))[j])
 
 
 def _weak(detector: Detector, ranked: Sequence[Hypothesis], misfits: float) -> bool:

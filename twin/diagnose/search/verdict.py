@@ -20,6 +20,7 @@ from twin.diagnose.search.accepted import Accepted, freed
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import POLICY, SearchPolicy
+from twin.rom.parameter import OF_LAWS
 
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
 
@@ -105,15 +106,16 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
             return "nothing", ()
         return "ambiguous" if strained[0].rivals else "out_of_tolerance", strained
     chosen, lead = found.accepted[0], found.accepted[0].hypothesis
+    # a tolerance tells it, and it has passed no threshold: what explains as much was chosen with it
+    unproved = bool(relaxed) and chosen.threshold < thresholds[lead.family]
     for other, cosine in chosen.rivals:
         more = policy.amplitude * (other.batch.q - lead.batch.q)
         near = other.statistic - more > lead.statistic - policy.close
         apart = min(lead.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
         alike = other.family == lead.family and Spot.read(other.name).owner == Spot.read(lead.name).owner
         same = alike and not (lead.when.signal and other.when.name != lead.when.name)
-        # a number that its tolerance tells has passed no threshold, nor need what does all that it does
-        least = min(thresholds[other.family], chosen.statistic) if relaxed else thresholds[other.family]
-        if near and not apart and not same and other.statistic >= least:
+        passes = near and not apart and other.statistic >= thresholds[other.family]
+        if not same and (unproved or passes):
             return "ambiguous", causes
     # a sensor at fault does not keep what is beside it out of the description
     others = [c for c in causes if groups.get(c.family) != "sensor"]
@@ -202,7 +204,7 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
     pulls = [
         Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit,
              temperature_change=float(T), displacement_change=float(w))
-        for p, c, s, T, w in zip(study.probed.parameters, x, sigma, *moves, strict=True)
+        for p, c, s, T, w in zip(study.probed.parameters, x, sigma, *moves, strict=True) if p.kind not in OF_LAWS
     ]  # fmt: skip
     for a in found.accepted:
         change, spread = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))
