@@ -6,7 +6,7 @@ usual: the geometric mean of the rise over the runs, and s 0 .. 1 how a film tha
 neither says how strong a film is in the mean. Radiation is part of h: emissivities are known no better than laws.
 
 They are fitted with the exact model, like the numbers of the description: a calibration can make the described film of
-a motor 0.4 times as strong and so 14 K warmer, where a response linearised at the description is of another shape.
+a motor 0.4 times as strong, and there the response linearised at the description has another shape.
 """
 
 from __future__ import annotations
