@@ -60,7 +60,7 @@ def test_forced_convection_and_coolants_have_little_of_it():
     assert sigma["films.air.exponent"] == Form().steep
 
 
-def test_films_that_hear_no_speed_have_no_reaction_to_it():
+def test_films_whose_law_reads_no_speed_have_no_reaction_to_it():
     study = small_case.study()
     films = study.probed.base.load_model.films
     made = with_film_laws(study, Form()).probed.parameters

@@ -34,7 +34,7 @@ class Effects:
     contact: Array  # (n_contacts, n)
     environment: Array  # (n_environments, n) K per K
     exponent: Array  # (n_films, n) of the rise of a surface above its air; what a diagnosis alone varies
-    wind: Array  # (n_films, n) per unit of what a film hears of speed; likewise
+    wind: Array  # (n_films, n) by the relative speed that a film's law reads; likewise
     E: Array  # (n_c, r, r) J/K: shares in E of the members that capacities act on
     capacity: Array  # (n_c, n)
     G: Array  # (n_e, n_poses * 3, r) m/K: shares in G of the members that expansions act on

@@ -35,8 +35,8 @@ from twin.rom.parameter import Parameter
 BARS = (1.0 + 5.0**0.5) / 2.0
 OF_BARS = 1.0 / (1.0 - BARS**-2)  # of the difference: the error of linear elements goes with the square of their size
 # times the segments of a rail. What its sensors show depends on where in a segment they sit, otherwise in every
-# division, and no few of them span what another one does (of the screw of the shipped axis six leave a third): two of
-# three are known, and synthetic measurements come from the others
+# division, and a few of them do not span what another one does (of the screw of the shipped axis six leave a third):
+# two of three are known, and synthetic measurements come from the others
 SEGMENTS = tuple(2.0 ** (k / 9.0) for k in range(1, 10))
 BYTES = 10e9  # of a machine on a mesh of half the size: what a computer of 16 GB has to spare
 DIFFUSIVITY = 1.3e-5  # m^2/s, of steel and cast iron (VDI Heat Atlas, 2nd ed., D6.1)

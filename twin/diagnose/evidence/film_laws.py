@@ -2,8 +2,8 @@
 
     h = h_described (rise / usual)^e exp(w (s - mean s)),      e ~ N(0, steep^2),  w ~ N(0, speed^2)
 
-usual: the geometric mean of the rise over the runs, and s 0 .. 1 how a film that hears a speed reacts to it, so that
-neither says how strong a film is in the mean. Radiation is part of h: emissivities are known no better than laws.
+usual: the geometric mean of the rise over the runs, and s 0 .. 1 the reaction to the relative speed that its law
+reads, so that neither says how strong a film is in the mean. Radiation is part of h: emissivities are known no better than laws.
 
 They are fitted with the exact model, like the numbers of the description: a calibration can make the described film of
 a motor 0.4 times as strong, and there the response linearised at the description has another shape.
@@ -30,25 +30,25 @@ MOST = 2.5
 
 
 def with_film_laws(study: Study, form: Form) -> Study:
-    """The study with an exponent more for every film, and a reaction to speed for each that hears one. A coefficient
-    that is too large for free convection has the exponent in the share that free convection may be."""
+    """The study with an exponent more for every film, and a reaction to speed for each whose law reads one. A
+    coefficient that is too large for free convection has the exponent in the share that free convection may be."""
     probed = study.probed
     films = probed.base.load_model.films
     n, fitted = len(films), study.fitted
     most = np.max([convection(probed.runs[k].drive, n).mean(axis=0) for k in fitted], axis=0)
     usual = np.exp(np.mean(np.concatenate([_log_rise(study, k) for k in fitted]), axis=0))
     moving = [winds(study, k, np.full(n, EXPONENT)) for k in range(len(study.runs))]
-    heard = [s * (1.0 + FORCED) / (1.0 + FORCED * s) for s in moving]
-    mean = np.mean(np.concatenate([heard[k] for k in fitted]), axis=0)
+    reaction = [s * (1.0 + FORCED) / (1.0 + FORCED * s) for s in moving]
+    mean = np.mean(np.concatenate([reaction[k] for k in fitted]), axis=0)
     parameters = list(probed.parameters)
     for f, film in enumerate(films):
         if form.steep > 0.0:
             parameters.append(_of(film.name, "exponent", form.steep * min(1.0, FREE / max(float(most[f]), FREE))))
-        if form.speed > 0.0 and any(heard[k][:, f].any() for k in fitted):
+        if form.speed > 0.0 and any(reaction[k][:, f].any() for k in fitted):
             parameters.append(_of(film.name, "wind", form.speed))
     runs = tuple(
         replace(run, loads=replace(run.loads, usual=np.tile(usual, (run.drive.n_steps, 1)), wind=own - mean))
-        for run, own in zip(probed.runs, heard, strict=True)
+        for run, own in zip(probed.runs, reaction, strict=True)
     )
     wider = replace(probed, parameters=tuple(parameters), runs=runs)
     return make_study(wider, [planned.measured for planned in study.runs], fitted)

@@ -26,6 +26,7 @@ from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import COMPONENTS, Planned, Study
 from twin.physics.play import play as follower
 from twin.rom.apply import member_mean
+from twin.rom.parameter import OF_LAWS
 
 Add = Callable[[Key, Sequence[np.ndarray]], None]  # a column in parts, one per fitted run
 
@@ -51,7 +52,7 @@ def readings_of(
     plans = [study.runs[k] for k in study.fitted]
     scale = study.scale
     for i, p in enumerate(study.probed.parameters):
-        if p.kind != "exponent":
+        if p.kind not in OF_LAWS:
             add(("gain", p.path, "always"), [jac[:, i] / scale[i] for jac in J])
     _sensors(study, plans, outputs, add, swaps)
     if any(len(plan.measured.tcp) for plan in plans):

@@ -54,7 +54,7 @@ class ProbedLoads:
     power_table: Array  # (n, l, 121) W over TEMPERATURES
     contact_heat: Array  # (n, s, r) W, projected
     usual: Array  # (n, n_films) K: the rise at which films of another exponent have the described coefficient
-    wind: Array  # (n, n_films): what films hear of speed
+    wind: Array  # (n, n_films): of the relative speed that films' laws read
 
 
 def loads_for(model: MachineModel, drive: Drive) -> ProbedLoads:

@@ -72,18 +72,18 @@ def gains(
     for i, name in enumerate(sealed.sensors):
         errors = [read[:, i] - T[:, i] for read, (T, _) in zip(readings, models, strict=True)]
         alone = readings[1][:, i] - bare[0][:, i]
-        affected = _rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * floors[0][i]
+        affected = _least_rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * floors[0][i]
         result.append(gain_of(sealed.name, name, "K", errors, sealed.bin_time, affected, rng, policy.block))
     for c in range(3 if len(sealed.tcp) else 0):
         errors = [sealed.tcp[:, c] - w[:, c] for _, w in models]
         alone = sealed.tcp[:, c] - bare[1][:, c]
-        affected = _rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * floors[1][c]
+        affected = _least_rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * floors[1][c]
         result.append(gain_of(sealed.name, COMPONENTS[c], "m", errors, sealed.tcp_time, affected, rng, policy.block))
     return tuple(result)
 
 
-def _rms(changes: Sequence[np.ndarray]) -> float:
-    """Of the smallest of changes of a channel (n,), where it was measured."""
+def _least_rms(changes: Sequence[np.ndarray]) -> float:
+    """The least rms of changes of a channel (n,), where it was measured."""
     measured = [change[np.isfinite(change)] for change in changes]
     return min(float(np.sqrt(np.mean(change**2))) if len(change) else 0.0 for change in measured)
 

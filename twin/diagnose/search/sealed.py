@@ -5,8 +5,8 @@ the machine that make more of the channels that they move worse than better, bey
 size that the data allow makes more of them better than worse, the run refutes the size alone: the name stays, and
 nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
 calibration makes of it without its tolerance. What is told of a declared number is judged beside a calibration of all
-others. A number that calibration alone moved out of its tolerance is judged
-beside the calibration that keeps it in, and needs this confirmation where only the fit behind the scores is sure of it.
+others. A number that calibration alone moved out of its tolerance is judged beside the calibration that keeps it in,
+and needs this confirmation where only the fit behind the scores is sure of it.
 """
 
 from __future__ import annotations

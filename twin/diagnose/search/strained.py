@@ -55,7 +55,7 @@ def closed(
         (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in _factors(detector, j)
         if _does_the_same(detector, one, cosine, heat, h.name in fits)
     )  # fmt: skip
-    # a material grows too much where one of its parts, or of another's, does: beside that it hardly moves
+    # a part that expands too much moves the expansion of its material, or of another: with the part's free it stays
     family = [h for h in ranked if h.family == one.hypothesis.family and h.name != one.hypothesis.name]
     most = detector.policy.stands * abs(float(before.x[j]))
     near = [
