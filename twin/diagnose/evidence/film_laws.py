@@ -3,7 +3,8 @@
     h = h_described (rise / usual)^e exp(w (s - mean s)),      e ~ N(0, steep^2),  w ~ N(0, speed^2)
 
 usual: the geometric mean of the rise over the runs, and s 0 .. 1 the reaction to the relative speed that its law
-reads, so that neither says how strong a film is in the mean. Radiation is part of h: emissivities are known no better than laws.
+reads, so that neither says how strong a film is in the mean. Radiation is part of h: emissivities are known no better
+than laws.
 
 They are fitted with the exact model, like the numbers of the description: a calibration can make the described film of
 a motor 0.4 times as strong, and there the response linearised at the description has another shape.
