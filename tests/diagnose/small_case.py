@@ -12,6 +12,7 @@ import numpy as np
 
 from tests.calibrate import lumped_case
 from twin.calibrate.fit.measured import measured
+from twin.diagnose.evidence.film_laws import with_film_laws
 from twin.diagnose.evidence.nulls import form_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.elements import Elements, elements_of
@@ -101,10 +102,16 @@ def probed(linear: bool = False) -> ProbedModel:
 
 
 @cache
-def study(linear: bool = False) -> Study:
+def described(linear: bool = False) -> Study:
+    """With the numbers of the description alone."""
     own = probed(linear)
     plans = [measured(own.base, run, b.drive, b.name) for run, b in zip(runs(), own.runs, strict=True)]
     return make_study(own, plans, range(2))
+
+
+@cache
+def study(linear: bool = False) -> Study:
+    return with_film_laws(described(linear), form_of(machine(linear)))
 
 
 @cache

@@ -75,7 +75,7 @@ def test_sensor_faults_touch_one_sensor(read):
 def test_a_gain_is_a_declared_parameter(read):
     columns, index, _, J = read
     study = small_case.study()
-    for i, p in enumerate(study.probed.parameters):
+    for i, p in enumerate(small_case.described().probed.parameters):
         wanted = np.concatenate([jac[:, i] for jac in J]) / study.scale[i]
         np.testing.assert_allclose(columns[:, index["gain", p.path, "always"]], wanted, rtol=1e-5, atol=1e-12)
 

@@ -29,7 +29,7 @@ RADIATION = 5.2  # W/(m^2 K) of a surface of emissivity 0.9 at 22 degC: 4 sigma 
 def test_laminar_free_convection_where_a_constant_is_described():
     """The film's gain and its exponent explain all but a tenth of what both machines differ by: that of 1/4 in what
     convection is of the film."""
-    machine, study = small_case.machine(), small_case.study()
+    machine, study = small_case.machine(), small_case.described()
     law = LAWS["free_vertical_plate_laminar"].function
     gain = DESCRIBED / float(law(surface=20.0 + RISE, ambient=20.0, height=HEIGHT))
     film = machine.films["air"].model_copy(
@@ -55,23 +55,24 @@ def test_laminar_free_convection_where_a_constant_is_described():
 
 def test_forced_convection_and_coolants_have_little_of_it():
     """400 W/(m^2 K) of water have a sixteenth of the exponent that the same film would have in still air."""
-    sigma = {p.path: p.sigma for p in with_film_laws(small_case.study(), Form()).probed.parameters}
+    sigma = {p.path: p.sigma for p in with_film_laws(small_case.described(), Form()).probed.parameters}
     assert sigma["films.coolant.exponent"] == pytest.approx(Form().steep / 16.0)
     assert sigma["films.air.exponent"] == Form().steep
 
 
 def test_films_whose_law_reads_no_speed_have_no_reaction_to_it():
-    study = small_case.study()
+    study = small_case.described()
     films = study.probed.base.load_model.films
     made = with_film_laws(study, Form()).probed.parameters
-    assert [p.targets[0] for p in made if p.kind == "wind"] == [f.name for f in films if f.use.signals]
+    for kind in ("wind", "wind_exponent"):
+        assert [p.targets[0] for p in made if p.kind == kind] == [f.name for f in films if f.use.signals]
     assert [p.targets[0] for p in made if p.kind == "exponent"] == [f.name for f in films]
     of_nodes = with_film_laws(study, Form(steep=0.0)).probed.parameters
     assert not any(p.kind == "exponent" for p in of_nodes)
 
 
 def test_laws_as_described_change_nothing():
-    study = small_case.study()
+    study = small_case.described()
     free = with_film_laws(study, Form())
     np.testing.assert_array_equal(
         free.all_outputs(np.zeros(len(free.scale))), study.all_outputs(np.zeros(len(study.scale)))
@@ -80,7 +81,7 @@ def test_laws_as_described_change_nothing():
 
 def test_a_corrected_signal_leaves_the_laws_of_films():
     """A run whose current is read anew has films at the rise and the speed that it had."""
-    study = with_film_laws(small_case.study(), Form())
+    study = with_film_laws(small_case.described(), Form())
     x = np.array([0.8 * (p.kind in OF_LAWS) for p in study.probed.parameters])
     as_logged = with_signal(study, "spindle_current", 1.0)
     np.testing.assert_allclose(as_logged.all_outputs(x), study.all_outputs(x), rtol=0.0, atol=1e-9)
@@ -88,7 +89,7 @@ def test_a_corrected_signal_leaves_the_laws_of_films():
 
 
 def test_the_delivered_calibration_has_the_laws_of_the_description():
-    study = with_film_laws(small_case.study(), Form())
+    study = with_film_laws(small_case.described(), Form())
     sensors = (np.full(len(study.runs[k].measured.sensors), small_case.NOISE) for k in study.fitted)
     tcp = Channels(np.full(3, small_case.TCP_NOISE), np.zeros(3))
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), tcp) for s in sensors))

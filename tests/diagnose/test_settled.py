@@ -8,8 +8,6 @@ from functools import cache
 import numpy as np
 
 from tests.diagnose import small_case
-from twin.diagnose.evidence.formal import wind_columns
-from twin.diagnose.evidence.nulls import Form
 from twin.diagnose.search.accepted import settled
 
 HIDDEN = np.array([1.0, -0.8])  # prior standard deviations of the first two sources
@@ -57,10 +55,3 @@ def test_model_discrepancy_does_not_take_what_parameters_explain():
     scored, delivered = greedy.fitter(y).x, settled(greedy, y, ())[0]
     assert held_out(scored) > 0.6 * held_out(np.zeros(len(scored)))
     assert held_out(delivered) < 0.8 * held_out(scored)
-
-
-def test_films_that_hear_no_speed_have_no_wind():
-    study = small_case.study()
-    heard = [f for f in study.probed.base.load_model.films if f.use.signals]
-    assert wind_columns(study, Form()).shape == (len(measured()), 3 * len(heard))
-    assert wind_columns(study, Form(wind=0.0)).shape[1] == 0

@@ -9,6 +9,7 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.model.surrogate import CONDUCTS, Surrogate, make_surrogate
+from twin.rom.parameter import OF_LAWS
 
 FAR = 2.5  # prior standard deviations
 UNITS = 0.05, 1e-6  # K, m: noise
@@ -27,7 +28,8 @@ def test_one_number_far_off_is_predicted(side):
         x = side * FAR * np.eye(len(study.scale))[j]
         exact = study.all_outputs(x)
         change, wrong = (np.linalg.norm(v / unit) for v in (exact - surrogate.y0, surrogate.at(x)[0] - exact))
-        assert wrong < max(0.1 * change, 1.0), study.probed.parameters[j].path
+        p = study.probed.parameters[j]
+        assert wrong < max((0.2 if p.kind in OF_LAWS else 0.1) * change, 1.0), p.path
 
 
 def test_a_share_is_that_of_the_conductance():

@@ -12,9 +12,12 @@ from typing import Any, Literal
 
 from twin.rom.from_json import filled
 
-Kind = Literal["source", "film", "joint", "contact", "capacity", "expansion", "environment", "exponent", "wind"]
+Kind = Literal[
+    "source", "film", "joint", "contact", "capacity", "expansion", "environment", "exponent", "wind", "wind_exponent"
+]  # fmt: skip
 Scale = Literal["log", "linear"]
-OF_LAWS: tuple[Kind, ...] = ("exponent", "wind")  # of films, which no description has and a diagnosis alone varies
+# of laws of films, which no description has and a diagnosis alone varies
+OF_LAWS: tuple[Kind, ...] = ("exponent", "wind", "wind_exponent")
 
 
 @dataclass(frozen=True)

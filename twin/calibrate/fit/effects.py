@@ -34,7 +34,8 @@ class Effects:
     contact: Array  # (n_contacts, n)
     environment: Array  # (n_environments, n) K per K
     exponent: Array  # (n_films, n) of the rise of a surface above its air; what a diagnosis alone varies
-    wind: Array  # (n_films, n) by the relative speed that a film's law reads; likewise
+    wind: Array  # (n_films, n) of the speed that a film's law reads: the logarithm of how strong it makes the film, and
+    wind_exponent: Array  # its exponent; both of a diagnosis too
     E: Array  # (n_c, r, r) J/K: shares in E of the members that capacities act on
     capacity: Array  # (n_c, n)
     G: Array  # (n_e, n_poses * 3, r) m/K: shares in G of the members that expansions act on
@@ -73,6 +74,7 @@ def effects_of(model: MachineModel, parameters: Sequence[Parameter], starts: Seq
         "environment": [e.name for e in load.environments],
         "exponent": [f.name for f in load.films],
         "wind": [f.name for f in load.films],
+        "wind_exponent": [f.name for f in load.films],
         "capacity": list(body.members),
         "expansion": list(body.members),
     }
@@ -99,6 +101,7 @@ def effects_of(model: MachineModel, parameters: Sequence[Parameter], starts: Seq
         environment=acts["environment"],
         exponent=acts["exponent"],
         wind=acts["wind"],
+        wind_exponent=acts["wind_exponent"],
         E=_shares(body.E_members, some["capacity"], (r, r)),
         capacity=acts["capacity"][some["capacity"]],
         G=_shares(body.G_members, some["expansion"], (len(model.poses), 3, r)).reshape(-1, 3 * len(model.poses), r),
@@ -135,6 +138,7 @@ class Factors:
     environment: jax.Array
     exponent: jax.Array
     wind: jax.Array
+    wind_exponent: jax.Array
     capacity: jax.Array
 
 
@@ -148,5 +152,6 @@ def factors_at(effects: Effects, u: jax.Array) -> Factors:
         jnp.asarray(effects.environment) @ u,
         jnp.asarray(effects.exponent) @ u,
         jnp.asarray(effects.wind) @ u,
+        jnp.asarray(effects.wind_exponent) @ u,
         factors(effects.capacity, u),
     )

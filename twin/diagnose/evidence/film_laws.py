@@ -1,10 +1,12 @@
 """Films that react otherwise than described to their own rise and to speed: parameters of a diagnosis alone.
 
-    h = h_described (rise / usual)^e exp(w (s - mean s)),      e ~ N(0, steep^2),  w ~ N(0, speed^2)
+    h = h_described (rise / usual)^e exp(w (s - mean s) + m (b - mean b)),
+    e ~ N(0, steep^2),  w ~ N(0, speed^2),  m ~ N(0, speed_exponent^2)
 
-usual: the geometric mean of the rise over the runs, and s 0 .. 1 the reaction to the relative speed that its law
-reads, so that neither says how strong a film is in the mean. Radiation is part of h: emissivities are known no better
-than laws.
+usual: the geometric mean of the rise over the runs. With a relative speed v and h = h_0 (1 + c v^m), b = d ln h / dm
+= c v^m ln v / (1 + c v^m), and s is d ln h / d ln c as a share of what it is at the top speed; c as described. Means
+are subtracted, so that none of them says how strong a film is in the mean. Radiation is part of h: emissivities are
+known no better than laws.
 
 They are fitted with the exact model, like the numbers of the description: a calibration can make the described film of
 a motor 0.4 times as strong, and there the response linearised at the description has another shape.
@@ -15,44 +17,70 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import xlogy
 
-from twin.diagnose.evidence.nulls import Form, convection, winds
+from twin.diagnose.evidence.nulls import Form, convection
 from twin.diagnose.model.integration import LITTLE
 from twin.diagnose.model.study import Study, make_study
 from twin.rom.parameter import Kind, Parameter
 
 FREE = 25.0  # W/(m^2 K), the most that free convection in a gas is (Incropera, DeWitt, 6th ed. 2007, table 1.1)
 EXPONENT = 0.65  # of speeds in films: between laminar, 0.5, and turbulent, 0.8 (Incropera, DeWitt, 7.2)
-# forced convection at the top speed over what there is at rest: two laws h (1 + c s^m) differ in ln h by
-# s^m / (1 + c s^m), to first order in c; free convection with radiation is 6 to 12, forced air 10 to 30 W/(m^2 K)
+# least c, forced convection at the top speed over what there is at rest: free convection with radiation is 6 to 12,
+# forced air 10 to 30 W/(m^2 K). A description of less says nothing of how a film reacts to a speed that it does feel
 FORCED = 2.0
+LEAST = 1.0  # W/(m^2 K), of a film at rest
 # bounds, standard deviations: as far as synthetic measurements draw
 MOST = 2.5
 
 
 def with_film_laws(study: Study, form: Form) -> Study:
-    """The study with an exponent more for every film, and a reaction to speed for each whose law reads one. A
-    coefficient that is too large for free convection has the exponent in the share that free convection may be."""
+    """The study with an exponent more for every film, and a reaction to speed with its own exponent for each whose law
+    reads one. A coefficient that is too large for free convection has the first in the share that free convection may
+    be."""
     probed = study.probed
     films = probed.base.load_model.films
     n, fitted = len(films), study.fitted
-    most = np.max([convection(probed.runs[k].drive, n).mean(axis=0) for k in fitted], axis=0)
+    described = [convection(probed.runs[k].drive, n) for k in fitted]
+    most = np.max([h.mean(axis=0) for h in described], axis=0)
     usual = np.exp(np.mean(np.concatenate([_log_rise(study, k) for k in fitted]), axis=0))
-    moving = [winds(study, k, np.full(n, EXPONENT)) for k in range(len(study.runs))]
-    reaction = [s * (1.0 + FORCED) / (1.0 + FORCED * s) for s in moving]
-    mean = np.mean(np.concatenate([reaction[k] for k in fitted]), axis=0)
+    least, largest = (of([of(h, axis=0) for h in described], axis=0) for of in (np.min, np.max))
+    c = np.maximum(largest / np.maximum(least, LEAST) - 1.0, FORCED)
+    speed = _relative_speeds(study)
+    forced = [c * v**EXPONENT / (1.0 + c * v**EXPONENT) for v in speed]
+    wind = [s * (1.0 + c) / c for s in forced]
+    bent = [xlogy(s, v) for s, v in zip(forced, speed, strict=True)]
+    mean_wind, mean_bent = (np.mean(np.concatenate([own[k] for k in fitted]), axis=0) for own in (wind, bent))
     parameters = list(probed.parameters)
     for f, film in enumerate(films):
         if form.steep > 0.0:
             parameters.append(_of(film.name, "exponent", form.steep * min(1.0, FREE / max(float(most[f]), FREE))))
-        if form.speed > 0.0 and any(reaction[k][:, f].any() for k in fitted):
+        if any(speed[k][:, f].any() for k in fitted):
             parameters.append(_of(film.name, "wind", form.speed))
-    runs = tuple(
-        replace(run, loads=replace(run.loads, usual=np.tile(usual, (run.drive.n_steps, 1)), wind=own - mean))
-        for run, own in zip(probed.runs, reaction, strict=True)
-    )
-    wider = replace(probed, parameters=tuple(parameters), runs=runs)
+            parameters.append(_of(film.name, "wind_exponent", form.speed_exponent))
+    runs = []
+    for k, run in enumerate(probed.runs):
+        constant = np.tile(usual, (run.drive.n_steps, 1))
+        loads = replace(run.loads, usual=constant, wind=wind[k] - mean_wind, wind_exponent=bent[k] - mean_bent)
+        runs.append(replace(run, loads=loads))
+    wider = replace(probed, parameters=tuple(parameters), runs=tuple(runs))
     return make_study(wider, [planned.measured for planned in study.runs], fitted)
+
+
+def _relative_speeds(study: Study) -> list[np.ndarray]:
+    """Per run (n, n_films) the speed that the law of each film reads, of the largest in the fitted runs; 0 where it
+    reads none."""
+    load, runs = study.probed.base.load_model, study.probed.runs
+    units = {s.name: s.unit for s in load.signals}
+    result = [np.zeros((run.drive.n_steps, len(load.films))) for run in runs]
+    for f, film in enumerate(load.films):
+        for signal in film.use.signals.values():
+            values = [np.abs(run.signals.get(signal, np.zeros(run.drive.n_steps))) for run in runs]
+            top = max(float(values[k].max()) for k in study.fitted)
+            if units.get(signal) in ("m/s", "1/s") and top > 0.0:
+                for own, v in zip(result, values, strict=True):
+                    own[:, f] = v / top
+    return result
 
 
 def _of(film: str, kind: Kind, sigma: float) -> Parameter:

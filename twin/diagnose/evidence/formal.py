@@ -10,18 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twin.build.workers import each
 from twin.diagnose.evidence.leading import LEAST, channel_of, leading, leading_of_each
-from twin.diagnose.evidence.nulls import EXPONENTS, Form, winds
+from twin.diagnose.evidence.nulls import Form
 from twin.diagnose.evidence.whiten import Whitener
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
-from twin.progress import Progress, silent
 
 CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
 READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
-SPREAD = 12.0**-0.5  # standard deviation of a uniform law of width 1
-BENT = 2.0**-0.5  # and of half a squared standard normal
 
 
 @dataclass(frozen=True)
@@ -34,12 +30,12 @@ class Described:
 
 
 def known_forms(
-    study: Study, described: Described, nominal: tuple[Nominal, ...], raw: np.ndarray, J: np.ndarray, wind: np.ndarray,
+    study: Study, described: Described, nominal: tuple[Nominal, ...], raw: np.ndarray, J: np.ndarray,
     whiten: Whitener, form: Form,
 ) -> np.ndarray:  # fmt: skip
-    """White columns (m, k) of unit prior variance; raw (m, n), J (m, n_parameters), wind (m, w): `wind_columns`."""
+    """White columns (m, k) of unit prior variance; raw (m, n), J (m, n_parameters)."""
     columns = np.hstack([described.columns, _aside(study, nominal, len(J), form)])
-    parts = [whiten(np.hstack([columns, wind]))] if columns.shape[1] else []
+    parts = [whiten(columns)] if columns.shape[1] else []
     parts += _wobbles(study, described, raw, whiten, form)
     return np.hstack([*parts, _readings(study, J, whiten, form)]) if parts else np.zeros((len(J), 0))
 
@@ -86,36 +82,3 @@ def _readings(study: Study, J: np.ndarray, whiten: Whitener, form: Form) -> np.n
     heated = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
     white = whiten(form.reading * J[:, heated] / study.scale[heated])
     return leading_of_each(channel_of(study), white)
-
-
-def wind_columns(study: Study, form: Form, progress: Progress = silent) -> np.ndarray:
-    """(m, 3 films that hear a speed) outputs [K, m] of one standard deviation each, by the exact model: films of motors
-    and screws stand 15 K above the air, where half as much again of a coefficient is no small change.
-
-    Per film: its reaction with the mean of two exponents, the difference of exponents, the second order.
-    """
-    n = len(study.probed.base.load_model.films)
-    heard = [f for f in range(n) if any(winds(study, k, np.ones(n))[:, f].any() for k in study.fitted)]
-    if not heard or form.wind == 0.0:
-        return np.zeros((study.rows[-1].stop, 0))
-    with progress("films that hear a speed", len(heard)) as advance:
-        made = each(_of_film, (study, form), heard, lambda _: advance(""))
-    return np.hstack(made)
-
-
-def _of_film(shared: tuple[Study, Form], f: int) -> np.ndarray:
-    study, form = shared
-    x = np.zeros(len(study.probed.parameters))
-    n_films = len(study.probed.base.load_model.films)
-    parts = []
-    for k in study.fitted:
-        slots = study.slots(k)
-        shapes = [winds(study, k, np.full(n_films, e))[:, f] for e in EXPONENTS]
-        for q, shape in enumerate((*shapes, (shapes[0] + shapes[1]) / 2)):
-            slots.film[:, q, f] = shape
-        y, D = study.by_amplitudes(k, x, slots, (0.0, 0.0, 0.0))
-        more, less = (study.outputs(k, x, slots, (0.0, 0.0, a)) for a in (form.wind, -form.wind))
-        parts.append(
-            np.stack([form.wind * D[:, 2], SPREAD * form.wind * (D[:, 1] - D[:, 0]), BENT * (more + less - 2 * y)], 1)
-        )
-    return np.vstack(parts)

@@ -22,7 +22,6 @@ from twin.rom.drive import Drive
 from twin.rom.parameter import OF_LAWS
 
 SPREAD = 0.6  # of parameters, in prior standard deviations: tolerances are stated with care
-EXPONENTS = (0.5, 0.8)  # of speeds in films: from laminar to turbulent
 
 
 @dataclass(frozen=True)
@@ -32,13 +31,13 @@ class Form:
     local_film: float = 0.12  # of each face's coefficient against its group's
     shape: float = 0.05  # of a film group's coefficient, slowly varying within a run
     shape_time: float = 5400.0  # s, over which it does
-    wind: float = 0.25  # of a film group's coefficient at the top speed of its law against that at rest
     # of the exponent of the rise above the air in a film's coefficient: rms difference of two of 0 (forced air), 0.13
     # (free convection beside as much radiation), 1/4 and 1/3 (laminar and turbulent free convection)
     steep: float = 0.2
     # of the logarithm of a film's coefficient at its top speed against that at rest: rms of the other laws of the
     # ball-screw axis and the ram borer of even seeds
     speed: float = 0.5
+    speed_exponent: float = 0.15  # of that speed in the coefficient: half of what laminar and turbulent flow differ by
     # of the logarithm of a film's coefficient beyond its tolerance: laws of the rise to the power 0 and 0.3 that agree
     # at one rise differ by 0.3 ln 5 at five times and at a fifth of it (three times had a film of the table of the
     # ball-screw axis, seed 0, before a loss). In synthetic measurements alone: what a calibration makes of it is what a
@@ -62,7 +61,7 @@ class Form:
 def form_of(machine: Machine) -> Form:
     """That of a machine: in a lumped one a film of a node is no face's, and as uncertain as it is stated. With its
     exponent as another nuisance the lumped machine of the tests lost faults that it had found."""
-    return Form(steep=0.0, law=0.0, speed=0.0) if machine.lumped else Form()
+    return Form(steep=0.0, law=0.0) if machine.lumped else Form()
 
 
 @dataclass(frozen=True)
@@ -95,8 +94,6 @@ def null(
     for place in heated_places(study):
         lump = lump_of(study, place, form) * float(np.clip(rng.standard_normal(), -1.8, 1.8))
         E += lump * np.outer(probed.B[place], probed.B[place])
-    wind = form.wind * np.clip(rng.standard_normal(len(load.films)), -2.0, 2.0)
-    exponent = rng.uniform(*EXPONENTS, len(load.films))
     law = np.exp(form.law * np.clip(rng.standard_normal(len(load.films)), -1.5, 1.5)) if form.law else 1.0
     readings = _readings(study, J, rng, form)
     aside = form.aside * rng.standard_normal(len(probed.base.sensors))
@@ -117,7 +114,7 @@ def null(
             M += strength * probed.M[p]
         rise = run.drive.environment[:, load.surroundings] - probed.base.reference_temperature
         slow = _smooth(rng, n, len(load.films), form.shape_time / (run.drive.time[1] - run.drive.time[0]))
-        wobble = law * (1.0 + mean + form.shape * slow + wind * winds(study, k, exponent)) - 1.0
+        wobble = law * (1.0 + mean + form.shape * slow) - 1.0
         forcing = np.zeros((n, body.n))
         for j, vector in enumerate(split):
             if vector is not None:
@@ -160,20 +157,6 @@ def _smooth(rng: np.random.Generator, n: int, columns: int, memory: float) -> np
     R = np.exp(-0.5 * ((knots[:, None] - knots) / memory) ** 2)
     drawn = np.linalg.cholesky(R + 1e-6 * np.eye(len(knots))) @ rng.standard_normal((len(knots), columns))
     return np.stack([np.interp(np.arange(n), knots, own) for own in drawn.T], axis=1) if columns else np.zeros((n, 0))
-
-
-def winds(study: Study, k: int, exponent: np.ndarray) -> np.ndarray:
-    """(n, n_films) 0 .. 1: how fast the air of each film moves, as its law hears, to the exponent (n_films,); 0 for
-    films that hear no speed."""
-    load, run = study.probed.base.load_model, study.runs[k].run
-    units = {s.name: s.unit for s in load.signals}
-    result = np.zeros((run.drive.n_steps, len(load.films)))
-    for f, film in enumerate(load.films):
-        for signal in film.use.signals.values():
-            values = run.signals.get(signal)
-            if units.get(signal) in ("m/s", "1/s") and values is not None and np.any(values):
-                result[:, f] = (np.abs(values) / np.abs(values).max()) ** exponent[f]
-    return result
 
 
 def shared_by_film(study: Study, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

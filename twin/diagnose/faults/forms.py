@@ -6,12 +6,12 @@ import numpy as np
 
 from twin.diagnose.evidence.formal import Described
 from twin.diagnose.evidence.nulls import Form, convection, lump_of
-from twin.diagnose.faults.elements import EXPONENT, Elements, Key
+from twin.diagnose.faults.elements import Elements, Key
 from twin.diagnose.faults.signal import CLOCK
 from twin.diagnose.model.study import Study, heated_places
 
 # Kinds that `described_forms` makes nuisances of: with every history, or the one named
-NUISANCE = {"film": "always", "group_film": "", "capacity": "", "moved": "", "start": "", "joint": "", "contact": "",
+NUISANCE = {"film": "always", "capacity": "", "moved": "", "start": "", "joint": "", "contact": "",
             "group": "", "air": ""}  # fmt: skip
 
 
@@ -36,10 +36,6 @@ def described_forms(study: Study, elements: Elements, raw: np.ndarray, form: For
     for place in probed.places:
         if place.film:
             add(("film", place.name, "always"), form.local_film * float(usual[films.index(place.film)]))
-    for f, film in enumerate(load.films):
-        for signal in film.use.signals.values():
-            heard = elements.histories.same.get(signal, signal)
-            add(("group_film", film.name, f"{heard}^{EXPONENT:g}"), form.wind * float(usual[f]))
     for p in heated_places(study):
         add(("capacity", probed.places[p].name, "always"), lump_of(study, p, form))
     for kind, source, history in list(elements.index):

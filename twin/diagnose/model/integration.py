@@ -7,7 +7,7 @@ differentiated like a parameter:
 
     (E + sum a_k E_k) x' = -(A(theta law (1 + sum a_k film_k), joints, contacts) + sum a_k gate_k A_k) x
                            + (B + sum a_k B_k) P + ... + sum a_k (gate_k rise_k M_k + forcing_k),
-    T_air + sum a_k environment_k,      law = (rise / usual)^e exp(w wind)
+    T_air + sum a_k environment_k,      law = (rise / usual)^e exp(w wind + m wind_exponent)
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ class ProbedLoads:
     power_table: Array  # (n, l, 121) W over TEMPERATURES
     contact_heat: Array  # (n, s, r) W, projected
     usual: Array  # (n, n_films) K: the rise at which films of another exponent have the described coefficient
-    wind: Array  # (n, n_films): of the relative speed that films' laws read
+    wind: Array  # (n, n_films) d ln h / dw, of the relative speed that films' laws read
+    wind_exponent: Array  # (n, n_films) d ln h / dm
 
 
 def loads_for(model: MachineModel, drive: Drive) -> ProbedLoads:
@@ -72,6 +73,7 @@ def loads_for(model: MachineModel, drive: Drive) -> ProbedLoads:
         contact_heat=drive.contact_heat @ body.P.T,
         usual=np.ones((drive.n_steps, len(model.load_model.films))),
         wind=np.zeros((drive.n_steps, len(model.load_model.films))),
+        wind_exponent=np.zeros((drive.n_steps, len(model.load_model.films))),
     )
 
 
@@ -155,7 +157,8 @@ def _step(
     convection = Tabulated(jnp.asarray(loads.theta)[:n], layout.following_films, loads.film_table)
     surfaces, position = system.surfaces(z), jnp.asarray(loads.position)
     rise = jnp.maximum(jnp.abs(surfaces - system.film_plan.air(environment, position)), LITTLE)
-    law = (rise / jnp.asarray(loads.usual)) ** f.exponent * jnp.exp(f.wind * jnp.asarray(loads.wind))
+    wind = f.wind * jnp.asarray(loads.wind) + f.wind_exponent * jnp.asarray(loads.wind_exponent)
+    law = (rise / jnp.asarray(loads.usual)) ** f.exponent * jnp.exp(wind)
     film_factor = f.film * jnp.maximum(1.0 + a @ jnp.asarray(slots.film), 0.02)
     films = film_loads(jnp, system.film_plan, convection, surfaces, environment, position, 1.0, film_factor)
     films = replace(films, total=films.total * law, lift=films.lift * law)

@@ -20,7 +20,7 @@ import scipy.linalg
 from twin.calibrate.fit.measured import measured
 from twin.calibrate.fit.noise import Channels
 from twin.diagnose.evidence.film_laws import with_film_laws
-from twin.diagnose.evidence.formal import known_forms, wind_columns
+from twin.diagnose.evidence.formal import known_forms
 from twin.diagnose.evidence.nulls import Form, form_of
 from twin.diagnose.evidence.whiten import Whitener
 from twin.diagnose.faults.elements import Elements, Histories, Key, elements_of
@@ -147,9 +147,8 @@ def _compared(
     narrow = _narrowed(elements, chosen)
     place = {c: i for i, c in enumerate(chosen)}
     raw = respond(study, nominal, elements.vectors, narrow.columns)
-    wind = wind_columns(study, form)
     described = described_forms(study, narrow, raw, form)
-    known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
+    known = known_forms(study, described, nominal, raw, J, whiten, form)
     D = np.zeros((len(J), 2 * len(wanted)))
     for i, (now, new, reading, factor) in enumerate(wanted):
         if now is not None:

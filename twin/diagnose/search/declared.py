@@ -96,7 +96,8 @@ def _corrected(study: Study, planned: Planned, signal: str, factor: float) -> Pl
     signals = {n: values * (factor if n == signal else 1.0) for n, values in run.signals.items()}
     more, less = (_evaluated(study, run.drive, values) for values in (signals, run.signals))
     drive = _sum(run.drive, more, less, list(base.load_model.contact_sources))
-    loads = replace(loads_for(base, drive), usual=run.loads.usual, wind=run.loads.wind)  # films stay as they are fitted
+    was = run.loads  # laws of films stay as they are fitted
+    loads = replace(loads_for(base, drive), usual=was.usual, wind=was.wind, wind_exponent=was.wind_exponent)
     return replace(planned, run=replace(run, drive=drive, signals=signals, loads=loads))
 
 

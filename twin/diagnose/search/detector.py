@@ -19,7 +19,7 @@ from twin.calibrate.fit.measured import Measured
 from twin.calibrate.fit.noise import Channels, estimated
 from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.evidence.fitter import Fitted, Fitter
-from twin.diagnose.evidence.formal import known_forms, wind_columns
+from twin.diagnose.evidence.formal import known_forms
 from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, null
 from twin.diagnose.evidence.pulls import Pulls, gumbel
 from twin.diagnose.evidence.settled import settled_alone
@@ -174,7 +174,6 @@ def make_detector(
         advance("responses")
     first = len(elements.columns)
     index = {**elements.index, **{key: first + c for key, c in of_reading.items()}}
-    wind = wind_columns(study, form, progress)
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
     bare = np.hstack(bare_forms(study, raw, index))
@@ -182,7 +181,7 @@ def make_detector(
 
     def fitter_of(whiten: Whitener, *modes: np.ndarray) -> Fitter:
         discretised = [o.columns(whiten, SPREAD) for o in other]
-        known = known_forms(study, described, nominal, raw, J, wind, whiten, form)
+        known = known_forms(study, described, nominal, raw, J, whiten, form)
         return Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *discretised, known, *modes]))
 
     fitter = fitter_of(whiten)
