@@ -1,4 +1,4 @@
-"""Films whose law has another exponent than described."""
+"""Films whose law has other exponents than described, of their rise or of a speed."""
 
 from __future__ import annotations
 
@@ -29,28 +29,44 @@ RADIATION = 5.2  # W/(m^2 K) of a surface of emissivity 0.9 at 22 degC: 4 sigma 
 def test_laminar_free_convection_where_a_constant_is_described():
     """The film's gain and its exponent explain all but a tenth of what both machines differ by: that of 1/4 in what
     convection is of the film."""
-    machine, study = small_case.machine(), small_case.described()
-    law = LAWS["free_vertical_plate_laminar"].function
-    gain = DESCRIBED / float(law(surface=20.0 + RISE, ambient=20.0, height=HEIGHT))
-    film = machine.films["air"].model_copy(
-        update={"law": "free_vertical_plate_laminar", "parameters": {"height": f"{HEIGHT} m"}, "gain": gain}
+    gain = DESCRIBED / float(
+        LAWS["free_vertical_plate_laminar"].function(surface=20.0 + RISE, ambient=20.0, height=HEIGHT)
     )
-    real = machine.model_copy(update={"films": machine.films | {"air": film}})
+    law = {"law": "free_vertical_plate_laminar", "parameters": {"height": f"{HEIGHT} m"}, "gain": gain}
+    left, found = _explained("air", law, ("gain", "exponent"))
+    assert left < 0.1
+    # within what rises below half a kelvin do, at the start of a run
+    np.testing.assert_allclose(found["exponent"], 0.25 * DESCRIBED / (DESCRIBED + RADIATION), rtol=0.2)
+
+
+def test_laminar_forced_convection_where_turbulent_is_described():
+    """The exponent of the speed tells most of what a share of forced convection alone does not."""
+    laminar = {"parameters": {"natural": "6 W/(m^2*K)", "forced": "30 W/(m^2*K)", "exponent": 0.5}}
+    without, _ = _explained("moving", laminar, ("gain", "wind"))
+    left, found = _explained("moving", laminar, ("gain", "wind", "wind_exponent"))
+    assert left < 0.1
+    assert left < 0.5 * without
+    assert found["wind_exponent"] < 0.0
+
+
+def _explained(film: str, law: dict[str, object], of: tuple[str, ...]) -> tuple[float, dict[str, float]]:
+    """What numbers of a film's law leave of the difference to a machine with another law, and their values."""
+    machine, study = small_case.machine(), small_case.described()
+    films = machine.films | {film: machine.films[film].model_copy(update=law)}
+    real = machine.model_copy(update={"films": films})
     plans, known = [p.measured for p in study.runs], parameters(machine)
     other = make_study(make_probed_model(real, known, small_case.runs()), plans, study.fitted)
-    x = np.zeros(len(known))
     free = with_film_laws(study, Form())
-    (j,) = [i for i, p in enumerate(free.probed.parameters) if p.path == "films.air.exponent"]
-    (gain,) = [i for i, p in enumerate(free.probed.parameters) if p.path == "films.air.gain"]
+    paths = [p.path for p in free.probed.parameters]
+    own = [paths.index(f"films.{film}.{name}") for name in of]
     unit = np.concatenate([_units(study, k) for k in study.fitted])
-    y, u = other.all_outputs(x) / unit, np.zeros(len(free.scale))
-    before = np.linalg.norm(y - study.all_outputs(x) / unit)
-    for _ in range(4):  # Gauss-Newton, of both
-        J = jacobian_of(free, u)[:, [gain, j]] / unit[:, None]
-        u[[gain, j]] += np.linalg.lstsq(J, y - free.all_outputs(u) / unit, rcond=None)[0]
-    assert np.linalg.norm(y - free.all_outputs(u) / unit) < 0.1 * before
-    # within what rises below half a kelvin do, at the start of a run
-    np.testing.assert_allclose(u[j] * free.scale[j], 0.25 * DESCRIBED / (DESCRIBED + RADIATION), rtol=0.2)
+    y, u = other.all_outputs(np.zeros(len(known))) / unit, np.zeros(len(free.scale))
+    before = np.linalg.norm(y - free.all_outputs(u) / unit)
+    for _ in range(4):  # Gauss-Newton
+        J = jacobian_of(free, u)[:, own] / unit[:, None]
+        u[own] += np.linalg.lstsq(J, y - free.all_outputs(u) / unit, rcond=None)[0]
+    left = float(np.linalg.norm(y - free.all_outputs(u) / unit) / before)
+    return left, {name: float(u[j] * free.scale[j]) for name, j in zip(of, own, strict=True)}
 
 
 def test_forced_convection_and_coolants_have_little_of_it():
