@@ -31,6 +31,7 @@ from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.report.recalibration import large
+from twin.diagnose.report.text import alike
 from twin.diagnose.search.detector import emptied
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.sealed import judged as on_sealed
@@ -109,7 +110,8 @@ def answer(row: Row) -> str:
     right = {(family, p) for p in sought | set(row.get("same", ()))}
     if named and named[0] in right:
         return "right"
-    rivals = [tuple(r) for r in row["rivals"]] if row["verdict"] == "ambiguous" else []
+    told = row["rivals"] if row["verdict"] == "ambiguous" else row.get("alike", [])  # of the headline
+    rivals = [tuple(r) for r in told]
     return "among" if right & {*named, *rivals} else "wrong"
 
 
@@ -301,6 +303,7 @@ def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
         "causes": [(c.family, c.place, round(c.amplitude, 4), c.history, c.ci95) for c in causes],
         "gains": [(g.channel, g.unit, g.recalibrated, g.extended, g.ci95) for g in opened.gains if g.affected],
         "rivals": [(r.family, r.place) for c in causes for r in c.rivals],
+        "alike": [(c.family, place) for c in causes for place in alike(c)],
         "by_run": [[(s.amplitude, s.sigma) for s in a.by_run] for a in found.accepted],
         "observed": {k: v / detector.thresholds.get(k, np.inf) for k, v in found.steps[0].observed.items()},
         "dispersion": left.share,

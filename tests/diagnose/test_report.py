@@ -415,6 +415,17 @@ def test_a_sensor_beside_does_not_lead_what_is_ambiguous_or_out_of_tolerance():
         assert "; besides: sensor x_nut is at fault" in text
 
 
+def test_other_faces_of_a_part_that_look_the_same_are_told():
+    """Of the same part and family, where it takes a sensor to tell them; neither what the data tell nor other parts."""
+    told = {"bed.left": "a sensor between", "bed.right": "", "column.left": "a sensor between"}
+    rivals = tuple(
+        Rival("heat_source", place, "always", 70.0, "W", 402.0, 0.99, remedy) for place, remedy in told.items()
+    )
+    text = verdict_sentence(replace(diagnosis("named"), causes=(heat(rivals=rivals),)))
+    assert text.endswith(" (these data do not tell bed.x_motor from bed.left).")
+    assert "do not tell" not in verdict_sentence(replace(diagnosis("named"), causes=(heat(rivals=rivals[1:]),)))
+
+
 def test_a_clock_that_is_off_changes_no_description():
     clock = replace(SIGNAL, place="runs.run_1", parameter="", history="clock", amplitude=120.0, unit="s")
     lines = summary_lines(replace(diagnosis("signal"), causes=(clock,)))

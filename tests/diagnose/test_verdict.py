@@ -14,6 +14,7 @@ from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.table import OF_KIND
+from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import parameter_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import look
@@ -28,6 +29,21 @@ from twin.diagnose.search.verdict import (
     strained_of,
     verdict_of,
 )
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("bed.left", "bed.right", True),
+        ("bed.left", "column.left", False),
+        ("parts.screw", "parts.rail", False),
+        ("scales.x", "scales.y", False),
+        ("sources.motor>bed.left", "sources.motor>bed.right", True),
+    ],
+)
+def test_faces_of_a_part_have_one_owner_and_two_parts_do_not(one, other, same):
+    """Causes of one owner are one answer, others are "ambiguous" where the data do not tell them."""
+    assert (Spot.read(one).owner == Spot.read(other).owner) == same
 
 
 @pytest.mark.parametrize(

@@ -159,9 +159,24 @@ def verdict_sentence(d: Diagnosis) -> str:
         return _sentence(f"Not the machine, but its measurement: {causes}")
     if d.verdict == "signal":
         return _sentence(f"Not the machine, but what was logged of its loads: {causes}")
+    causes = joined([cause_words(c) + _alike_words(c) for c in d.causes])
     if len(d.causes) == 1:
         return _sentence(causes)
     return _sentence(f"{len(d.causes)} causes act together: {causes}")
+
+
+def alike(cause: Cause) -> list[str]:
+    """Other places of its part at which these data would show the same cause as they do."""
+    part = Spot.read(cause.place).owner
+    return list(dict.fromkeys(
+        r.place for r in cause.rivals
+        if r.family == cause.family and r.place != cause.place and r.remedy and Spot.read(r.place).owner == part
+    ))  # fmt: skip
+
+
+def _alike_words(cause: Cause) -> str:
+    others = alike(cause)
+    return f" (these data do not tell {cause.place} from {' and '.join(others)})" if others else ""
 
 
 def follows(d: Diagnosis) -> str:

@@ -61,9 +61,7 @@ class Spot:
     @property
     def owner(self) -> str:
         """What it belongs to: the part of a surface, or what it is without its partner."""
-        if self.of in (Of.SURFACE, Of.MATERIAL, Of.PART, Of.SCALE, Of.TANK):
-            return self.text.partition(".")[0]
-        return f"{self.of.value}.{self.name}"
+        return self.part if self.of is Of.SURFACE else f"{self.of.value}.{self.name}"
 
     @property
     def part(self) -> str:
