@@ -22,19 +22,25 @@ ANY = 10.0  # prior standard deviations, of a parameter without tolerance: more 
 Outputs = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def settled_alone(fitter: Fitter, y: np.ndarray, free: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray]:
+def settled_alone(
+    fitter: Fitter, y: np.ndarray, free: Sequence[int] = (), held: Sequence[int] = ()
+) -> tuple[np.ndarray, np.ndarray]:
     """Parameters (n,) in prior standard deviations of measurements y (m,) without a cause, and their covariance (n, n);
-    free: parameters that have no tolerance."""
+    free: parameters that have no tolerance; held: that stay as declared."""
     study = fitter.study
 
     def left(x: np.ndarray) -> np.ndarray:
         return fitter.whiten(y - study.all_outputs(x))
 
-    return settle(fitter, fitter.surrogate.at, left, free)
+    return settle(fitter, fitter.surrogate.at, left, free, held)
 
 
 def settle(
-    fitter: Fitter, outputs: Outputs, left: Callable[[np.ndarray], np.ndarray], free: Sequence[int] = ()
+    fitter: Fitter,
+    outputs: Outputs,
+    left: Callable[[np.ndarray], np.ndarray],
+    free: Sequence[int] = (),
+    held: Sequence[int] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Parameters (n,) that leave least, and their covariance (n, n).
 
@@ -51,13 +57,14 @@ def settle(
     W = 1.0 / (1.0 + rows * (N**2).sum(axis=1))
     precision = np.ones(len(low))
     precision[list(free)] = ANY**-2.0
+    still = [*laws, *held]
     P = np.diag(precision)
     for _ in range(PASSES):
         before = x
         white_left, there = left(x), outputs(x)[0]
         for _ in range(INNER):
             f, J = outputs(x)
-            J[:, laws] = 0.0
+            J[:, still] = 0.0
             white = whiten(J)
             A = np.linalg.inv(P + white.T @ (W[:, None] * white))
             found = A @ (white.T @ (W * (white_left + whiten(there - f + J @ x))))

@@ -154,7 +154,7 @@ def _fitted_with(detector: Detector, y: np.ndarray, change: np.ndarray) -> float
 def _fitted_by(detector: Detector, y: np.ndarray, study: Study, enough: float) -> float:
     """The misfit of a study with other loads, parameters fitted. Where it is below `enough`, with exact derivatives."""
     low, high = bounds(study)
-    x, hotter, left = np.zeros(len(low)), _gains(detector.study, study), np.inf
+    x, hotter, left = np.zeros(len(low)), imitating(detector.study, study), np.inf
     for i in range(detector.policy.exact_passes + 1):
         if i < detector.policy.exact_passes:
             J = detector.fitter.surrogate.at(x + hotter)[1]
@@ -169,7 +169,7 @@ def _fitted_by(detector: Detector, y: np.ndarray, study: Study, enough: float) -
     return left
 
 
-def _gains(described: Study, corrected: Study) -> np.ndarray:
+def imitating(described: Study, corrected: Study) -> np.ndarray:
     """(n,) prior standard deviations by which described sources would emit what they do with corrected loads."""
     before, after = _emitted(described), _emitted(corrected)
     result = np.zeros(len(described.probed.parameters))

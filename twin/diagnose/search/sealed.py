@@ -1,12 +1,14 @@
 """The sealed runs judge the headline: what names a cause in the machine must predict runs that were not looked at.
 
-It never makes a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But causes of
-the machine that make more of the channels that they move worse than better, beyond chance, are withdrawn. Where another
-size that the data allow makes more of them better than worse, the run refutes the size alone: the name stays, and
-nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
-calibration makes of it without its tolerance. What is told of a declared number is judged beside a calibration of all
-others. A number that calibration alone moved out of its tolerance is judged beside the calibration that keeps it in,
-and needs this confirmation where only the fit behind the scores is sure of it.
+They make no name that the diagnosed runs do not: a sensor fault, or an event of theirs, shows in no other run. But
+causes of the machine that make more of the channels that they move worse than better, beyond chance, are withdrawn; a
+rival of another family that explains the diagnosed runs as well, and that they confirm, takes the place of one. Where
+another size that the data allow makes more of the channels better than worse, the run refutes the size alone: the
+name stays, and nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what
+the settled calibration makes of it without its tolerance. What is told of a declared number is judged beside a
+calibration of all others, and a factor of a signal beside one that leaves the sources which read it as declared. A
+number that calibration alone moved out of its tolerance is judged beside the calibration that keeps it in, and needs
+this confirmation where only the fit behind the scores is sure of it.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
 from twin.diagnose.search.accepted import Accepted, freed, settled
+from twin.diagnose.search.declared import imitating, with_signal
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.gain import gains
 from twin.diagnose.search.look import Search
@@ -86,11 +89,15 @@ def judged(
 
 
 def _beside_declared(found: Search, y: np.ndarray) -> Search:
-    """The search beside a calibration that has the declared numbers which were named as they are declared: one that
-    moves them itself predicts as well as the model that was told."""
-    study = found.detector.study
-    named = [replace(a, amplitude=np.zeros_like(a.amplitude)) for a in found.accepted if freed(study, a.hypothesis)]
-    return replace(found, x0=settled(found.detector, y, named)[0]) if named else found
+    """The search beside a calibration that keeps as declared the numbers that were named, and those that imitate a
+    factor of a signal: one that moves them itself predicts as well as the model that was told."""
+    study, held = found.detector.study, set[int]()
+    for h in (a.hypothesis for a in found.accepted):
+        held.update(freed(study, h))
+        if (fault := fault_of(h)).corrects:
+            place, factor = fault.factor(h.name)
+            held.update(np.flatnonzero(imitating(study, with_signal(study, fault.bare(place), factor))).tolist())
+    return replace(found, x0=settled_alone(found.detector.fitter, y, held=sorted(held))[0]) if held else found
 
 
 def _told_by_fit(found: Search) -> bool:
