@@ -1,14 +1,13 @@
 """The sealed runs judge the headline: what names a cause in the machine must predict runs that were not looked at.
 
-They make no name that the diagnosed runs do not: a sensor fault, or an event of theirs, shows in no other run. But
-causes of the machine that make more of the channels that they move worse than better, beyond chance, are withdrawn; a
-rival of another family that explains the diagnosed runs as well, and that they confirm, takes the place of one. Where
-another size that the data allow makes more of the channels better than worse, the run refutes the size alone: the
-name stays, and nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what
-the settled calibration makes of it without its tolerance. What is told of a declared number is judged beside a
-calibration of all others, and a factor of a signal beside one that leaves the sources which read it as declared. A
-number that calibration alone moved out of its tolerance is judged beside the calibration that keeps it in, and needs
-this confirmation where only the fit behind the scores is sure of it.
+They never make a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But causes
+of the machine that make more of the channels that they move worse than better, beyond chance, are withdrawn. Where
+another size that the data allow makes more of them better than worse, the run refutes the size alone: the name stays,
+and nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
+calibration makes of it without its tolerance. What is told of a declared number is judged beside a calibration of all
+others, and a factor of a signal beside one that leaves the sources which read it as declared. A number that
+calibration alone moved out of its tolerance is judged beside the calibration that keeps it in, and needs this
+confirmation where only the fit behind the scores is sure of it.
 """
 
 from __future__ import annotations
