@@ -62,6 +62,7 @@ def test_ties_go_to_the_smaller_error():
     assert PoseStudy(("x", "y"), 1.0, grids).smallest(1.0, "linear").counts == (6, 2)
 
 
+@pytest.mark.long
 def test_fields_of_a_run_converge_with_the_step():
     """Loads are means over a step, of first order once steps resolve what switches: against 576 steps, half the step
     leaves (4 - 1)/(2 - 1) = 3 times less."""

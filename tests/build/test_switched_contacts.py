@@ -151,6 +151,7 @@ def test_a_factor_kept_while_a_joint_creeps_changes_little(models):
     np.testing.assert_allclose(kept.stored, heat, atol=1e-10 * np.abs(heat).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("value", [1.0, 1.7])
 def test_the_window_model_takes_switched_contacts(machine, models, value):
     """Its step against the runtime's, at the described conductances and at others."""

@@ -43,6 +43,7 @@ KEYS = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("key", KEYS, ids=".".join)
 def test_against_differences(key):
     """On the machine whose laws read no temperature, where responses leave out nothing."""

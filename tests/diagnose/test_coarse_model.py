@@ -26,6 +26,7 @@ def with_states(model: MachineModel, n: int) -> MachineModel:
     return replace(model, bodies=bodies)
 
 
+@pytest.mark.long
 def test_an_artefact_of_too_few_states_is_told():
     found = too_coarse(with_states(lumped_case.artefact().model, 2), small_case.study(), *NOISE)
     assert found is not None

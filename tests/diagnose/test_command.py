@@ -197,6 +197,7 @@ EXTENSION = ["extended.h5", "machine.toml"]
 LOADS = ["runs/warm_up/loads.csv", "runs/warm_up/run.toml"]
 
 
+@pytest.mark.long
 def test_a_folder_is_that_of_its_newest_report(artefact, tmp_path, found):
     out = tmp_path / "out"
     arguments = ["diagnose", str(artefact), str(RUN), "-o", str(out)]
@@ -218,6 +219,7 @@ def test_a_folder_is_that_of_its_newest_report(artefact, tmp_path, found):
     assert report(out)["verdict"] == "nothing"
 
 
+@pytest.mark.long
 def test_an_interrupted_build_leaves_the_report(artefact, tmp_path, found, monkeypatch, capsys):
     def interrupted(*_, **more):
         raise KeyboardInterrupt

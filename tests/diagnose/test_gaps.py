@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.evidence.whiten import measured_of, missing
@@ -12,6 +13,7 @@ from twin.diagnose.model.study import with_measured
 from twin.diagnose.search.detector import emptied
 
 
+@pytest.mark.long
 def test_what_is_missing_counts_nowhere():
     detector = small_case.made_detector()
     plans = [planned.measured for planned in detector.study.runs]

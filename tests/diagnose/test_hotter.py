@@ -48,6 +48,7 @@ def test_channels_of_a_stronger_source_are_wrong_by_as_much_more_as_they_rise():
     assert after.thresholds == detector.thresholds
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factor", [0.2, 1.05])
 def test_a_source_within_its_tolerance_or_a_colder_one_changes_nothing(factor):
     detector = small_case.made_detector()

@@ -52,6 +52,7 @@ def test_todays_limits_are_those_of_the_diagnosis():
         assert today[family, place, suspicion.unit] == pytest.approx(known_suspicions(detector)[suspicion])
 
 
+@pytest.mark.long
 def test_one_more_run_never_tells_less_and_the_best_comes_first():
     for f in plan().suspicions:
         gains = [p.gain for p in f.proposals]

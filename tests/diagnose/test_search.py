@@ -144,6 +144,7 @@ def test_what_a_cause_explains_does_not_raise_thresholds():
     assert found.detector.thresholds == detector.thresholds
 
 
+@pytest.mark.long
 def test_nothing_is_named_in_a_model_that_is_wrong_in_its_form():
     detector, y = small_case.made_detector(), measured(seed=4) + slow_discrepancy(0.3)
     found, own = searched(detector, y)
@@ -157,6 +158,7 @@ def test_nothing_is_named_in_a_model_that_is_wrong_in_its_form():
     assert np.median([after[p] / before[p] for p in before]) > 2.5
 
 
+@pytest.mark.long
 def test_slow_errors_of_channels_are_not_held_against_a_cause():
     """Heat at twice its limit is named, which is far from enough to explain more than all that such a model leaves."""
     detector, form = small_case.made_detector(), slow_discrepancy(0.3)

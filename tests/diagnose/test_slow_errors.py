@@ -60,6 +60,7 @@ def test_a_slow_error_is_no_evidence_any_more():
     assert not detector.poor
 
 
+@pytest.mark.long
 def test_a_score_beyond_no_conductance_at_all_is_held(monkeypatch):
     """A linear score may say that a joint has less than nothing."""
     detector = small_case.made_detector()

@@ -63,6 +63,7 @@ def test_a_screw_held_at_both_ends_is_one_in_c(tmp_path):
     same(read_artefact(tmp_path / "a.h5"), SPINDLE / "runs" / "warm_up")
 
 
+@pytest.mark.long
 def test_air_that_is_warmer_above_an_axis_that_moves_up_is_so_in_c(tmp_path):
     climbing(tmp_path)
     twin.build(tmp_path, options=twin.BuildOptions(held_out=1)).save(tmp_path / "a.h5")

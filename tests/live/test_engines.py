@@ -32,6 +32,7 @@ def result(spindle):
     return twin.read(spindle).run(RUN).numbers
 
 
+@pytest.mark.long
 def test_groups_of_fast_rows_do_not_matter(spindle, compiled):
     """Two and a half minutes at 50 Hz, evaluated in pieces while they come; no value where a piece would end."""
     channels = open_engine(spindle, "c", compiled).facts.channels
@@ -94,6 +95,7 @@ def test_a_replay_ends_where_twin_run_ends(engine, kelvin, metres, spindle, stat
     np.testing.assert_allclose(step["positions_m"], result.position[-1], rtol=0, atol=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", ["c", "jax"])
 def test_a_state_goes_on_bit_by_bit(engine, spindle, compiled):
     one, other = (open_engine(spindle, engine, compiled) for _ in range(2))

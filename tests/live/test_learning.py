@@ -82,6 +82,7 @@ def cut_up(block: Block, n: int = 3) -> Iterator[Block]:
         yield replace(block, sequence=k + n, time=block.time + k * block.interval, values=values)
 
 
+@pytest.mark.long
 def test_temperatures_and_r_tests_are_followed_as_by_the_filter_state_of_twin_update(spindle, tmp_path):
     warmer = twin.load(MACHINE).edited({"sources.motor.gain": 1.4}, tmp_path / "warmer.toml")
     options = twin.SimulateOptions(tcp_every="5 min")
@@ -226,6 +227,7 @@ def test_the_health_record_says_what_was_learnt(tmp_path):
     assert measured["learnt"][0]["name"] == "dx"
 
 
+@pytest.mark.long
 def test_a_state_of_one_filter_is_refused_by_the_other_and_the_filter_state_begins_first(spindle, tmp_path, capsys):
     given = ["live", str(spindle), "--source", f"replay:{MACHINE / 'runs' / 'warm_up'}", "--speed", "0", "--out",
              f"file:{tmp_path / 'o.json'}", "--engine", "jax", "--state"]  # fmt: skip

@@ -114,6 +114,7 @@ def test_frames_and_json_are_blocks_and_anything_else_is_damaged():
         assert isinstance(read_message(wrong), Damaged), wrong
 
 
+@pytest.mark.long
 def test_blocks_arrive_and_what_came_while_nobody_listened_comes_later(broker, tmp_path):
     place, client = f"127.0.0.1:{broker.port}/machine/loads", broker.sender()
     first = MqttSource(place, broker.channels())
@@ -137,6 +138,7 @@ def test_blocks_arrive_and_what_came_while_nobody_listened_comes_later(broker, t
     client.loop_stop()
 
 
+@pytest.mark.long
 def test_what_was_taken_but_is_not_in_the_journal_comes_again(broker):
     place, client = f"127.0.0.1:{broker.port}/loads", broker.sender()
     killed = MqttSource(place, broker.channels())
@@ -180,6 +182,7 @@ def test_blocks_that_wait_for_a_missing_one_are_not_acknowledged(broker, tmp_pat
     client.loop_stop()
 
 
+@pytest.mark.long
 def test_a_wrong_password_is_refused(broker):
     source = MqttSource(f"127.0.0.1:{broker.port}/loads", broker.channels("wrong"))
     source.resume(None)

@@ -196,6 +196,7 @@ def test_a_client_certificate_that_has_expired_is_refused_at_once(control):
         OpcUaSource(control.url, replace(channels, opcua=own), FACTS)
 
 
+@pytest.mark.long
 def test_another_server_than_the_pinned_one_is_refused(control):
     channels = channels_of(control)
     certificate(control.folder, "other", 365)
@@ -209,6 +210,7 @@ def test_another_server_than_the_pinned_one_is_refused(control):
             source.close()
 
 
+@pytest.mark.long
 def test_a_server_whose_certificate_has_expired_is_refused(tmp_path):
     control = Control(tmp_path, days=-1)
     source = OpcUaSource(control.url, channels_of(control), FACTS)

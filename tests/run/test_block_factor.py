@@ -23,6 +23,7 @@ def test_trees_have_no_fill_in():
     assert sum(map(len, plan(*GRAPHS["loop"]).later)) == 5  # one block of fill-in
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("symmetric", [True, False])
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_solves_the_whole_system(graph, symmetric):

@@ -87,6 +87,7 @@ def test_only_own_names_and_numbers_are_hosts(host, known):
     assert guard._known(host) is known
 
 
+@pytest.mark.long
 def test_a_running_machine_is_followed(server, slide_artefact, state, tmp_path, shown):
     folder = shutil.copytree(state, tmp_path / "state")
     one = server(str(slide_artefact), "--live", str(folder))
