@@ -41,7 +41,7 @@ check: $(READY) ## style, format, types, the import rules and the size of functi
 	$(BIN)/python -m pytest -q tests/test_complexity.py
 
 .PHONY: test
-test: $(READY) ## every behaviour, with hidden effects of four families in a small machine (7 min)
+test: $(READY) ## every behaviour, with hidden effects of four families in a small machine (5 min)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 .PHONY: test-long
