@@ -34,8 +34,8 @@ class Effects:
     contact: Array  # (n_contacts, n)
     environment: Array  # (n_environments, n) K per K
     exponent: Array  # (n_films, n) of the rise of a surface above its air; what a diagnosis alone varies
-    wind: Array  # (n_films, n) of how strong the speed that its law reads makes a film; likewise
-    wind_exponent: Array  # (n_films, n) of the exponent of that speed; likewise
+    wind: Array  # (n_films, n) of ln c, c forced over free convection at the top speed; a diagnosis alone varies it
+    wind_exponent: Array  # (n_films, n) of the exponent of the speed in forced convection; a diagnosis alone varies it
     E: Array  # (n_c, r, r) J/K: shares in E of the members that capacities act on
     capacity: Array  # (n_c, n)
     G: Array  # (n_e, n_poses * 3, r) m/K: shares in G of the members that expansions act on

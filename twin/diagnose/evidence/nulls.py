@@ -37,7 +37,7 @@ class Form:
     # of the logarithm of a film's coefficient at its top speed against that at rest: rms of the other laws of the
     # ball-screw axis and the ram borer of even seeds
     speed: float = 0.5
-    speed_exponent: float = 0.15  # of that speed in the coefficient: half of what laminar and turbulent flow differ by
+    speed_exponent: float = 0.15  # of that speed in the coefficient: half of 0.8 - 0.5, turbulent and laminar flow
     # of the logarithm of a film's coefficient beyond its tolerance: laws of the rise to the power 0 and 0.3 that agree
     # at one rise differ by 0.3 ln 5 at five times and at a fifth of it (three times had a film of the table of the
     # ball-screw axis, seed 0, before a loss). In synthetic measurements alone: what a calibration makes of it is what a
