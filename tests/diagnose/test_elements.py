@@ -86,12 +86,12 @@ def test_tcp_causes_touch_the_tcp_alone(read):
     plan = study.runs[1]
     own = columns[study.runs[0].size :]
     for (kind, place, _), c in index.items():
-        if kind in ("slip", "step", "probe", "frame", "heated", "scale", "load", "expansion"):
+        if kind in ("slip", "probed", "step", "probe", "frame", "heated", "scale", "load", "expansion"):
             T, w = plan.split(own[:, c])
             assert not T.any(), (kind, place)
             if kind == "probe":
                 np.testing.assert_allclose(w[:, "xyz".index(place[1])], plan.measured.tcp_time, rtol=1e-6)
-    slips = [columns[:, index["slip", f"d{a}", "always"]] for a in "xz"]
+    slips = [columns[:, index[kind, f"d{a}", "always"]] for a in "xz" for kind in ("slip", "probed")]
     assert all(s.any() and np.abs(s).max() <= 0.5 + 1e-6 for s in slips)
 
 

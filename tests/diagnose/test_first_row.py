@@ -12,7 +12,7 @@ import pytest
 from tests.diagnose import small_case
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
-from twin.diagnose.faults.readings import late, play, readings_of
+from twin.diagnose.faults.readings import LAGS, late, play, readings_of
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.search.gain import _read
 from twin.inject.damage.channels import Damage
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.long
 
 SIZE = 4e-6  # m
 EVERY = 2400.0  # s, between measurements of three rows
-KINDS = ("scale", "expansion", "slip", "step", "probe", "frame", "heated", "load")
+KINDS = ("scale", "expansion", "slip", "probed", "step", "probe", "frame", "heated", "load")
 
 
 @cache
@@ -118,6 +118,21 @@ def test_a_reading_changes_as_a_damaged_log_does(kind, lost):
         assert not flat(study, columns[:, index[key]])[n:].any()
 
 
+def test_a_play_of_what_measures_leaves_what_a_damaged_log_does():
+    study, _, _ = read()
+    split = [study.runs[k].split(study.outputs(k, zeros(study)))[1] for k in range(3)]
+    whole = tuple(replace(r, tcp=replace(r.tcp, displacement=w)) for r, w in zip(runs(), split, strict=True))
+    width = 0.5 * float(np.ptp(split[0][:, 0]))
+    after = planned((*(damaged(r, Damage("slip", "tcp.dx", width, "play")) for r in whole[:2]), whole[2]))
+    change = told(after) - told(planned(whole))
+    of_kind = {kind: width * flat(study, play(study, lambda k: small_case.nominal()[k].states, kind, "dx", width))
+               for kind in LAGS}  # fmt: skip
+    top = np.abs(change).max()
+    assert top > 0.2 * width
+    np.testing.assert_allclose(of_kind["probed"], change, atol=1e-2 * top)  # rows are between steps
+    assert np.abs(of_kind["slip"] - change).max() > 0.1 * top  # moved before the first measurement, too
+
+
 @pytest.mark.parametrize("seconds", [-60.0, 90.0])
 def test_a_late_clock_leaves_what_it_is_said_to(seconds):
     study, _, _ = read()
@@ -147,18 +162,24 @@ def test_every_reading_of_the_tcp_counts_from_the_first_row():
     assert touched == {kind for kind, _, _ in index} & {*KINDS, "clock"}
     nominal = small_case.nominal()
     for width in (1e-6, 8e-6):
-        wanted = from_first(absolute, play(absolute, nominal, "dz", width))
-        np.testing.assert_allclose(flat(study, play(study, nominal, "dz", width)), wanted, atol=1e-12)
+        for kind in LAGS:
+            wanted = from_first(absolute, play(absolute, lambda k: nominal[k].states, kind, "dz", width))
+            now = play(study, lambda k: nominal[k].states, kind, "dz", width)
+            np.testing.assert_allclose(flat(study, now), wanted, atol=1e-12)
     states = {0: nominal[0].states}
     wanted = from_first(absolute, late(absolute, states, 600.0))
     np.testing.assert_allclose(flat(study, late(study, states, 600.0)), wanted, atol=1e-18)
 
 
-@pytest.mark.parametrize(("kind", "name"), [("probe", "tcp.dx"), ("frame", "tcp.dy:x"), ("slip", "tcp.dz")])
+@pytest.mark.parametrize(
+    ("kind", "name"), [("probe", "tcp.dx"), ("frame", "tcp.dy:x"), ("slip", "tcp.dz"), ("probed", "tcp.dz")]
+)
 def test_a_sealed_run_that_counts_from_its_first_row_does_so_in_what_is_predicted(kind, name):
     always = History("always", np.ones((1, 1)))
     batch = Batch("", kind, "", (name,), np.zeros((1, 1), dtype=int), (always,))
-    cause = SimpleNamespace(hypothesis=Hypothesis(batch, 0, always, 1.0, (SIZE,), 1.0), amplitude=np.array([SIZE]))
+    cause = SimpleNamespace(
+        hypothesis=Hypothesis(batch, 0, always, 1.0, (SIZE,), 1.0), amplitude=np.array([SIZE]), units=()
+    )
     added = []
     for reference in ("first", "absolute"):
         study = read(reference)[0]

@@ -17,6 +17,7 @@ import numpy as np
 
 from twin.build.mesh import load_body_meshes
 from twin.build.mesh_error import LARGEST, OF_FINER, OF_LINEAR, refined_bytes, refined_unknowns
+from twin.build.workers import each
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.evidence.leading import channel_of, leading_of_each
 from twin.diagnose.model.probed_model import make_probed_model
@@ -78,18 +79,15 @@ def differences(
     # elements err about each sensor by itself: refined at once, a bearing in a coarse box would hide the castings
     apart = np.zeros(len(J), dtype=int) if machine.lumped else np.unique(channel_of(study), return_inverse=True)[1]
 
-    def study_of(other: _Other) -> Study:
-        known = [_acting(p, other.machine) for p in parameters]
-        probed = make_probed_model(other.machine, known, runs, progress, other.mesh, not machine.lumped)
-        return make_study(probed, plans, study.fitted)
-
+    known = _Known(tuple(parameters), tuple(runs), tuple(plans), tuple(study.fitted), machine.lumped)
     # two windows made alike are off alike
-    y = surrogate.y0 if machine.lumped else study_of(_Other(machine)).all_outputs(x)
-    found = []
-    for others in _others(machine):
-        studies = [study_of(other) for other in others]
-        d = np.stack([o.share * (own.all_outputs(x) - y) for o, own in zip(others, studies, strict=True)], axis=1)
-        D = others[0].share * (jacobian_of(studies[0], x) - J) if machine.lumped else np.zeros_like(J)
+    y = surrogate.y0 if machine.lumped else _outputs(known, _Other(machine))
+    found, every = [], list(_others(machine))
+    with progress("other discretisations", sum(map(len, every))) as advance:
+        shown = [each(_outputs, known, others, lambda _: advance("")) for others in every]
+    for others, outputs in zip(every, shown, strict=True):
+        d = np.stack([o.share * (own - y) for o, own in zip(others, outputs, strict=True)], axis=1)
+        D = others[0].share * (jacobian_of(known.study(others[0]), x) - J) if machine.lumped else np.zeros_like(J)
         real = np.arange(len(others)) % 3 == 1
         found.append(Difference(d[:, ~real], d[:, real], D, apart) if real.any() else Difference(d, d, D, apart))
     return tuple(found)
@@ -102,6 +100,27 @@ class _Other:
     machine: Machine
     share: float = 1.0  # of its difference that is one standard deviation
     mesh: Mesh = Mesh.DESCRIBED
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What is the same of every discretisation."""
+
+    parameters: tuple[Parameter, ...]
+    runs: tuple[Run, ...]
+    plans: tuple[Measured, ...]
+    fitted: tuple[int, ...]
+    lumped: bool
+
+    def study(self, other: _Other) -> Study:
+        acting = [_acting(p, other.machine) for p in self.parameters]
+        probed = make_probed_model(other.machine, acting, self.runs, silent, other.mesh, not self.lumped)
+        return make_study(probed, self.plans, self.fitted)
+
+
+def _outputs(known: _Known, other: _Other) -> np.ndarray:
+    """(m,) what it measures as described."""
+    return known.study(other).all_outputs(np.zeros(len(known.parameters)))
 
 
 def _others(machine: Machine) -> Iterator[list[_Other]]:

@@ -5,7 +5,7 @@ offset    sensor       1 K;   drift  1 K/day;   lag  1 s;   detached  all of it;
 clock     run          1 s later than stated, to first order; exactly by `late`
 scale     axis<part    1 m/m/K of an encoder scale as warm as a part, from the middle of the stroke
 expansion part         100 % more
-slip      dx           1 m of play, seen at WIDTH; at other widths by `play`
+slip      dx           1 m of play, seen at WIDTH; at other widths by `play`;   probed  the same, of what measures
 step      dx           1 m from a measurement on
 load      dx:signal    1 m per unit of a signal
 probe     dx           1 m/s of drift;   frame dx:axis  1 m/m;   heated dx  1 m from first to last row of a set
@@ -158,7 +158,9 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
             grown = [np.einsum("kcr,kr->kc", g, x) for g, x in zip(rows, z, strict=True)]
             add(("expansion", member, "always"), column(grown))
     for c, name in enumerate(COMPONENTS):
-        add(("slip", name, "always"), component(c, [_play(p, own, c) for p, own in zip(plans, nominal, strict=True)]))
+        for kind, lags in LAGS.items():
+            of = [lags(plan, own.states, c) for plan, own in zip(plans, nominal, strict=True)]
+            add((kind, name, "always"), component(c, of))
         for r, t in enumerate(times):
             for start in _sets(t)[1:]:
                 values = [np.zeros(len(x)) if k < r else np.ones(len(x)) for k, x in enumerate(times)]
@@ -176,11 +178,13 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
                 add(("load", f"{name}:{signal.name}", "always"), component(c, values))
 
 
-def play(study: Study, nominal: Sequence[Nominal], name: str, width: float) -> np.ndarray:
-    """(m,) what a play of `width` [m] in a component of the TCP makes it read in the fitted runs, per metre of play."""
-    c, wide = COMPONENTS.index(name), max(width, NARROW)
-    runs = [(study.runs[k], nominal[k]) for k in study.fitted]
-    return np.concatenate([_numbers(plan, w=_only(c, _play(plan, own, c, wide))) for plan, own in runs])
+def play(study: Study, states: Callable[[int], np.ndarray], kind: str, name: str, width: float) -> np.ndarray:
+    """(m,) what a play of `width` [m] in a component of the TCP makes it read in the fitted runs, per metre of play.
+
+    states: (n + 1, r) of run k; kind: of LAGS.
+    """
+    c, wide, runs = COMPONENTS.index(name), max(width, NARROW), [(k, study.runs[k]) for k in study.fitted]
+    return np.concatenate([_numbers(plan, w=_only(c, LAGS[kind](plan, states(k), c, wide))) for k, plan in runs])
 
 
 def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.ndarray:
@@ -269,10 +273,23 @@ def _within_set(time: np.ndarray) -> np.ndarray:
     return result
 
 
-def _play(plan: Planned, nominal: Nominal, c: int, width: float = WIDTH) -> np.ndarray:
-    """Where a play lags the thermal displacement of a component, per width: -1/2 .. 1/2."""
+def _play(plan: Planned, states: np.ndarray, c: int, width: float = WIDTH) -> np.ndarray:
+    """Where a play lags the thermal displacement of a component in the machine, per width: -1/2 .. 1/2."""
     if not len(plan.measured.tcp):
         return np.zeros(0)
-    row = np.asarray(plan.rows.row)[:, c].mean(axis=0)
-    w = nominal.states @ row
+    w = states @ np.asarray(plan.rows.row)[:, c].mean(axis=0)
     return ((follower(w, width) - w) / width)[np.asarray(plan.rows.step)]
+
+
+def _probed(plan: Planned, states: np.ndarray, c: int, width: float = WIDTH) -> np.ndarray:
+    """The same of a play in what measures, which is moved only by the mean of every measurement."""
+    time = plan.measured.tcp_time
+    if not len(time):
+        return np.zeros(0)
+    rows = np.einsum("kr,kr->k", np.asarray(plan.rows.row)[:, c], states[np.asarray(plan.rows.step)])
+    number = np.searchsorted(_sets(time), time, side="right") - 1
+    w = np.bincount(number, rows) / np.bincount(number)
+    return ((follower(w, width) - w) / width)[number]
+
+
+LAGS = {"slip": _play, "probed": _probed}

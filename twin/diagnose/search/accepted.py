@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +16,7 @@ from twin.diagnose.evidence.settled import settle, settled_alone
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
@@ -120,29 +122,34 @@ def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
 
 
 def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(m,) white change by what acts on what is read, at its amplitude (q,); x (n,): parameters that a clock's
-    run has."""
+    """(m,) white change by what acts on what is read, at its amplitude (q,); x (n,): parameters of
+    the motion that it reads otherwise."""
     if fault_of(h).exchanges:  # `exchanged` has left nothing of it
         return np.zeros(detector.columns.raw.shape[0])
     if fault_of(h).curved:
-        return detector.whiten(curved_change(detector, h, float(amplitude[0]), x))
+        return detector.whiten(curved_change(detector, h, float(amplitude[0]), motion(detector, x)))
     return np.asarray(readings_columns(detector, h) @ amplitude)
 
 
-def curved_change(detector: Detector, h: Hypothesis, size: float, x: np.ndarray | None) -> np.ndarray:
-    """(m,) change of what is measured by what is curved; x None: of the nominal machine, which costs no step."""
-    study, nominal = detector.study, detector.nominal
-
-    def states(k: int) -> np.ndarray:
-        return nominal[k].states if x is None else study.states(k, x)
-
-    return fault_of(h).change(study, nominal, states, h.name, size)
+Motion = Callable[[int], np.ndarray]  # states (n + 1, r) of run k
 
 
-def curved_slope(detector: Detector, h: Hypothesis, size: float, x: np.ndarray) -> np.ndarray:
+def motion(detector: Detector, x: np.ndarray | None) -> Motion:
+    """Of parameters x (n,), each run stepped once; None: of the nominal machine, which costs no step."""
+    if x is None:
+        return lambda k: detector.nominal[k].states
+    return cache(lambda k: detector.study.states(k, x))
+
+
+def curved_change(detector: Detector, h: Hypothesis, size: float, states: Motion) -> np.ndarray:
+    """(m,) change of what is measured by what is curved."""
+    return fault_of(h).change(detector.study, detector.nominal, states, h.name, size)
+
+
+def curved_slope(detector: Detector, h: Hypothesis, size: float, states: Motion) -> np.ndarray:
     """(m,) its derivative by the size."""
     by = detector.policy.aside * max(abs(size), h.batch.smallest)
-    more, less = (curved_change(detector, h, size + d, x) for d in (by, -by))
+    more, less = (curved_change(detector, h, size + d, states) for d in (by, -by))
     return np.asarray((more - less) / (2.0 * by))
 
 
@@ -170,12 +177,23 @@ def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.n
 
 def stepped(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
     """(size,) outputs of run k with the causes that act in the machine; x (n,) already shifted."""
-    study = detector.study
+    return detector.study.outputs(k, x, *_acting(detector, accepted, k))
+
+
+def states_with(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
+    """(n + 1, r) states of run k likewise."""
+    return detector.study.states(k, x, *_acting(detector, accepted, k))
+
+
+def _acting(
+    detector: Detector, accepted: Sequence[Accepted], k: int
+) -> tuple[Slots, Sequence[float]] | tuple[()]:  # fmt: skip
+    """What acts in the machine in run k, with its amplitudes; nothing where no cause does."""
     units = [u for a in accepted for u in a.units]
     if not units:
-        return study.outputs(k, x)
+        return ()
     amplitudes = [v for a in accepted if a.units for v in a.amplitude]
-    return study.outputs(k, x, slots_with(study, detector.elements, units, k), amplitudes)
+    return slots_with(detector.study, detector.elements, units, k), amplitudes
 
 
 def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K
-from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian, readings_columns
+from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian, motion, readings_columns
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import Edge, edges_of, moved, with_pulses
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -61,8 +61,9 @@ def judged(
     """Candidates, most worthy first: those whose statistics are exact, and the others.
 
     Those that are bent or have edges are refitted, until one leads all others by a share of `behind`, by what both
-    score before they are refitted: fitted edges are worth as much to others. Of several starts of a candidate the first
-    has its score; it is the worthiest that they end at.
+    score before they are refitted: fitted edges are worth as much to others. What is curved is refitted all the same:
+    its score is that of a few sizes and of the described motion. Of several starts of a candidate the first has its
+    score; it is the worthiest that they end at.
     """
     worthy = partial(worth, policy=detector.policy)
     starts = {id(first): (first, *more) for first, *more in candidates}
@@ -74,7 +75,8 @@ def judged(
         behind = detector.policy.saturates if fault_of(h).saturates else detector.policy.behind
         led = worthy(h) < (1.0 - behind) * leads_by
         bends = bent(detector, h)
-        if (led and not _saturated(detector, h)) or (bends and count[h.batch.kind] >= detector.policy.entrants):
+        told_badly = fault_of(h).curved or _saturated(detector, h)
+        if (led and not told_badly) or (bends and count[h.batch.kind] >= detector.policy.entrants):
             left.append(h)
             continue
         count[h.batch.kind] += bends
@@ -215,9 +217,10 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
 def _read_anew(detector: Detector, fitted: Fitted, h: Hypothesis) -> Hypothesis:
     """A hypothesis about readings that are not in proportion to its size, at the size that removes most misfit."""
     left = fitted.projector(detector.whiten(fitted.residual))
-    size, tried, x = h.amplitude[0], list[tuple[float, float]](), beginning(fitted.x, detector.policy)
+    size, tried = h.amplitude[0], list[tuple[float, float]]()
+    states = motion(detector, beginning(fitted.x, detector.policy))
     for _ in range(detector.policy.read_passes):
-        change, D = (detector.whiten(f(detector, h, size, x)) for f in (curved_change, curved_slope))
+        change, D = (detector.whiten(f(detector, h, size, states)) for f in (curved_change, curved_slope))
         kept = left - fitted.projector(change)
         tried.append((float(change @ (left + kept)), size))
         step = float(D @ kept) / max(float(D @ fitted.projector(D)), 1e-30)

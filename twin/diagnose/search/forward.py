@@ -28,7 +28,7 @@ from twin.diagnose.search.declared import (
     misplaced_candidates,
     swapped_candidates,
 )
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Search, Step, cosines, distinct, look, scored
@@ -130,8 +130,8 @@ def _limits(detector: Detector, accepted: Sequence[Accepted]) -> dict[str, float
     """Per family the statistic that a name needs beside the accepted ones, whose misfits look like causes."""
     policy = detector.policy
     misfits = policy.misfit * max((a.statistic for a in accepted if a.units), default=0.0)
-    times = policy.later if accepted else 1.0
-    return {name: max(times * value, misfits) for name, value in detector.thresholds.items()}
+    beside = policy.later * max(FLOOR, detector.least) if accepted else 0.0
+    return {name: max(value + beside, misfits) for name, value in detector.thresholds.items()}
 
 
 def _passing(

@@ -12,7 +12,7 @@ from twin.diagnose.faults.readings import readings_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Gain
-from twin.diagnose.search.accepted import in_place, stepped, with_shifts
+from twin.diagnose.search.accepted import in_place, states_with, stepped, with_shifts
 from twin.diagnose.search.look import Search
 
 
@@ -44,7 +44,8 @@ def _read(found: Search, k: int) -> np.ndarray:
     if not wanted:
         return result
     one = replace(study, runs=(study.runs[k],), fitted=(0,))
-    nominal = found.detector.nominal[k]
+    z = states_with(found.detector, found.accepted, k, with_shifts(study, found.accepted, found.x))
+    nominal = replace(found.detector.nominal[k], states=z)
     y = study.outputs(k, np.zeros(len(found.x)))
     columns, index = readings_of(one, [nominal], [y], [np.zeros((len(y), len(found.x)))])
     for a in wanted:

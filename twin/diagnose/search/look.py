@@ -16,7 +16,7 @@ from twin.diagnose.evidence.unknown import Heat, evidence
 from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.lost import lost_candidates
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.accepted import Accepted, curved_change, readings_columns
+from twin.diagnose.search.accepted import Accepted, curved_change, motion, readings_columns
 from twin.diagnose.search.detector import Detector
 
 
@@ -110,7 +110,8 @@ def sized_candidates(detector: Detector, projector: Projector, white: np.ndarray
     ]
     if not tried:
         return []
-    D = detector.whiten(np.column_stack([curved_change(detector, h, h.amplitude[0], None) for h in tried]))
+    nominal = motion(detector, None)
+    D = detector.whiten(np.column_stack([curved_change(detector, h, h.amplitude[0], nominal) for h in tried]))
     # all at once: N is large, and would be read twice for each of them
     B = projector.N.T @ np.column_stack([D, white])
     half = scipy.linalg.solve_triangular(projector.factor[0], B, lower=True)

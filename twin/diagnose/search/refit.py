@@ -23,6 +23,7 @@ from twin.diagnose.search.accepted import (
     freed,
     gains_of,
     jacobian,
+    motion,
     readings_columns,
     shifted,
     spans,
@@ -65,14 +66,14 @@ def refit(
         there = shifted(study, x, gains, amplitude)
         sizes = [(a.hypothesis, float(amplitude[own.start])) for a, own in zip(accepted, of_each, strict=True)]
         J = jacobian(detector, x, sizes, None if i < policy.anew else J)
-        bent = np.zeros(len(y))
+        bent, states = np.zeros(len(y)), motion(detector, there)
         for a, own in zip(accepted, of_each, strict=True):
             fault = fault_of(a.hypothesis)
             if fault.curved:
                 size = float(amplitude[own][0])
-                slope = curved_slope(detector, a.hypothesis, size, there)
+                slope = curved_slope(detector, a.hypothesis, size, states)
                 D[:, own] = detector.whiten(slope)[:, None]
-                bent += size * slope - curved_change(detector, a.hypothesis, size, there)
+                bent += size * slope - curved_change(detector, a.hypothesis, size, states)
             elif fault.exchanges:  # `exchanged` has left nothing of it
                 D[:, own] = 0.0
             elif not a.units:
