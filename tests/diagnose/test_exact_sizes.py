@@ -12,7 +12,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.readings import late
-from twin.diagnose.search.accepted import Accepted, curved_change, freed, parameter_of
+from twin.diagnose.search.accepted import Accepted, curved_change, freed, motion, parameter_of
 from twin.diagnose.search.contest import exact
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import gains
@@ -219,7 +219,7 @@ def test_sizes_scored_together_are_scored_as_each_alone():
     found = sized_candidates(detector, fitted.projector, white)
     assert found
     for h in found:
-        change = detector.whiten(curved_change(detector, h, h.amplitude[0], None))
+        change = detector.whiten(curved_change(detector, h, h.amplitude[0], motion(detector, None)))
         P = fitted.projector(change)
         assert h.statistic == pytest.approx(float(P @ (2.0 * white - change)), rel=1e-6, abs=1e-6)
         assert h.information == pytest.approx(float(P @ change) / h.amplitude[0] ** 2, rel=1e-6)
