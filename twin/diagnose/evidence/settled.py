@@ -29,8 +29,8 @@ def settled_alone(
     free: parameters that have no tolerance; held: that stay as declared."""
     study = fitter.study
 
-    def left(x: np.ndarray) -> np.ndarray:
-        return fitter.whiten(y - study.all_outputs(x))
+    def left(x: np.ndarray) -> np.ndarray:  # at the description, where it begins, outputs are known
+        return fitter.whiten(y - (study.all_outputs(x) if np.any(x) else fitter.surrogate.y0))
 
     return settle(fitter, fitter.surrogate.at, left, free, held)
 
