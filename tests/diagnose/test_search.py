@@ -11,6 +11,7 @@ from tests.diagnose import small_case
 from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.fault import Unit
+from twin.diagnose.faults.readings import play
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import exchanged
 from twin.diagnose.search.dispersion import raised, searched
@@ -44,6 +45,17 @@ def test_nothing_is_found_where_nothing_is():
     assert all(abs(p.pull) < 5.0 for p in pulls_of(found))
     models = predicted(found, 2)
     np.testing.assert_array_equal(models.extended, models.recalibrated)
+
+
+@pytest.mark.parametrize(("kind", "said"), [("slip", "always"), ("probed", "when measured")])
+def test_a_play_of_the_machine_is_told_from_one_of_what_measures(kind, said):
+    study, seed, size = small_case.study(), 3, 4e-6
+    x = 0.5 * np.random.default_rng(seed).standard_normal(len(study.probed.parameters))  # as `measured` draws them
+    lag = size * play(study, lambda k: study.states(k, x), kind, "dz", size)
+    found = search(small_case.made_detector(), measured(seed=seed) + lag)
+    verdict, (cause,) = verdict_of(found, FAMILIES)
+    assert (verdict, cause.family, cause.place, cause.history) == ("named", "slip", "tcp.dz", said)
+    assert cause.ci95[0] < size < cause.ci95[1]
 
 
 def test_a_sensor_that_is_off_is_a_sensor_that_is_off():

@@ -80,10 +80,10 @@ def differences(
     apart = np.zeros(len(J), dtype=int) if machine.lumped else np.unique(channel_of(study), return_inverse=True)[1]
 
     known = _Known(tuple(parameters), tuple(runs), tuple(plans), tuple(study.fitted), machine.lumped)
-    # two windows made alike are off alike
-    y = surrogate.y0 if machine.lumped else _outputs(known, _Other(machine))
     found, every = [], list(_others(machine))
     with progress("other discretisations", sum(map(len, every))) as advance:
+        # two windows made alike are off alike
+        y = surrogate.y0 if machine.lumped else _outputs(known, _Other(machine))
         shown = [each(_outputs, known, others, lambda _: advance("")) for others in every]
     for others, outputs in zip(every, shown, strict=True):
         d = np.stack([o.share * (own - y) for o, own in zip(others, outputs, strict=True)], axis=1)

@@ -122,8 +122,8 @@ def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
 
 
 def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(m,) white change by what acts on what is read, at its amplitude (q,); x (n,): parameters of
-    the motion that it reads otherwise."""
+    """(m,) white change by what acts on what is read, at its amplitude (q,); x (n,): parameters of the
+    motion that it reads otherwise."""
     if fault_of(h).exchanges:  # `exchanged` has left nothing of it
         return np.zeros(detector.columns.raw.shape[0])
     if fault_of(h).curved:
@@ -185,13 +185,11 @@ def states_with(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.
     return detector.study.states(k, x, *_acting(detector, accepted, k))
 
 
-def _acting(
-    detector: Detector, accepted: Sequence[Accepted], k: int
-) -> tuple[Slots, Sequence[float]] | tuple[()]:  # fmt: skip
-    """What acts in the machine in run k, with its amplitudes; nothing where no cause does."""
+def _acting(detector: Detector, accepted: Sequence[Accepted], k: int) -> tuple[Slots | None, Sequence[float]]:
+    """What acts in the machine in run k, with its amplitudes; None where no cause does."""
     units = [u for a in accepted for u in a.units]
     if not units:
-        return ()
+        return None, ()
     amplitudes = [v for a in accepted if a.units for v in a.amplitude]
     return slots_with(detector.study, detector.elements, units, k), amplitudes
 

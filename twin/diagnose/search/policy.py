@@ -55,7 +55,7 @@ class SearchPolicy:
     few: int = _rule(2, FIVE_AXIS, "windows that a cause may have and still leave heat where it is")
     left: float = _rule(0.5, FIVE_AXIS, "of the threshold of heat of any history: what windows may leave of it")
     misfit: float = _rule(0.003, DERIVED, "of what a cause explains: a response wrong by a twentieth leaves 0.05^2")
-    later: float = _rule(1.5, FIVE_AXIS, "times what any cause needs, that one beside another needs more: misfits")
+    later: float = _rule(1.5, FIVE_AXIS, "of what any cause needs: one beside another needs that more, for misfits")
     covers: float = _rule(0.9, FIVE_AXIS, "of the evidence for heat of any history that a name must explain")
     rival: float = _rule(10.0, JUDGED, "within which another explanation is a rival", "likelihood-ratio units")
     entrants: int = _rule(5, FIVE_AXIS, "candidates of a kind that are refitted")

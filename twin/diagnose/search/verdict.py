@@ -68,6 +68,8 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
         return _reading(wrong)
     if a.name != b.name and a.when.name == b.when.name:
         return f"a temperature sensor between {a.name} and {b.name}, nearer to one of them"
+    if a.name == b.name and fault_of(a).read and fault_of(b).read:
+        return f"a longer run, measured twice as often: {a.when.name} and {b.when.name} differ there"
     signals = [h.when.signal for h in (a, b) if h.when.signal]
     if a.name == b.name and a.when.signal and a.when.signal == b.when.signal:
         return f"a run with {a.when.signal} held for 2 h each at a third, two thirds and all of its range"
