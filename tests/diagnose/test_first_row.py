@@ -118,7 +118,7 @@ def test_a_reading_changes_as_a_damaged_log_does(kind, lost):
         assert not flat(study, columns[:, index[key]])[n:].any()
 
 
-def test_a_play_of_what_measures_leaves_what_a_damaged_log_does():
+def test_a_play_of_the_measuring_device_leaves_what_a_damaged_log_does():
     study, _, _ = read()
     split = [study.runs[k].split(study.outputs(k, zeros(study)))[1] for k in range(3)]
     whole = tuple(replace(r, tcp=replace(r.tcp, displacement=w)) for r, w in zip(runs(), split, strict=True))

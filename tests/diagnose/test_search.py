@@ -48,7 +48,7 @@ def test_nothing_is_found_where_nothing_is():
 
 
 @pytest.mark.parametrize(("kind", "said"), [("slip", "always"), ("probed", "when measured")])
-def test_a_play_of_the_machine_is_told_from_one_of_what_measures(kind, said):
+def test_a_play_of_the_machine_is_told_from_one_of_the_measuring_device(kind, said):
     study, seed, size = small_case.study(), 3, 4e-6
     x = 0.5 * np.random.default_rng(seed).standard_normal(len(study.probed.parameters))  # as `measured` draws them
     lag = size * play(study, lambda k: study.states(k, x), kind, "dz", size)

@@ -5,7 +5,8 @@ offset    sensor       1 K;   drift  1 K/day;   lag  1 s;   detached  all of it;
 clock     run          1 s later than stated, to first order; exactly by `late`
 scale     axis<part    1 m/m/K of an encoder scale as warm as a part, from the middle of the stroke
 expansion part         100 % more
-slip      dx           1 m of play, seen at WIDTH; at other widths by `play`;   probed  the same, of what measures
+slip      dx           1 m of play, seen at WIDTH; at other widths by `play`
+probed    dx           the same, of the measuring device
 step      dx           1 m from a measurement on
 load      dx:signal    1 m per unit of a signal
 probe     dx           1 m/s of drift;   frame dx:axis  1 m/m;   heated dx  1 m from first to last row of a set
@@ -282,7 +283,7 @@ def _play(plan: Planned, states: np.ndarray, c: int, width: float = WIDTH) -> np
 
 
 def _probed(plan: Planned, states: np.ndarray, c: int, width: float = WIDTH) -> np.ndarray:
-    """The same of a play in what measures, which is moved only by the mean of every measurement."""
+    """The same of a play in the measuring device, which is moved only by the mean of every measurement."""
     time = plan.measured.tcp_time
     if not len(time):
         return np.zeros(0)

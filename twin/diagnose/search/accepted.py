@@ -181,7 +181,7 @@ def stepped(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndar
 
 
 def states_with(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
-    """(n + 1, r) states of run k likewise."""
+    """(n + 1, r) states of run k with the causes that act in the machine; x (n,) already shifted."""
     return detector.study.states(k, x, *_acting(detector, accepted, k))
 
 
