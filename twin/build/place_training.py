@@ -91,12 +91,22 @@ def trajectory(shared: Shared, draw: Draw) -> np.ndarray:
     return stepped(shared, drive, shared.starts[draw.run], values, acting, warmer * (draw.seed > 0))
 
 
-def alone(shared: Shared, place: str) -> np.ndarray:
-    """States (N, m) of the first run of the described machine with heat at one place alone."""
-    drive, on = shared.drives[0], np.zeros(shared.drives[0].n_steps)
+def alone(shared: Shared) -> list[np.ndarray]:
+    """Per place (N, m): what heat at it alone changes in the first run of the described machine."""
+    drive = shared.drives[0]
+    on = np.zeros(drive.n_steps)
     for start, end, share in ON:
         on[round(start * len(on)) : round(end * len(on))] = share
-    return stepped(shared, drive, shared.starts[0], {}, Acting({place: ALONE * on}), np.zeros(len(shared.rich.bodies)))
+    model = pruned(shared.rich, [p.name for p in shared.places])
+    columns = [np.zeros((body.n, len(model.load_model.sources))) for body in model.bodies]
+    for own, body in zip(columns, model.bodies, strict=True):
+        own[:, list(body.sources)] = body.B
+    B = ALONE * np.vstack(columns)[:, -len(shared.places) :]
+    stepper = CoupledStepper(model, TRAINING_KEEP, TRAINING_FOLLOW, IMPLICIT_EULER)
+    first = stepper.uniform(shared.starts[0])
+    told = with_acting(drive, model.load_model, Acting())
+    kept = [X for k, X in stepper.responses(told, first, lambda k: on[k] * B) if k % shared.every == shared.every - 1]
+    return list(np.stack(kept, axis=-1).swapaxes(0, 1))
 
 
 def stepped(
@@ -127,11 +137,11 @@ def snapshots(shared: Shared, draws: int = DRAWS, progress: Progress = silent) -
     """
     runs = range(len(shared.drives))
     items = [Draw(run, seed) for seed in range(draws + 1) for run in runs]
-    names = [p.name for p in shared.places]
-    with progress("trajectories with places", len(items) + len(names)) as advance:
+    with progress("trajectories with places", len(items) + 1) as advance:
         made = each(trajectory, shared, items, lambda d: advance(f"run {d.run + 1}, draw {d.seed}"))
-        heated = each(alone, shared, names, advance)
-    return made[: len(runs)], made[len(runs) :], [X - made[0] for X in heated]
+        heated = alone(shared)
+        advance("heat at every place")
+    return made[: len(runs)], made[len(runs) :], heated
 
 
 def nominal(shared: Shared) -> list[np.ndarray]:

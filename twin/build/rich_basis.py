@@ -132,6 +132,7 @@ def rich_basis(
 
 def _distinct(X: np.ndarray) -> np.ndarray:
     """Columns of X without exact repetitions (up to scale)."""
-    scaled = X / np.linalg.norm(X, axis=0)
-    _, first = np.unique(np.round(scaled, 12), axis=1, return_index=True)
-    return X[:, np.sort(first)]
+    scaled = np.round(X / np.linalg.norm(X, axis=0), 12) + 0.0  # no -0
+    # by their bytes: np.unique compares columns as records of n fields, in four times the time (n = 40,000)
+    first = {column.tobytes(): k for k, column in reversed(list(enumerate(np.ascontiguousarray(scaled.T))))}
+    return X[:, sorted(first.values())]

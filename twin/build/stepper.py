@@ -265,13 +265,9 @@ class CoupledStepper:
         for step in range(first, drive.n_steps):
             dt = drive.time[step + 1] - drive.time[step]
             loads = self.loads(drive, step, x)
-            factors = self.factors(loads.theta, substeps / dt / tableau.diagonal)
             gamma = dense(np, self._contacts, contacts.at(step))
+            factors, solve, capacity = self._system(loads.theta, gamma, substeps / dt / tableau.diagonal)
             forcing = np.concatenate(self.forcing(loads))
-            rest = [self._rest(b, loads.theta, factor.theta) for b, factor in enumerate(factors)]
-            passes = 2 if self._far(loads.theta, factors) else 1
-            solve = partial(self._solve, self._whole(factors, self.across(factors, gamma)), rest, passes)
-            capacity = partial(self._capacity, factors)
             after = before = np.concatenate(x)
             own, seen = np.zeros_like(before), np.zeros_like(before)  # means over the step
             feedback, following = self._feedback(drive, step, loads.power), list(drive.losses.index)
@@ -286,6 +282,34 @@ class CoupledStepper:
             x = self._parts(after)
             loads = replace(loads, power=power)
             yield step, x, self._heat(loads, factors, dt, *map(self._parts, (after - before, seen, own)))
+
+    def responses(
+        self, drive: Drive, start: list[np.ndarray], forcing: Callable[[int], np.ndarray]
+    ) -> Iterator[tuple[int, np.ndarray]]:
+        """Yield (step, changes (N, k) [K] of all states after it) by k forcings (N, k) [W], each on top of the drive.
+
+        Films, losses and contacts are those of the drive without them, so that the response is linear. All k share the
+        factors: a run each would read these k times.
+        """
+        contacts = contact_entries(self.model.load_model, drive)
+        before, change = start, np.zeros_like(forcing(0))
+        for step, after, _ in self.run(drive, start):
+            theta, gamma = self.loads(drive, step, before).theta, dense(np, self._contacts, contacts.at(step))
+            rate = 1.0 / (drive.time[step + 1] - drive.time[step]) / self._tableau.diagonal
+            _, solve, capacity = self._system(theta, gamma, rate)
+            change, _ = stages(self._tableau, solve, capacity, change, forcing(step))
+            before = after
+            yield step, change
+
+    def _system(
+        self, theta: np.ndarray, gamma: np.ndarray, rate: float
+    ) -> tuple[list[_Factored], Callable[..., tuple[np.ndarray, np.ndarray]], Callable[[np.ndarray], np.ndarray]]:
+        """Factors of a step, its solution and what it stores, as `stages` takes them."""
+        factors = self.factors(theta, rate)
+        rest = [self._rest(b, theta, factor.theta) for b, factor in enumerate(factors)]
+        passes = 2 if self._far(theta, factors) else 1
+        solve = partial(self._solve, self._whole(factors, self.across(factors, gamma)), rest, passes)
+        return factors, solve, partial(self._capacity, factors)
 
     def _parts(self, x: np.ndarray) -> list[np.ndarray]:
         """The bodies' states (n_b,) of all states one after the other (N,)."""
