@@ -1,10 +1,10 @@
 """Faults hidden in shipped machines of parts, and what is said: `python -m benchmarks.shipped_machines NAME FIRST N`.
 
-NAME: ram_borer, ball_screw_axis or transfer_unit. Loads are drawn once per machine, so that one detector serves all
-seeds; a seed draws the values of the real machine (`twin.inject.machines.other`, castings on another mesh; its reduced
-rich model, `benchmarks.shipped_truth`), and what is hidden in it. Places are drawn among those where, as the
-description has it, the fault moves a sensor or the TCP by VISIBLE. Rows go to out/shipped/NAME_SEED.jsonl, and what is
-there is not made again. `NAME certify` compares that model with the full one.
+NAME: a shipped machine of parts. Loads are drawn once per machine, so that one detector serves all seeds; a seed draws
+the values of the real machine (`twin.inject.machines.other`, castings on another mesh; its reduced rich model,
+`benchmarks.shipped_truth`), and what is hidden in it. Places are drawn among those where, as the description has it,
+the fault moves a sensor or the TCP by VISIBLE. Rows go to out/shipped/NAME_SEED.jsonl, and what is there is not made
+again. `NAME certify` compares that model with the full one.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Shipped:
         """Loads alone, in the order of RUNS."""
         with TemporaryDirectory() as folder:
             for k, name in enumerate(RUNS):
-                drawn = loads_of_run(self.machine, 500 + k, name, HOURS, SAMPLING, TOGETHER[self.name])
+                drawn = loads_of_run(self.machine, 500 + k, name, HOURS, SAMPLING, TOGETHER.get(self.name, {}))
                 drawn.write(Path(folder) / name)
             return tuple(_less(read_run(Path(folder) / name), LESS.get(self.name, {})) for name in RUNS)
 
