@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.support.descriptions import SLIDE
 from twin.build.acting import Acting
-from twin.build.place_training import ALONE, ON, Shared, alone, snapshots, stepped, values_of
+from twin.build.place_training import Shared, alone, heat_alone, snapshots, stepped, values_of
 from twin.build.places import pruned
 from twin.diagnose.model.rich_probed_model import rich_probed_model
 from twin.logs.read import read_run
@@ -46,11 +46,8 @@ def test_heat_at_all_places_at_once_does_what_it_does_at_each_alone():
     found = alone(shared)
     assert len(found) == len(known.places) > 3
 
-    on = np.zeros(drive.n_steps)
-    for start, end, share in ON:
-        on[round(start * len(on)) : round(end * len(on))] = ALONE * share
     still = np.zeros(len(known.rich.bodies))
     without = stepped(shared, drive, 20.0, {}, Acting(), still)
     for place, X in zip(known.places, found, strict=True):
-        alone_there = stepped(shared, drive, 20.0, {}, Acting({place.name: on}), still) - without
+        alone_there = stepped(shared, drive, 20.0, {}, Acting({place.name: heat_alone(drive)}), still) - without
         assert np.linalg.norm(X - alone_there[:, 1:]) < 2e-3 * np.linalg.norm(X), place.name

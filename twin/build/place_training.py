@@ -93,20 +93,26 @@ def trajectory(shared: Shared, draw: Draw) -> np.ndarray:
 
 def alone(shared: Shared) -> list[np.ndarray]:
     """Per place (N, m): what heat at it alone changes in the first run of the described machine."""
-    drive = shared.drives[0]
-    on = np.zeros(drive.n_steps)
-    for start, end, share in ON:
-        on[round(start * len(on)) : round(end * len(on))] = share
-    model = pruned(shared.rich, [p.name for p in shared.places])
+    drive, model = shared.drives[0], pruned(shared.rich, [p.name for p in shared.places])
+    power = heat_alone(drive)
     columns = [np.zeros((body.n, len(model.load_model.sources))) for body in model.bodies]
     for own, body in zip(columns, model.bodies, strict=True):
         own[:, list(body.sources)] = body.B
-    B = ALONE * np.vstack(columns)[:, -len(shared.places) :]
+    B = np.vstack(columns)[:, -len(shared.places) :]
     stepper = CoupledStepper(model, TRAINING_KEEP, TRAINING_FOLLOW, IMPLICIT_EULER)
     first = stepper.uniform(shared.starts[0])
     told = with_acting(drive, model.load_model, Acting())
-    kept = [X for k, X in stepper.responses(told, first, lambda k: on[k] * B) if k % shared.every == shared.every - 1]
+    every = shared.every
+    kept = [X for k, X in stepper.responses(told, first, lambda k: power[k] * B) if k % every == every - 1]
     return list(np.stack(kept, axis=-1).swapaxes(0, 1))
+
+
+def heat_alone(drive: Drive) -> np.ndarray:
+    """(n,) W at one place."""
+    power = np.zeros(drive.n_steps)
+    for start, end, share in ON:
+        power[round(start * len(power)) : round(end * len(power))] = ALONE * share
+    return power
 
 
 def stepped(
