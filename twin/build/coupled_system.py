@@ -7,7 +7,7 @@ Y = S^-1 P and Q = P^T Y, the port temperatures solve (1 + Q Gamma) t = P^T S^-1
 Assembling and factorising the coupled matrix at every position was rejected: 720 steps would be 720 factorisations.
 
 Coefficients that follow surface temperature and speed change in every step. A factor is kept while they stay within
-FOLLOW of those it was made with; the rest, (theta - held) A_k x, goes to the right side with the state before, and
+`follow` of those it was made with; the rest, (theta - held) A_k x, goes to the right side with the state before, and
 once more with the state so found where it is more than half of what is allowed: what is left is of second order in the
 deviation, and it is stable as |theta - held| < held.
 """
