@@ -15,7 +15,7 @@ from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.result.spot import Spot
-from twin.diagnose.search.accepted import parameter_of
+from twin.diagnose.search.accepted import Accepted, parameter_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY
@@ -68,6 +68,20 @@ def test_an_exact_factor_is_told_as_a_factor_without_an_interval():
     found = rival_of(Hypothesis(batch, 0, batch.histories[0], 25.0, (1.0,), 100.0), 1.0)
     assert (found.place, found.amplitude) == ("signals.x_current", 0.707)
     assert np.isnan(found.ci95).all()
+
+
+@pytest.mark.parametrize(("behind", "wanted"), [(3.0, "ambiguous"), (40.0, "signal")])
+def test_factors_of_one_signal_that_explain_alike_are_not_told_apart(behind, wanted):
+    always = (History("factor", np.ones((1, 1))),)
+    places = ("signals.x_current*0.5", "signals.x_current*0.707", "signals.y_current*2")
+    batch = Batch("signal", "signal", "1", places, np.zeros((3, 1), dtype=int), always, fixed=True)
+    half, root, other = (Hypothesis(batch, i, always[0], 200.0 - i * behind, (1.0,), 1.0) for i in range(3))
+    near = ((root, 0.999), (other, 0.1)) if wanted == "ambiguous" else ((other, 0.1),)
+    one = Accepted(half, (), np.ones(1), np.eye(1), 200.0, 36.0, near)
+    found = SimpleNamespace(detector=small_case.made_detector(), accepted=(one,), steps=[SimpleNamespace(parts={})])
+    verdict, (cause,) = verdict_of(found, FAMILIES)
+    assert (verdict, cause.amplitude) == (wanted, 0.5)
+    assert cause.ci95 == ((0.5, 0.707) if wanted == "ambiguous" else (0.5, 0.5))
 
 
 def test_limits_of_factors_are_factors():

@@ -34,6 +34,8 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
     size = told(value), told(value - 1.96 * sigma), told(value + 1.96 * sigma)
     said = fault.described(study, Described(h.name, size, h.when.windows), a.amplitude, a.covariance)
     value, low, high = said.size
+    if fault.corrects:
+        low, high = _factors(a)
     settings = said.settings | ({"reference": h.when.reference} if h.when.signal else {})
     return Cause(
         family=h.family, place=said.place, parameter="", amplitude=value, ci95=(low, high), unit=h.batch.unit,
@@ -41,6 +43,13 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
         exponent=h.when.exponent, windows=said.windows, settings=settings,
         rivals=tuple(_rival(a.hypothesis, other, cosine, policy.apart) for other, cosine in a.rivals),
     )  # fmt: skip
+
+
+def _factors(a: Accepted) -> tuple[float, float]:
+    """The smallest and the largest of the exact factors of one signal that explain nearly as much."""
+    told = [fault_of(h).factor(h.name) for h in (a.hypothesis, *(h for h, _ in a.rivals)) if fault_of(h).corrects]
+    factors = [factor for signal, factor in told if signal == told[0][0]]
+    return min(factors), max(factors)
 
 
 def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
@@ -115,7 +124,9 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         near = other.statistic - more > lead.statistic - policy.close
         apart = min(lead.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
         alike = other.family == lead.family and Spot.read(other.name).owner == Spot.read(lead.name).owner
-        same = alike and not (lead.when.signal and other.when.name != lead.when.name)
+        # two histories of one place, and two factors of one signal, are written otherwise into the description
+        two = fault_of(lead).corrects or (lead.when.signal and other.when.name != lead.when.name)
+        same = alike and not two
         passes = near and not apart and other.statistic >= thresholds[other.family]
         if not same and (unproved or passes):
             return "ambiguous", causes
