@@ -70,12 +70,12 @@ def test_an_exact_factor_is_told_as_a_factor_without_an_interval():
     assert np.isnan(found.ci95).all()
 
 
-@pytest.mark.parametrize(("behind", "wanted"), [(3.0, "ambiguous"), (40.0, "signal")])
-def test_factors_of_one_signal_that_explain_alike_are_not_told_apart(behind, wanted):
+@pytest.mark.parametrize(("less", "wanted"), [(3.0, "ambiguous"), (40.0, "signal")])
+def test_factors_of_one_signal_that_explain_nearly_the_same_are_ambiguous(less, wanted):
     always = (History("factor", np.ones((1, 1))),)
     places = ("signals.x_current*0.5", "signals.x_current*0.707", "signals.y_current*2")
     batch = Batch("signal", "signal", "1", places, np.zeros((3, 1), dtype=int), always, fixed=True)
-    half, root, other = (Hypothesis(batch, i, always[0], 200.0 - i * behind, (1.0,), 1.0) for i in range(3))
+    half, root, other = (Hypothesis(batch, i, always[0], 200.0 - i * less, (1.0,), 1.0) for i in range(3))
     near = ((root, 0.999), (other, 0.1)) if wanted == "ambiguous" else ((other, 0.1),)
     one = Accepted(half, (), np.ones(1), np.eye(1), 200.0, 36.0, near)
     found = SimpleNamespace(detector=small_case.made_detector(), accepted=(one,), steps=[SimpleNamespace(parts={})])
