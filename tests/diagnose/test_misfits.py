@@ -160,6 +160,28 @@ def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
     assert closed(detector, y, fitted, (), (seen, [scored], step), relaxed, x0, loose) is None
 
 
+def test_no_more_is_refitted_than_decides(monkeypatch):
+    """Each refit takes seconds, and a machine of parts has a hundred joints and windows that score."""
+    detector = small_case.made_detector()
+    _, y = small_case.source_off(4.5)
+    fitted = detector.fitter(y)
+    x0, _ = settled(detector, y, ())
+    loose = loose_ones(detector, y, fitted, x0)
+    seen, ranked, step = look(detector, fitted)
+    relaxed = strained(detector, y, fitted, loose, (seen, ranked, step))
+    module = sys.modules[closed.__module__]
+    refitted, looked_at = [], []
+    monkeypatch.setattr(module, "misfit", lambda *_: 0.0)
+    monkeypatch.setattr(module, "exact", lambda d, y, f, h: refitted.append(h) or h)
+    monkeypatch.setattr(module, "_stays", lambda d, f, one, others: looked_at.extend(others) or True)
+    joint = next(h for h in ranked if bent(detector, h))
+    limit = detector.thresholds[joint.family]
+    for share in (0.9, 1.1):
+        several = [replace(joint, statistic=share * limit) for _ in range(100)]
+        assert closed(detector, y, fitted, (), (seen, several, step), relaxed, x0, loose) is not None
+        assert len(refitted) == len(looked_at) == (0 if share < 1.0 else detector.policy.others)
+
+
 def test_without_its_tolerance_a_number_is_what_the_data_alone_say():
     """Of the fit that finds causes: as with a prior a hundred times as wide, but for its bounds."""
     detector = small_case.made_detector()
