@@ -133,7 +133,7 @@ class _Helper:
 
     def __init__(self) -> None:
         # one thread each: the processes are the parallelism, and kernels of another width round otherwise
-        one = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "1")
+        one = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "TWIN_WORKERS"), "1")
         path = os.pathsep.join(p or os.getcwd() for p in sys.path)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "twin.build.workers"],

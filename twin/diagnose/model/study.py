@@ -13,6 +13,7 @@ from twin.calibrate.fit.effects import Effects, effects_of
 from twin.calibrate.fit.integration import Rows, displacements
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.model.integration import by_amplitudes, jacobian, outputs, states_of
+from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.probed_model import ProbedModel, ProbedRun
 from twin.diagnose.model.slots import Slots, first_slots, no_slots
 from twin.errors import TwinError
@@ -95,7 +96,7 @@ class Study:
 
     def all_outputs(self, x: np.ndarray) -> np.ndarray:
         """(m,) of all fitted runs at x (n,) in prior standard deviations."""
-        return np.concatenate([self.outputs(k, x) for k in self.fitted])
+        return np.concatenate(over_runs(lambda k: self.outputs(k, x), self.fitted))
 
     def slots(self, k: int) -> Slots:
         """Empty slots for run k, to be filled."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.workers import each
+from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.study import Study
 from twin.errors import ModelError
 from twin.progress import Progress, silent
@@ -57,7 +58,7 @@ class Surrogate:
 
 def jacobian_of(study: Study, x: np.ndarray) -> np.ndarray:
     n = len(study.probed.parameters)
-    return np.vstack([study.jacobian(k, x)[:, :n] for k in study.fitted])
+    return np.vstack(over_runs(lambda k: study.jacobian(k, x)[:, :n], study.fitted))
 
 
 def make_surrogate(study: Study, progress: Progress = silent) -> Surrogate:

@@ -16,6 +16,7 @@ from twin.diagnose.evidence.settled import settle, settled_alone
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.spot import Spot
@@ -52,14 +53,23 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
     return [] if j is None else [j]
 
 
+@dataclass(frozen=True)
+class Derivatives:
+    """Of the outputs by the parameters, beside causes."""
+
+    J: np.ndarray  # (m, n); the column of a number whose place a cause takes is empty
+    there: np.ndarray | None  # (n,) the parameters that they were made anew for; None of the surrogate
+
+
 def jacobian(
-    detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]], before: np.ndarray | None = None
-) -> np.ndarray:
-    """(m, n) derivatives by the parameters at x (n,) beside causes of these amplitudes; a number's own column is empty.
+    detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]], before: Derivatives | None = None
+) -> Derivatives:
+    """At x (n,) beside causes of these amplitudes.
 
     Causes that take a parameter's place are put there, for a film of nine times its size changes what every other
     parameter does. Conductances beyond their bounds and corrected signals, of which no surrogate knows, get derivatives
-    made anew, unless there are some from `before`.
+    made anew, unless there are some from `before`, of the same causes, nearer than `anew`: a fit takes its outputs from
+    the exact model, and derivatives only tell it where to go on.
     """
     study = detector.study
     low, high = bounds(study)
@@ -73,16 +83,17 @@ def jacobian(
             anew |= fault_of(h).conducts and not low[j] <= there[j] <= high[j]
     if not anew:
         J = detector.fitter.surrogate.at(there)[1]
-    elif before is not None:
-        J = before
+    elif before and before.there is not None and np.abs(there - before.there).max() < detector.policy.anew:
+        return before
     else:
         units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
-        J = np.vstack([
-            study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(x)]
-            for k in study.fitted
-        ])  # fmt: skip
+
+        def of_run(k: int) -> np.ndarray:
+            return study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(x)]
+
+        J = np.vstack(over_runs(of_run, study.fitted))
     J[:, held] = 0.0
-    return J
+    return Derivatives(J, there if anew else None)
 
 
 def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:
@@ -214,7 +225,7 @@ def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> 
         read = np.zeros(len(y))
         for a in reading:
             read += read_change(detector, a.hypothesis, a.amplitude, there)
-        exact = np.concatenate([stepped(detector, accepted, k, there) for k in study.fitted])
+        exact = np.concatenate(over_runs(lambda k: stepped(detector, accepted, k, there), study.fitted))
         return detector.whiten(y - exact) - read
 
     return settle(detector.fitter, outputs, left)

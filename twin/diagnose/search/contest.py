@@ -19,6 +19,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.study import K
 from twin.diagnose.search.accepted import curved_change, curved_slope, freed, jacobian, motion, readings_columns
 from twin.diagnose.search.detector import Detector
@@ -167,11 +168,12 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     x0[freed(study, h)] = 0.0
     now = _Point(a, x0, h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
-    held = policy.held if fault.wets else 0
+    held, by_parameters = policy.held if fault.wets else 0, None
     for i in range(passes or held + (policy.passes if not inner else policy.window_passes)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(detector, now, edges)
-        J = jacobian(detector, now.x, [(h, float(now.a[0]))])
+        by_parameters = jacobian(detector, now.x, [(h, float(now.a[0]))], by_parameters)
+        J = by_parameters.J
         projector = detector.fitter.projector(J, fitted.more)
         left = detector.whiten(y - fitted.beside - outputs + J @ now.x) - read @ now.a
         removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)
@@ -273,16 +275,15 @@ def _outputs(detector: Detector, p: _Point, edges: Sequence[Edge]) -> tuple[np.n
     """Outputs (m,) of all fitted runs and their derivatives (m, q + edges) by amplitudes and pulses at edges."""
     study, n = detector.study, len(p.a) + len(edges)
     units = units_of(study, p.h)
-    outputs, derivatives = [], []
-    for k in study.fitted:
+
+    def of_run(k: int) -> tuple[np.ndarray, np.ndarray]:
         if any(u.shapes[k].any() for u in units):
             slots = with_pulses(study, detector.elements, p.h, units, p.a, edges, k)
-            f, D = study.by_amplitudes(k, p.x, slots, [*p.a, *np.zeros(len(edges))])
-            derivatives.append(D)
-        else:
-            f = study.outputs(k, p.x)
-            derivatives.append(np.zeros((len(f), n)))
-        outputs.append(f)
+            return study.by_amplitudes(k, p.x, slots, [*p.a, *np.zeros(len(edges))])
+        f = study.outputs(k, p.x)
+        return f, np.zeros((len(f), n))
+
+    outputs, derivatives = zip(*over_runs(of_run, study.fitted), strict=True)
     return np.concatenate(outputs), np.vstack(derivatives)
 
 

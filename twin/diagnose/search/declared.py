@@ -21,7 +21,9 @@ from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.fault import Fault
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.integration import loads_for
+from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.study import Planned, Study
+from twin.diagnose.model.surrogate import jacobian_of
 from twin.diagnose.search.accepted import Accepted, exchanged, parameter_of
 from twin.diagnose.search.contest import misfit
 from twin.diagnose.search.detector import Detector
@@ -39,7 +41,11 @@ def misplaced_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> l
 
     def left(h: Hypothesis, _: np.ndarray) -> float:
         units = units_of(study, h)
-        there = [study.outputs(k, x, slots_with(study, detector.elements, units, k), h.amplitude) for k in study.fitted]
+
+        def of_run(k: int) -> np.ndarray:
+            return study.outputs(k, x, slots_with(study, detector.elements, units, k), h.amplitude)
+
+        there = over_runs(of_run, study.fitted)
         return _fitted_with(detector, y, detector.whiten(np.concatenate(there) - detector.fitter.surrogate.y0))
 
     return _better(detector, y, fitted, lambda fault: fault.elsewhere, left)
@@ -159,7 +165,7 @@ def _fitted_by(detector: Detector, y: np.ndarray, study: Study, enough: float) -
         if i < detector.policy.exact_passes:
             J = detector.fitter.surrogate.at(x + hotter)[1]
         elif left < enough:
-            J = np.vstack([study.jacobian(k, x)[:, : len(x)] for k in study.fitted])
+            J = jacobian_of(study, x)
         else:
             break
         projector = detector.fitter.projector(J)

@@ -122,7 +122,10 @@ class SearchPolicy:
     longest: float = _rule(0.7, SOLVER, "longest step", "logarithm of a factor")
     still: float = _rule(0.1, SOLVER, "of amplitudes: a pass that changes less is the last", "standard deviations")
     refit_less: float = _rule(0.5, SOLVER, "a pass that changes less is the last", "likelihood-ratio units")
-    anew: int = _rule(5, SOLVER, "passes in which derivatives beyond all bounds are made anew")
+    anew: float = _rule(
+        0.5, SOLVER, "by which parameters move before derivatives beyond all bounds are made anew",
+        "prior standard deviations",
+    )  # fmt: skip
     rises: int = _rule(2, SOLVER, "passes in a row that make it worse, after which it runs away")
     # what the shape of a cause leaves open
     edge_prior: float = _rule(1800.0, DERIVED, "standard deviation of an edge: half an hour's block", "s")

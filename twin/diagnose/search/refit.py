@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from twin.diagnose.evidence.formal import of_channels
 from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.fault import Curve
 from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.over_runs import over_runs
+from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.search.accepted import (
     Accepted,
@@ -45,7 +48,8 @@ def refit(
         u for a in accepted if a.units for u in shape_errors(study, a.hypothesis, a.units, a.amplitude, policy)
     ]
     open_shapes = open_shapes[: K - len(units)]
-    slots = [slots_with(study, detector.elements, [*units, *open_shapes], k) for k in study.fitted] if units else []
+    acting = [*units, *open_shapes]
+    slots = {k: slots_with(study, detector.elements, acting, k) for k in study.fitted} if units else {}
     # amplitudes in the order of the accepted: those of slots are stepped, those of readings are linear
     stepped = np.concatenate([np.full(len(a.amplitude), bool(a.units)) for a in accepted])
     amplitude = np.concatenate([a.amplitude for a in accepted])
@@ -61,11 +65,12 @@ def refit(
     x[held] = 0.0
     misfit, rises, least = np.inf, 0, np.inf
     best: Any = None  # the pass with the least misfit, at the parameters and amplitudes that it began with
-    J = np.zeros((len(y), len(x)))
-    for i in range(policy.refits):
+    J, derivatives = np.zeros((len(y), len(x))), None
+    for _ in range(policy.refits):
         there = shifted(study, x, gains, amplitude)
         sizes = [(a.hypothesis, float(amplitude[own.start])) for a, own in zip(accepted, of_each, strict=True)]
-        J = jacobian(detector, x, sizes, None if i < policy.anew else J)
+        derivatives = jacobian(detector, x, sizes, derivatives)
+        J = derivatives.J
         bent, states = np.zeros(len(y)), motion(detector, there)
         for a, own in zip(accepted, of_each, strict=True):
             fault = fault_of(a.hypothesis)
@@ -82,7 +87,8 @@ def refit(
             D[:, q] = detector.whiten(fitter.surrogate.at(there)[1][:, [j]])[:, 0] / study.scale[j]
         if units:
             now = [*amplitude[stepped], *np.zeros(len(open_shapes))]
-            parts = [study.by_amplitudes(k, there, slot, now) for k, slot in zip(study.fitted, slots, strict=True)]
+            of_run = partial(_by_amplitudes, study, slots, there, now)
+            parts = over_runs(of_run, study.fitted)
             f = np.concatenate([p for p, _ in parts])
             every = np.vstack([d for _, d in parts])
             exact, shapes = every[:, : len(units)], every[:, len(units) :]
@@ -122,6 +128,12 @@ def refit(
     more = np.hstack([policy.wide * D * np.sqrt(np.diag(inverse)), errors])
     bare = study.all_outputs(there) if units else f
     return Fitted(x, J, residual, fitter.projector(J, more), f - bare, more), result
+
+
+def _by_amplitudes(
+    study: Study, slots: Mapping[int, Slots], x: np.ndarray, a: Sequence[float], k: int
+) -> tuple[np.ndarray, np.ndarray]:
+    return study.by_amplitudes(k, x, slots[k], a)
 
 
 def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], amplitude: np.ndarray) -> np.ndarray:
