@@ -173,6 +173,18 @@ def test_contacts_that_calibration_strains_are_told_with_what_they_became():
     assert cause.amplitude == pytest.approx(np.exp(-6.0 * parameters[contact].sigma))
 
 
+@pytest.mark.parametrize(("share", "reaches"), [(0.5, False), (0.9, True)])
+def test_a_number_at_the_bound_of_its_calibration_may_be_as_far_off_as_physics_allows(share, reaches):
+    detector = small_case.made_detector()
+    parameters = detector.study.probed.parameters
+    j, y = small_case.source_off(0.0)
+    p = parameters[j]
+    x = share * p.coordinate(p.high)
+    (cause,) = strained_of(replace(search(detector, y), loose=(Loose(j, x, 0.01, 2.0),)))
+    assert cause.ci95[0] == pytest.approx(np.exp(p.sigma * (x - 1.96 * 0.01)))
+    assert cause.ci95[1] == pytest.approx(5.0 if reaches else np.exp(p.sigma * (x + 1.96 * 0.01)))
+
+
 @pytest.mark.parametrize(
     ("causes", "next_one", "statistic", "left", "wanted"),
     [

@@ -16,7 +16,7 @@ from twin.diagnose.faults.table import family_of_parameter, fault_of
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
 from twin.diagnose.result.spot import Spot
-from twin.diagnose.search.accepted import Accepted, freed
+from twin.diagnose.search.accepted import Accepted, freed, parameter_of
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -154,11 +154,16 @@ def _more_alike(found: Search, left: float) -> bool:
 
 
 def strained_of(found: Search) -> tuple[Cause, ...]:
-    """Declared parameters that calibration alone moved out of their tolerance, at their values without one."""
-    result = []
+    """Declared parameters that calibration alone moved out of their tolerance, at their values without one. Of one that
+    has come near a bound of the calibration, the interval reaches as far as physics allows."""
+    result, detector = [], found.detector
+    ends = detector.policy.nearly * np.array(bounds(detector.study))
     for own in found.loose:
-        p = found.detector.study.probed.parameters[own.index]
+        p = detector.study.probed.parameters[own.index]
         gain, low, high = (float(np.exp(p.sigma * (own.x + z * own.sigma))) for z in (0.0, -1.96, 1.96))
+        if own.settled and not ends[0, own.index] < own.x < ends[1, own.index]:
+            far = _farthest(detector, own.index, own.x)
+            low, high = min(low, far), max(high, far)
         place = ".".join(p.path.split(".")[:2])
         result.append(Cause(
             family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
@@ -166,6 +171,16 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
             rivals=tuple(rival_of(h, cosine, _reading(h)) for h, cosine in own.rivals),
         ))  # fmt: skip
     return tuple(sorted(result, key=lambda c: -c.statistic))
+
+
+def _farthest(detector: Detector, j: int, x: float) -> float:
+    """The largest factor of a declared number that physics allows, or the smallest; of the sign of x."""
+    for batch in detector.columns.batches:
+        fault = fault_of(batch)
+        for name, largest in zip(batch.places, batch.largest, strict=False) if fault.declared else ():
+            if parameter_of(detector.study, name) == j:
+                return fault.curve.told(float(np.sign(x)) * largest)
+    return 1.0
 
 
 def unknown_of(found: Search) -> Unknown | None:
