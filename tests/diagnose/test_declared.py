@@ -131,6 +131,7 @@ def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
     assert jacobian(detector, x + 0.9 * detector.policy.anew, [(h, 1.0)], made) is made
     further = jacobian(detector, x + 1.1 * detector.policy.anew, [(h, 1.0)], made)
     assert np.abs(further.J - made.J).max() > 0.01 * np.abs(made.J).max()
+    assert not np.allclose(anew, detector.fitter.surrogate.at(x)[1], rtol=0.2)
 
 
 def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description():

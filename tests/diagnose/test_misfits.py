@@ -4,6 +4,7 @@ explains better is not out of its tolerance."""
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,8 +19,9 @@ from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.accepted import Accepted, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.declared import declared_candidates
+from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import _leaking, _restless, refit, search
-from twin.diagnose.search.look import look
+from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.strained import _untied, _weak, closed, loose_ones, strained
 from twin.diagnose.search.verdict import verdict_of
 
@@ -138,8 +140,9 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
     assert closed(detector, y, fitted, declared, (seen, [quiet], step), relaxed, x0, loose) is not None
 
 
-def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
-    """A joint in windows scores by its derivative, and removes next to nothing when it is refitted."""
+def relaxed_source() -> tuple[Detector, list[Hypothesis], Callable[[list[Hypothesis]], Search | None]]:
+    """A source 4.5 tolerances off: the detector, all hypotheses there, and what `closed` says of those that it is
+    given."""
     detector = small_case.made_detector()
     _, y = small_case.source_off(4.5)
     fitted = detector.fitter(y)
@@ -148,6 +151,12 @@ def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
     seen, ranked, step = look(detector, fitted)
     relaxed = strained(detector, y, fitted, loose, (seen, ranked, step))
     assert relaxed is not None
+    return detector, ranked, lambda some: closed(detector, y, fitted, (), (seen, some, step), relaxed, x0, loose)
+
+
+def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
+    """A joint in windows scores by its derivative, and removes next to nothing when it is refitted."""
+    detector, ranked, ended = relaxed_source()
     module = sys.modules[closed.__module__]
     monkeypatch.setattr(module, "_stays", lambda *_: False)
     monkeypatch.setattr(module, "exact", lambda d, y, f, h: replace(h, statistic=0.0))
@@ -155,20 +164,14 @@ def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
     straight = next(h for h in ranked if not bent(detector, h) and h.family not in ("loss_law", "signal"))
     many = 1e9
     scored = replace(joint, statistic=many)
-    assert closed(detector, y, fitted, (), (seen, [scored], step), relaxed, x0, loose) is not None
+    assert ended([scored]) is not None
     scored = replace(straight, statistic=many)
-    assert closed(detector, y, fitted, (), (seen, [scored], step), relaxed, x0, loose) is None
+    assert ended([scored]) is None
 
 
 def test_no_more_is_refitted_than_decides(monkeypatch):
     """Each refit takes seconds, and a machine of parts has a hundred joints and windows that score."""
-    detector = small_case.made_detector()
-    _, y = small_case.source_off(4.5)
-    fitted = detector.fitter(y)
-    x0, _ = settled(detector, y, ())
-    loose = loose_ones(detector, y, fitted, x0)
-    seen, ranked, step = look(detector, fitted)
-    relaxed = strained(detector, y, fitted, loose, (seen, ranked, step))
+    detector, ranked, ended = relaxed_source()
     module = sys.modules[closed.__module__]
     refitted, looked_at = [], []
     monkeypatch.setattr(module, "misfit", lambda *_: 0.0)
@@ -178,7 +181,7 @@ def test_no_more_is_refitted_than_decides(monkeypatch):
     limit = detector.thresholds[joint.family]
     for share in (0.9, 1.1):
         several = [replace(joint, statistic=share * limit) for _ in range(100)]
-        assert closed(detector, y, fitted, (), (seen, several, step), relaxed, x0, loose) is not None
+        assert ended(several) is not None
         assert len(refitted) == len(looked_at) == (0 if share < 1.0 else detector.policy.others)
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.fault import Curve
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.over_runs import over_runs
-from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.search.accepted import (
     Accepted,
@@ -63,6 +61,10 @@ def refit(
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
     x = x.copy()
     x[held] = 0.0
+
+    def of_runs(x: np.ndarray, a: Sequence[float]) -> list[tuple[np.ndarray, np.ndarray]]:
+        return over_runs(lambda k: study.by_amplitudes(k, x, slots[k], a), study.fitted)
+
     misfit, rises, least = np.inf, 0, np.inf
     best: Any = None  # the pass with the least misfit, at the parameters and amplitudes that it began with
     J, derivatives = np.zeros((len(y), len(x))), None
@@ -87,8 +89,7 @@ def refit(
             D[:, q] = detector.whiten(fitter.surrogate.at(there)[1][:, [j]])[:, 0] / study.scale[j]
         if units:
             now = [*amplitude[stepped], *np.zeros(len(open_shapes))]
-            of_run = partial(_by_amplitudes, study, slots, there, now)
-            parts = over_runs(of_run, study.fitted)
+            parts = of_runs(there, now)
             f = np.concatenate([p for p, _ in parts])
             every = np.vstack([d for _, d in parts])
             exact, shapes = every[:, : len(units)], every[:, len(units) :]
@@ -122,18 +123,12 @@ def refit(
     inverse = np.linalg.pinv(F)
     alone = sizes_by_run(projector.N, D, white, study.rows, [own.start for own in of_each])
     result = [
-        replace(a, amplitude=amplitude[own], covariance=inverse[own, own], by_run=of_runs)
-        for a, of_runs, own in zip(accepted, alone, of_each, strict=True)
+        replace(a, amplitude=amplitude[own], covariance=inverse[own, own], by_run=by_run)
+        for a, by_run, own in zip(accepted, alone, of_each, strict=True)
     ]
     more = np.hstack([policy.wide * D * np.sqrt(np.diag(inverse)), errors])
     bare = study.all_outputs(there) if units else f
     return Fitted(x, J, residual, fitter.projector(J, more), f - bare, more), result
-
-
-def _by_amplitudes(
-    study: Study, slots: Mapping[int, Slots], x: np.ndarray, a: Sequence[float], k: int
-) -> tuple[np.ndarray, np.ndarray]:
-    return study.by_amplitudes(k, x, slots[k], a)
 
 
 def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], amplitude: np.ndarray) -> np.ndarray:

@@ -163,7 +163,7 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
         gain, low, high = (float(np.exp(p.sigma * (own.x + z * own.sigma))) for z in (0.0, -1.96, 1.96))
         if own.settled and not ends[0, own.index] < own.x < ends[1, own.index]:
             far = _farthest(detector, own.index, own.x)
-            low, high = min(low, far), max(high, far)
+            low, high = (low, max(high, far)) if own.x > 0.0 else (min(low, far), high)
         place = ".".join(p.path.split(".")[:2])
         result.append(Cause(
             family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
@@ -174,7 +174,8 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
 
 
 def _farthest(detector: Detector, j: int, x: float) -> float:
-    """The largest factor of a declared number that physics allows, or the smallest; of the sign of x."""
+    """The factor of a declared number that physics allows, the largest for x > 0, the smallest for x < 0; 1 where no
+    range is known."""
     for batch in detector.columns.batches:
         fault = fault_of(batch)
         for name, largest in zip(batch.places, batch.largest, strict=False) if fault.declared else ():
