@@ -22,7 +22,7 @@ from twin.diagnose.search.declared import declared_candidates
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import _leaking, _restless, refit, search
 from twin.diagnose.search.look import Search, look
-from twin.diagnose.search.strained import _untied, _weak, closed, loose_ones, strained
+from twin.diagnose.search.strained import Freed, _untied, _weak, closed, loose_ones, strained
 from twin.diagnose.search.verdict import verdict_of
 
 pytestmark = pytest.mark.long
@@ -126,8 +126,8 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
     x0, _ = settled(detector, y, ())
     declared = declared_candidates(detector, y, fitted)
     seen, ranked, step = look(detector, fitted, declared)
-    loose = loose_ones(detector, y, fitted, x0)
-    relaxed = strained(detector, y, fitted, loose, look(detector, fitted))
+    loose = loose_ones(detector, y, fitted, x0, Freed())
+    relaxed = strained(detector, y, fitted, loose, look(detector, fitted), Freed())
     assert relaxed is not None
     module = sys.modules[closed.__module__]
     monkeypatch.setattr(module, "misfit", lambda *_: 0.0)  # the number itself removes nothing of what was left
@@ -147,9 +147,9 @@ def relaxed_source() -> tuple[Detector, list[Hypothesis], Callable[[list[Hypothe
     _, y = small_case.source_off(4.5)
     fitted = detector.fitter(y)
     x0, _ = settled(detector, y, ())
-    loose = loose_ones(detector, y, fitted, x0)
+    loose = loose_ones(detector, y, fitted, x0, Freed())
     seen, ranked, step = look(detector, fitted)
-    relaxed = strained(detector, y, fitted, loose, (seen, ranked, step))
+    relaxed = strained(detector, y, fitted, loose, (seen, ranked, step), Freed())
     assert relaxed is not None
     return detector, ranked, lambda some: closed(detector, y, fitted, (), (seen, some, step), relaxed, x0, loose)
 
@@ -207,7 +207,7 @@ def test_a_number_that_one_fit_alone_is_sure_of_is_moved_by_the_other_too(monkey
     monkeypatch.setattr(sys.modules[loose_ones.__module__], "settled_alone", unsure)
     limit = detector.pulls.settled.sigma * detector.pulls.settled.limit
     moved = np.where(np.arange(n) == j, np.sign(fitted.x) * limit, 0.0)
-    found = {own.index: own for own in loose_ones(detector, y, fitted, 0.6 * moved)}
+    found = {own.index: own for own in loose_ones(detector, y, fitted, 0.6 * moved, Freed())}
     assert not found[j].settled
     assert found[j].x > 1.96 * found[j].sigma
-    assert j not in {own.index for own in loose_ones(detector, y, fitted, 0.4 * moved)}
+    assert j not in {own.index for own in loose_ones(detector, y, fitted, 0.4 * moved, Freed())}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +16,10 @@ from twin.diagnose.faults.readings import play
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import exchanged
 from twin.diagnose.search.dispersion import raised, searched
-from twin.diagnose.search.forward import search
+from twin.diagnose.search.forward import begun, search, search_again
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.strained import strained
 from twin.diagnose.search.verdict import limits_at, limits_of, pulls_of, verdict_of
 
 
@@ -197,8 +199,39 @@ def test_what_is_left_beyond_noise_must_be_explained_by_less_than_a_cause():
     assert [a.hypothesis.name for a in named.accepted] == ["housing"]
 
 
+@pytest.mark.long
 def test_a_cause_that_explains_more_than_all_that_is_left_is_named_all_the_same():
     y = measured("heat", "housing", 400.0, seed=3) + slow_discrepancy(0.12)
     found, own = searched(small_case.made_detector(), y)
     assert own.share > POLICY.dispersed
     assert [(a.hypothesis.family, a.hypothesis.name) for a in found.accepted] == [("heat_source", "housing")]
+
+
+def test_where_more_is_left_the_first_search_stands_or_falls_and_nothing_is_fitted_twice(monkeypatch):
+    """Of one that still explains enough the causes stay; what no longer does is not named."""
+    detector, module = small_case.made_detector(), sys.modules[search.__module__]
+    y = measured("heat", "housing", 200.0, seed=3)
+    start = begun(detector, y)
+    first = search(detector, y, start)
+    (one,) = first.accepted
+    with monkeypatch.context() as patched:
+        patched.setattr(module, "refit", None)
+        same = search_again(detector, y, start, first, 0.9 * one.statistic)
+    (still,) = same.accepted
+    assert (still.hypothesis, still.statistic) == (one.hypothesis, one.statistic)
+    assert one.threshold < still.threshold == 0.9 * one.statistic
+    assert same.detector.least == 0.9 * one.statistic <= min(same.detector.thresholds.values())
+    assert not search_again(detector, y, start, first, 1.5 * one.statistic).accepted
+
+
+def test_a_declared_number_is_freed_once(monkeypatch):
+    detector, (_, y) = small_case.made_detector(), small_case.source_off(4.5)
+    module = sys.modules[strained.__module__]
+    start = begun(detector, y)
+    first = search(detector, y, start)
+    assert first.loose
+    assert [a.hypothesis.family for a in first.accepted] == ["loss_law"]
+    for made in ("settled_alone", "refit"):
+        monkeypatch.setattr(module, made, None)
+    again = search_again(detector, y, start, first, 0.5 * first.accepted[0].statistic)
+    assert verdict_of(again, FAMILIES)[0] == verdict_of(first, FAMILIES)[0] == "out_of_tolerance"

@@ -8,6 +8,8 @@ from functools import cache
 import numpy as np
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.settled import settled_alone, settled_nearly
+from twin.diagnose.model.study import Study
 from twin.diagnose.search.accepted import settled
 
 HIDDEN = np.array([1.0, -0.8])  # prior standard deviations of the first two sources
@@ -43,6 +45,16 @@ def test_parameters_are_found_and_predict():
     assert np.all(sigma < 1.2)
     assert np.mean(np.abs(x - truth) < 2.0 * sigma + 0.1) > 0.9
     assert held_out(x) < 0.35 * held_out(np.zeros(len(x)))
+
+
+def test_near_a_fit_it_is_known_without_a_step_of_the_model(monkeypatch):
+    """Synthetic measurements are settled so, for limits that their spread sets."""
+    fitter, y = small_case.made_detector().fitter, measured()
+    fitted, exactly = fitter(y), settled_alone(fitter, y)[0]
+    monkeypatch.setattr(Study, "outputs", None)
+    nearly = settled_nearly(fitter, fitted)
+    assert np.abs(nearly - exactly).max() < 0.03
+    assert np.abs(exactly).max() > 0.3
 
 
 def test_model_discrepancy_does_not_take_what_parameters_explain():

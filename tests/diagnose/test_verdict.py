@@ -19,7 +19,7 @@ from twin.diagnose.search.accepted import Accepted, parameter_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY
-from twin.diagnose.search.strained import loose_ones, strained
+from twin.diagnose.search.strained import Freed, loose_ones, strained
 from twin.diagnose.search.verdict import (
     CALIBRATED,
     _more_alike,
@@ -129,7 +129,7 @@ def test_films_without_a_declared_gain_are_not_asked_for_it():
     n, films = len(told), [i for i, p in enumerate(told) if p.kind == "film"]
     y = np.concatenate([detector.study.outputs(k, np.zeros(n)) for k in detector.study.fitted])
     fitted = detector.fitter(y)
-    assert strained(other, y, fitted, (Loose(films[0], 2.0, 0.1, 5.0),), look(detector, fitted)) is None
+    assert strained(other, y, fitted, (Loose(films[0], 2.0, 0.1, 5.0),), look(detector, fitted), Freed()) is None
 
 
 def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch):
@@ -140,9 +140,9 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     x[j] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
     fitted = detector.fitter(y)
-    loose = loose_ones(detector, y, fitted, x)
+    loose = loose_ones(detector, y, fitted, x, Freed())
     glance = look(detector, fitted)
-    freed = strained(detector, y, fitted, loose, glance)
+    freed = strained(detector, y, fitted, loose, glance, Freed())
     assert freed is not None
     module = sys.modules[strained.__module__]
     monkeypatch.setattr(module, "_scored", lambda *_: 0.0)  # by its derivative, as of a film many times as large
@@ -150,13 +150,13 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     def beside(share: float) -> bool:
         """Whether it is told where something else explains this share of what it does."""
         sure = replace(glance[1][0], statistic=share * freed[1].statistic)
-        return strained(detector, y, fitted, loose, (glance[0], [sure], glance[2])) is not None
+        return strained(detector, y, fitted, loose, (glance[0], [sure], glance[2]), Freed()) is not None
 
     assert beside(0.02)  # its own discrepancy may leave that
     assert not beside(0.5)
     gone = lambda *a: (fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
     monkeypatch.setattr(module, "refit", gone)
-    assert strained(detector, y, fitted, loose, glance) is None
+    assert strained(detector, y, fitted, loose, glance, Freed()) is None
 
 
 def test_contacts_that_calibration_strains_are_told_with_what_they_became():

@@ -34,7 +34,7 @@ def _options() -> type[Any]:
 @click.option("--tcp-noise", default="1 um", show_default=True, type=Quantity("m"),
               help="of a TCP deviation, where tcp.csv has no sigma")  # fmt: skip
 @click.option("--exclude", multiple=True, help="sensor to leave out; repeatable")
-@click.option("--nulls", default=200, show_default=True, type=click.IntRange(20),
+@click.option("--nulls", default=100, show_default=True, type=click.IntRange(20),
               help="synthetic runs without a cause, for thresholds; 60 more show model discrepancy")  # fmt: skip
 @click.option("--catalogue", type=click.Path(), help="Python file with entries of your own (FAMILIES)")
 @click.option("--machine", type=click.Path(), help="description with its meshes, where it has moved since the build")

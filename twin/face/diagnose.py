@@ -33,7 +33,7 @@ class DiagnoseOptions:
     noise: Quantity = "0.1 K"  # standard deviation of one temperature reading
     tcp_noise: Quantity = "1 um"  # of a TCP deviation, where tcp.csv has no sigma
     exclude: Sequence[str] = ()  # sensors to leave out
-    nulls: int = 200  # synthetic runs without a cause that thresholds come from
+    nulls: int = 100  # synthetic runs without a cause that thresholds come from
     catalogue: str | Path | None = None  # Python file with entries of your own (FAMILIES)
     seed: int = 1  # of the bootstrap
     plan: str | None = (

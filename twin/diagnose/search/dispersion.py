@@ -36,7 +36,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.contest import beginning, misfit, worth
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.forward import search
+from twin.diagnose.search.forward import afresh, begun, search, search_again
 from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.refit import refit
@@ -67,14 +67,18 @@ class Dispersion:
 
 def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing, and the dispersion of the
-    first search: where that is no chance, what is found is that of another one whose thresholds grew (`raised`)."""
-    first = search(detector, y)
+    first search: where that is no chance, causes must explain more (`raised`)."""
+    detector = afresh(detector)
+    start = begun(detector, y)
+    first = search(detector, y, start)
     own = dispersion_of(first)
     if own.share > detector.policy.dispersed:
         own = _with_errors(own, detector, y)
-        found = search(raised(detector, own), y)
-        return (found if found.accepted else search(_closed(detector), y)), own
-    return (search(raised(detector, own), y) if own.least(detector.policy) else first), own
+        wide = raised(detector, own)
+        found = search(wide, y, begun(wide, y))
+        return (found if found.accepted else search_again(detector, y, start, first, math.inf)), own
+    least = own.least(detector.policy)
+    return (search_again(detector, y, start, first, least) if least else first), own
 
 
 def dispersion_of(found: Search) -> Dispersion:
@@ -109,14 +113,8 @@ def wrong_temperatures(found: Search) -> bool:
 
 def raised(detector: Detector, own: Dispersion) -> Detector:
     """The detector of a model with that dispersion: no threshold below what a cause must explain."""
-    least = own.least(detector.policy)
     wide = detector if own.errors is None else with_errors(detector, own.errors)
-    return replace(wide, least=least, thresholds={name: max(v, least) for name, v in wide.thresholds.items()})
-
-
-def _closed(detector: Detector) -> Detector:
-    """The detector that names nothing."""
-    return replace(detector, least=math.inf, thresholds=dict.fromkeys(detector.thresholds, math.inf))
+    return wide.at_least(own.least(detector.policy))
 
 
 def slow_errors(detector: Detector, fitted: Fitted) -> np.ndarray:

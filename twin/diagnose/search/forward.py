@@ -7,7 +7,7 @@ too small to name or negative, is dropped and not looked at again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,32 +34,59 @@ from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Search, Step, cosines, distinct, look, scored
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
-from twin.diagnose.search.strained import closed, loose_ones, strained
+from twin.diagnose.search.strained import Freed, closed, loose_ones, strained
+
+Glance = tuple[Sight, list[Hypothesis], Step]
 
 
 @dataclass(frozen=True)
-class _Start:
+class Start:
     """What is known before anything is named."""
 
     detector: Detector  # with the model discrepancy of what gets hotter than described
     fitted: Fitted
     x0: np.ndarray  # (n,) settled without a cause
     covariance: np.ndarray  # (n, n) of it
+    scored: Glance  # all hypotheses
     declared: list[Hypothesis]
-    glance: tuple[Sight, list[Hypothesis], Step]
+    glance: Glance  # with the exact fits of those that are declared
     loose: tuple[Loose, ...]
-    relaxed: tuple[Fitted, Accepted] | None
+    freed: Freed
 
 
-def search(described: Detector, y: np.ndarray) -> Search:
-    """Causes in measurements y (m,) of the fitted runs, NaN where something is missing."""
-    start = _start(described, y)
+def search(described: Detector, y: np.ndarray, start: Start | None = None) -> Search:
+    """Causes in measurements y (m,) of the fitted runs, NaN where something is missing; start: `begun` with them."""
+    start = start or begun(afresh(described), y)
+    return _one_number(start, y) or _forward(described, y, start)
+
+
+def search_again(described: Detector, y: np.ndarray, start: Start, first: Search, least: float) -> Search:
+    """What a first search has found where causes must explain more than `least`. Only where it has named what no longer
+    does is searched anew: what remains of it might not have been named beside something stronger."""
+    fewer = start.detector.at_least(least)
+    start = replace(start, detector=fewer, loose=loose_ones(fewer, y, start.fitted, start.x0, start.freed))
+    if ended := _one_number(start, y):
+        return ended
+    named = sorted(first.accepted, key=lambda a: -a.statistic)
+    beside = _limits(fewer, named[:1])
+    if all(a.statistic > (beside[a.hypothesis.family] if i else least) for i, a in enumerate(named)):
+        accepted = tuple(replace(a, threshold=max(a.threshold, least)) for a in first.accepted)
+        return replace(first, detector=fewer, loose=start.loose, accepted=accepted)
+    return _forward(described.at_least(least), y, start)
+
+
+def _one_number(start: Start, y: np.ndarray) -> Search | None:
+    """The search that ends with one declared number out of its tolerance, if it does."""
+    detector, fitted = start.detector, start.fitted
+    relaxed = strained(detector, y, fitted, start.loose, start.scored, start.freed)
+    if relaxed is None:
+        return None
+    return closed(detector, y, fitted, start.declared, start.glance, relaxed, start.x0, start.loose)
+
+
+def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
     detector, policy, fitted, x = start.detector, start.detector.policy, start.fitted, start.x0
     covariance, loose = start.covariance, start.loose
-    if start.relaxed and (
-        ended := closed(detector, y, fitted, start.declared, start.glance, start.relaxed, x, loose)
-    ):  # fmt: skip
-        return ended
     accepted, steps = list[Accepted](), list[Step]()
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
@@ -105,16 +132,21 @@ def search(described: Detector, y: np.ndarray) -> Search:
     )  # fmt: skip
 
 
-def _start(described: Detector, y: np.ndarray) -> _Start:
+def afresh(detector: Detector) -> Detector:
+    """The detector with no derivatives yet: a diagnosis is the same whatever was searched before."""
+    return replace(detector, derivatives=[])
+
+
+def begun(described: Detector, y: np.ndarray) -> Start:
+    """What a search of measurements y (m,) begins with."""
     fitted = described.fitter(y)
     if (detector := hotter(described, fitted.x)) is not described:
         fitted = detector.fitter(y)
     x0, covariance = settled(detector, y, ())
     declared = [*declared_candidates(detector, y, fitted), *swapped_candidates(detector, y, fitted)]
-    known = scored(detector, fitted)
-    glance = look(detector, fitted, declared, known)
-    loose = loose_ones(detector, y, fitted, x0)
-    relaxed = strained(detector, y, fitted, loose, glance)
+    known, freed = scored(detector, fitted), Freed()
+    first = glance = look(detector, fitted, declared, known)
+    loose = loose_ones(detector, y, fitted, x0, freed)
     if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
         closer = [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
         exact = {h.name: h for h in closer}
@@ -123,7 +155,7 @@ def _start(described: Detector, y: np.ndarray) -> _Start:
         exact |= {name: told[name] for name, h in exact.items() if name in told and h.statistic <= 0.0}
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
         glance = look(detector, fitted, declared, known)
-    return _Start(detector, fitted, x0, covariance, declared, glance, loose, relaxed)
+    return Start(detector, fitted, x0, covariance, first, declared, glance, loose, freed)
 
 
 def _limits(detector: Detector, accepted: Sequence[Accepted]) -> dict[str, float]:

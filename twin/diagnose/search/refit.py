@@ -67,12 +67,11 @@ def refit(
 
     misfit, rises, least = np.inf, 0, np.inf
     best: Any = None  # the pass with the least misfit, at the parameters and amplitudes that it began with
-    J, derivatives = np.zeros((len(y), len(x))), None
+    J = np.zeros((len(y), len(x)))
     for _ in range(policy.refits):
         there = shifted(study, x, gains, amplitude)
         sizes = [(a.hypothesis, float(amplitude[own.start])) for a, own in zip(accepted, of_each, strict=True)]
-        derivatives = jacobian(detector, x, sizes, derivatives)
-        J = derivatives.J
+        J = jacobian(detector, x, sizes)
         bent, states = np.zeros(len(y)), motion(detector, there)
         for a, own in zip(accepted, of_each, strict=True):
             fault = fault_of(a.hypothesis)

@@ -6,7 +6,7 @@ It is the verdict where freeing it leaves nothing, or so little that a discrepan
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import islice
 
@@ -82,7 +82,17 @@ def closed(
     )  # fmt: skip
 
 
-def loose_ones(detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.ndarray) -> tuple[Loose, ...]:
+@dataclass(frozen=True)
+class Freed:
+    """What has been freed of its tolerance so far, beside one fit: it takes seconds, and a second search asks again."""
+
+    settled: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)  # by parameter: x (n,), covariance
+    refitted: dict[str, tuple[Fitted, Accepted]] = field(default_factory=dict)  # by place
+
+
+def loose_ones(
+    detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.ndarray, known: Freed
+) -> tuple[Loose, ...]:
     """The declared numbers farthest out of their tolerance, `far` at most, by two calibrations; settled (n,).
 
     Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
@@ -92,7 +102,9 @@ def loose_ones(detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.nd
     strain, by_settling = detector.pulls.strain(fitted.x, settled), detector.pulls.settled.strain(settled)
     found = []
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
-        x, covariance = settled_alone(detector.fitter, y, (j,))
+        if j not in known.settled:
+            known.settled[j] = settled_alone(detector.fitter, y, (j,))
+        x, covariance = known.settled[j]
         estimates = ((float(x[j]), float(np.sqrt(covariance[j, j])), True), (*_untied(fitted, j), False))
         for value, sigma, by_settled in estimates[: 2 if by_settling[j] >= detector.policy.alone else 1]:
             sure = max(detector.policy.sure, np.sqrt(detector.least))
@@ -196,7 +208,7 @@ def _weak(detector: Detector, ranked: Sequence[Hypothesis], misfits: float) -> b
 
 def strained(
     detector: Detector, y: np.ndarray, fitted: Fitted, loose: Sequence[Loose],
-    glance: tuple[Sight, list[Hypothesis], Step],
+    glance: tuple[Sight, list[Hypothesis], Step], known: Freed,
 ) -> tuple[Fitted, Accepted] | None:  # fmt: skip
     """Of the declared numbers out of their tolerance the one that leaves least, freed of it; None if there is none, or
     what was seen at a glance explains so much more that it would be left."""
@@ -221,7 +233,7 @@ def strained(
         likely = fault_of(h).faint or _scored(detector, fitted, seen, h) > policy.faint * most
         if not likely and policy.roughly * (1.0 - policy.covers) * _told_alone(detector, fitted, h) < most:
             continue
-        made = _freed(detector, y, fitted, h)
+        made = _freed(detector, y, fitted, h, known)
         if made and (
             likely or ((1.0 - policy.covers) * made[1].statistic > most and misfit(detector, made[0]) < before)
         ):
@@ -245,12 +257,18 @@ def _told_alone(detector: Detector, fitted: Fitted, h: Hypothesis) -> float:
     return float(fitted.x[j]) ** 2 * (1.0 / _variance(fitted, j) - 1.0)
 
 
-def _freed(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> tuple[Fitted, Accepted] | None:
+def _freed(
+    detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, known: Freed
+) -> tuple[Fitted, Accepted] | None:
     """The fit with a declared number at any value; None where that changes nothing, is beyond what physics has, or lies
     within the tolerance."""
     policy = detector.policy
-    one = Accepted(h, units_of(detector.study, h), np.array(h.amplitude), np.eye(1), h.statistic, policy.pulled**2, ())
-    fitted, (one,) = refit(detector, y, beginning(fitted.x, policy), [one])
+    if h.name not in known.refitted:
+        units = units_of(detector.study, h)
+        one = Accepted(h, units, np.array(h.amplitude), np.eye(1), h.statistic, policy.pulled**2, ())
+        at, (one,) = refit(detector, y, beginning(fitted.x, policy), [one])
+        known.refitted[h.name] = at, one
+    fitted, one = known.refitted[h.name]
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
     if not sigma > 0.0 or not h.batch.possible(h.place, change):
         return None
