@@ -40,6 +40,7 @@ def test_laminar_free_convection_where_a_constant_is_described():
     np.testing.assert_allclose(found["exponent"], 0.25 * DESCRIBED / (DESCRIBED + RADIATION), rtol=0.2)
 
 
+@pytest.mark.long
 def test_laminar_forced_convection_where_turbulent_is_described():
     """The exponent of the speed tells most of what a share of forced convection alone does not."""
     laminar = {"parameters": {"natural": "6 W/(m^2*K)", "forced": "30 W/(m^2*K)", "exponent": 0.5}}

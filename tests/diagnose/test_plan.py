@@ -62,6 +62,7 @@ def test_one_more_run_never_tells_less_and_the_best_comes_first():
         assert {"x to and fro", "long rest", "warm start", "again"} <= {p.experiment for p in f.proposals}
 
 
+@pytest.mark.long
 def test_a_sensor_where_heat_is_suspected_helps_most_and_one_far_away_as_much_as_none():
     bed = of("heat_source", "bed")
     sensors = [p for p in bed.proposals if p.experiment.startswith("sensor")]

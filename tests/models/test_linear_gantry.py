@@ -74,6 +74,7 @@ def test_joints_by_roughness_and_bolts(machine):
     assert solid < joint_conductance("column_1", machine) < 1.1 * solid
 
 
+@pytest.mark.long
 def test_the_papers_rise_and_error_within_a_factor_of_two(stories):
     """1.2 K in the columns; 12 um, with the reader 18 um, along Y."""
     told = stories["constant_room"]
@@ -87,6 +88,7 @@ def test_the_papers_rise_and_error_within_a_factor_of_two(stories):
     assert told.balance < 1e-10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", RUNS)
 def test_symmetric_heat_moves_nothing_across(stories, name):
     told = stories[name]
@@ -96,12 +98,14 @@ def test_symmetric_heat_moves_nothing_across(stories, name):
             assert told.rises[f"{part[:-1]}2"] == pytest.approx(rise, rel=0.05), part
 
 
+@pytest.mark.long
 def test_a_room_that_warms_doubles_the_error(stories):
     constant, ramped, standing = (stories[name].tcp[-1, 1] for name in RUNS)
     assert 1.5 < ramped / constant < 2.5
     assert 0.5 * (ramped - constant) < standing < 1.5 * (ramped - constant)
 
 
+@pytest.mark.long
 def test_the_coolers_take_most_of_the_heat(machine, stories):
     """Eq (5): copper loss of a motor at the run's current, of which 13.5 W remain."""
     power = stories["constant_room"].power

@@ -24,6 +24,7 @@ from twin.rom.turned_surface import surface_turns, turned_surface
 from twin.run.replay import replay
 from twin.run.results import write_results
 
+pytestmark = pytest.mark.long  # its machine takes half a minute
 RUN = Path(__file__).parents[1] / "machines" / "slide" / "runs" / "short"
 ANGLES = {"c": 40.0, "a": -75.0}  # deg, of the turntable and of the head on it
 
