@@ -20,6 +20,7 @@ from twin.diagnose.model.bank import Nominal, nominal_run, respond
 from twin.diagnose.model.probed_model import ProbedModel, make_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.search.detector import Detector, instruments_of, make_detector
+from twin.diagnose.search.forward import afresh
 from twin.diagnose.search.policy import POLICY
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
@@ -130,9 +131,13 @@ def responses(linear: bool = False) -> np.ndarray:
     return respond(study(linear), nominal(linear), elements(linear).vectors, elements(linear).columns)
 
 
-@cache
 def made_detector() -> Detector:
-    """From few synthetic measurements: thresholds are rough."""
+    """From few synthetic measurements: thresholds are rough; no test knows what another one has derived."""
+    return afresh(_detector())
+
+
+@cache
+def _detector() -> Detector:
     instruments = instruments_of(study(), NOISE, TCP_NOISE)
     form = replace(form_of(machine()), contact=0.5)  # with contacts more uncertain than those of other machines
     return make_detector(study(), FAMILIES, instruments, POLICY, form, counts=(24, 40))

@@ -28,7 +28,7 @@ from twin.diagnose.search.declared import (
     swapped_candidates,
     with_signal,
 )
-from twin.diagnose.search.forward import _reads, afresh, search
+from twin.diagnose.search.forward import _reads, search
 from twin.diagnose.search.verdict import verdict_of
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
@@ -119,7 +119,7 @@ def test_the_source_that_reads_a_corrected_signal_has_no_other_loss_beside_it():
 
 
 def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
-    detector = afresh(small_case.made_detector())
+    detector = small_case.made_detector()
     study = detector.study
     y = of_another("spindle_current")
     h = declared_exactly(detector, y, detector.fitter(y))[0]
