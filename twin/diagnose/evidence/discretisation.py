@@ -12,13 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 
 from twin.build.mesh import load_body_meshes
 from twin.build.mesh_error import LARGEST, OF_FINER, OF_LINEAR, refined_bytes, refined_unknowns
-from twin.build.workers import LONG, each
+from twin.build.workers import each
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.evidence.leading import channel_of, leading_of_each
 from twin.diagnose.model.probed_model import make_probed_model
@@ -42,7 +41,7 @@ OF_BARS = 1.0 / (1.0 - BARS**-2)  # of the difference: the error of linear eleme
 SEGMENTS = tuple(2.0 ** (k / 9.0) for k in range(1, 10))
 BYTES = 10e9  # of a machine on a mesh of half the size: what a computer of 16 GB has to spare
 DIFFUSIVITY = 1.3e-5  # m^2/s, of steel and cast iron (VDI Heat Atlas, 2nd ed., D6.1)
-EDGES = 2.0  # times the edge of a cube of its capacity that a node's heat has to go: machine parts are no cubes
+LONG = 2.0  # times the edge of a cube of its capacity that a node's heat has to go: machine parts are no cubes
 SPLIT_FROM = 120.0  # s, of a node's inside behind its surface: two steps of 60 s
 
 
@@ -82,13 +81,12 @@ def differences(
 
     known = _Known(tuple(parameters), tuple(runs), tuple(plans), tuple(study.fitted), machine.lumped)
     found, every = [], list(_others(machine))
-    # the finer mesh takes as long as all rails, which others make meanwhile; two windows made alike are off alike
-    flat = [*chain(*every), *([] if machine.lumped else [_Other(machine)])]
-    with progress("other discretisations", len(flat)) as advance:
-        made = each(_outputs, known, flat, lambda _: advance(""), LONG if machine.lumped else 0.0)
-    y, shown = surrogate.y0 if machine.lumped else made[-1], iter(made)
-    for others in every:
-        d = np.stack([o.share * (next(shown) - y) for o in others], axis=1)
+    with progress("other discretisations", sum(map(len, every))) as advance:
+        # two windows made alike are off alike
+        y = surrogate.y0 if machine.lumped else _outputs(known, _Other(machine))
+        shown = [each(_outputs, known, others, lambda _: advance("")) for others in every]
+    for others, outputs in zip(every, shown, strict=True):
+        d = np.stack([o.share * (own - y) for o, own in zip(others, outputs, strict=True)], axis=1)
         D = others[0].share * (jacobian_of(known.study(others[0]), x) - J) if machine.lumped else np.zeros_like(J)
         real = np.arange(len(others)) % 3 == 1
         found.append(Difference(d[:, ~real], d[:, real], D, apart) if real.any() else Difference(d, d, D, apart))
@@ -159,10 +157,10 @@ def with_inside(machine: Machine, name: str) -> Machine:
     machine itself where the node is light.
 
     Heat crosses a body of length l in l^2 / (pi^2 a), the time constant of the slowest cosine (Carslaw and Jaeger,
-    Conduction of heat in solids, 2nd ed. 1959, 3.3); l is EDGES times the edge of a cube of steel of its capacity.
+    Conduction of heat in solids, 2nd ed. 1959, 3.3); l is LONG times the edge of a cube of steel of its capacity.
     """
     node, capacity, inside = machine.nodes[name], node_capacity(machine, name), inside_of(name)
-    settles = (EDGES * (capacity / VOLUMETRIC) ** (1.0 / 3.0)) ** 2 / (np.pi**2 * DIFFUSIVITY)
+    settles = (LONG * (capacity / VOLUMETRIC) ** (1.0 / 3.0)) ** 2 / (np.pi**2 * DIFFUSIVITY)
     if settles < SPLIT_FROM or inside in machine.nodes or inside in machine.contacts:
         return machine
     halves = {

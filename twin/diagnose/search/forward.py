@@ -61,8 +61,8 @@ def search(described: Detector, y: np.ndarray, start: Start | None = None) -> Se
 
 
 def search_again(described: Detector, y: np.ndarray, start: Start, first: Search, least: float) -> Search:
-    """What a first search has found where causes must explain more than `least`. Only where it has named what no longer
-    does is searched anew: what remains of it might not have been named beside something stronger."""
+    """What a first search has found where causes must explain more than `least`, from fits that are known. Anew it is
+    searched only where one of them no longer does: what remains might not have been named without it."""
     fewer = start.detector.at_least(least)
     start = replace(start, detector=fewer, loose=loose_ones(fewer, y, start.fitted, start.x0, start.freed))
     if ended := _one_number(start, y):
@@ -85,6 +85,7 @@ def _one_number(start: Start, y: np.ndarray) -> Search | None:
 
 
 def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
+    """Forward selection from what is known before anything is named."""
     detector, policy, fitted, x = start.detector, start.detector.policy, start.fitted, start.x0
     covariance, loose = start.covariance, start.loose
     accepted, steps = list[Accepted](), list[Step]()
