@@ -41,11 +41,11 @@ check: $(READY) ## style, format, types, the import rules and the size of functi
 	$(BIN)/python -m pytest -q tests/test_complexity.py
 
 .PHONY: test
-test: $(READY) ## every behaviour, with hidden effects of four families in a small machine (5 min)
+test: $(READY) ## every behaviour, with hidden effects of four families in a small machine (13 min on two cores)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 .PHONY: test-long
-test-long: $(READY) ## the rest of what continuous integration runs (some 10 min)
+test-long: $(READY) ## the rest of what continuous integration runs (some 16 min)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "long and not slow" $(PYTEST_ARGS)
 
 .PHONY: test-hidden

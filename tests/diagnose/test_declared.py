@@ -129,6 +129,8 @@ def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
     made = jacobian(detector, x, [(h, 1.0)])
     np.testing.assert_allclose(made, anew, rtol=1e-9, atol=1e-15)
     np.testing.assert_array_equal(jacobian(detector, x + 0.9 * detector.policy.anew, [(h, 1.0)]), made)
+    np.testing.assert_array_equal(jacobian(detector, x, [(h, 1.0 + 0.9 * detector.policy.anew)]), made)
+    assert np.abs(jacobian(detector, x, [(h, 1.0 + 1.1 * detector.policy.anew)]) - made).max() > 0.0
     further = jacobian(detector, x + 1.1 * detector.policy.anew, [(h, 1.0)])
     assert np.abs(further - made).max() > 0.01 * np.abs(made).max()
     assert not np.allclose(anew, detector.fitter.surrogate.at(x)[1], rtol=0.2)

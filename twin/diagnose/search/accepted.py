@@ -79,20 +79,20 @@ def jacobian(detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesi
 
 def _made_anew(detector: Detector, there: np.ndarray, corrected: Sequence[tuple[Hypothesis, float]]) -> np.ndarray:
     """(m, n) of the exact model at parameters there (n,), or of the nearest that this diagnosis has made within `anew`
-    of them."""
-    study = detector.study
-    causes = tuple((h.family, h.name, amplitude) for h, amplitude in corrected)
-    near = [(float(np.abs(there - d.there).max()), d.J) for d in detector.derivatives if d.causes == causes]
+    of them and of the amplitudes."""
+    study, causes = detector.study, tuple((h.family, h.name) for h, _ in corrected)
+    units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
+    at = np.append(there, sizes)
+    near = [(float(np.abs(at - d.there).max()), d.J) for d in detector.derivatives if d.causes == causes]
     distance, J = min(near, key=lambda own: own[0], default=(np.inf, np.zeros(0)))
     if distance < detector.policy.anew:
         return J
-    units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
 
     def of_run(k: int) -> np.ndarray:
         return study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(there)]
 
     J = np.vstack(over_runs(of_run, study.fitted))
-    detector.derivatives.append(Derivatives(causes, there, J))
+    detector.derivatives.append(Derivatives(causes, at, J))
     return J
 
 

@@ -75,8 +75,8 @@ class _Made:
 class Derivatives:
     """Of the outputs by the parameters, at parameters or with signals that no surrogate knows."""
 
-    causes: tuple[tuple[str, str, float], ...]  # family, place and amplitude of those that correct a signal
-    there: np.ndarray  # (n,) prior standard deviations
+    causes: tuple[tuple[str, str], ...]  # family and place of those that correct a signal
+    there: np.ndarray  # (n + causes,) prior standard deviations, then amplitudes: 1 is all of a factor
     J: np.ndarray  # (m, n)
 
 
