@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_CHUNK = 4_000_000  # candidate pixels at a time: bounds the memory to about 400 MB
+_CHUNK = 4_000_000  # pixels of triangles at a time: bounds the memory to about 200 MB
+_EDGE = 1e-9  # pixels by which a triangle is larger than it is: rounding leaves no cracks
 
 
 @dataclass(frozen=True)
@@ -84,44 +85,72 @@ def rasterise(
     y = (high[1] - view[:, 1]) / pixel - 0.5
     corner = np.stack([x, y, view[:, 2]], axis=1)[triangles]  # (m, 3 corners, 3)
 
-    first = np.clip(np.ceil(corner[:, :, :2].min(axis=1)).astype(int), 0, None)
-    last = np.minimum(np.floor(corner[:, :, :2].max(axis=1)).astype(int), [width - 1, height - 1])
-    extent = np.maximum(last - first + 1, 0)
-    count = extent[:, 0] * extent[:, 1]
-
     front = np.full(height * width, -1)
-    weight = np.zeros((height * width, 3))
     depth = np.full(height * width, -np.inf)
-    some = np.flatnonzero(count)
-    for chunk in np.split(some, np.searchsorted(np.cumsum(count[some]), np.arange(_CHUNK, count.sum(), _CHUNK))):
-        if len(chunk) == 0:
-            continue
-        t = np.repeat(chunk, count[chunk])
-        k = np.arange(len(t)) - np.repeat(np.cumsum(count[chunk]) - count[chunk], count[chunk])
-        px = first[t, 0] + k % extent[t, 0]
-        py = first[t, 1] + k // extent[t, 0]
-        bary, inside = _barycentric(corner, t, px, py)
-        t, bary, at = t[inside], bary[inside], (py * width + px)[inside]
-        z = np.einsum("pk,pk->p", corner[t, :, 2], bary)
-        nearer = z > depth[at]
-        t, bary, at, z = t[nearer], bary[nearer], at[nearer], z[nearer]
-        order = np.argsort(z, kind="stable")  # of several candidates for a pixel the last one written stays
-        t, bary, at, z = t[order], bary[order], at[order], z[order]
-        front[at], weight[at], depth[at] = t, bary, z
+    rows = _rows(corner, width, height)
+    ends = np.cumsum(rows.count)
+    for chunk in np.split(np.arange(len(rows.t)), np.searchsorted(ends, np.arange(_CHUNK, rows.count.sum(), _CHUNK))):
+        n = rows.count[chunk]
+        row = np.repeat(chunk, n)
+        px = rows.first[row] + np.arange(len(row)) - np.repeat(np.cumsum(n) - n, n)
+        at = rows.y[row] * width + px
+        z = rows.z[row] + rows.dz[row] * px
+        np.maximum.at(depth, at, z)
+        nearest = z == depth[at]
+        front[at[nearest]] = rows.t[row[nearest]]
+    covered = np.flatnonzero(front >= 0)
+    weight = np.zeros((height * width, 3))
+    weight[covered] = _barycentric(corner, front[covered], covered % width, covered // width)
     shape = (height, width)
     return Raster(front.reshape(shape), weight.reshape(*shape, 3), depth.reshape(shape), pixel)
 
 
-def _barycentric(corner: np.ndarray, t: np.ndarray, px: np.ndarray, py: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Barycentric coordinates (p, 3) of pixel centres in triangles t, and which pixels lie inside."""
+@dataclass(frozen=True)
+class _Rows:
+    """The pixels of triangles, row by row of the picture; each array (r,)."""
+
+    t: np.ndarray  # triangle
+    y: np.ndarray
+    first: np.ndarray  # pixel from the left
+    count: np.ndarray
+    z: np.ndarray  # depth at the picture's left border, and its change per pixel
+    dz: np.ndarray
+
+
+def _rows(corner: np.ndarray, width: int, height: int) -> _Rows:
+    """Which pixel centres triangles (m, 3 corners, 3) cover; on their edges both triangles have them: no cracks."""
+    u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    twice_area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    low = np.clip(np.ceil(corner[:, :, 1].min(axis=1) - _EDGE).astype(int), 0, None)
+    high = np.minimum(np.floor(corner[:, :, 1].max(axis=1) + _EDGE).astype(int), height - 1)
+    n = np.where(twice_area == 0.0, 0, np.maximum(high - low + 1, 0))  # none of what is seen edge-on
+    t = np.repeat(np.arange(len(corner)), n)
+    y = low[t] + np.arange(len(t)) - np.repeat(np.cumsum(n) - n, n)
+    left, right = np.full(len(t), np.inf), np.full(len(t), -np.inf)
+    for k in range(3):
+        (ax, ay), (bx, by) = corner[t, k, :2].T, corner[t, (k + 1) % 3, :2].T
+        # one that lies along the row ends where the two others do
+        crossed = (np.minimum(ay, by) - _EDGE <= y) & (y <= np.maximum(ay, by) + _EDGE) & (ay != by)
+        share = np.clip(np.divide(y - ay, by - ay, where=crossed, out=np.zeros(len(t))), 0.0, 1.0)
+        x = ax + share * (bx - ax)
+        left, right = np.where(crossed, np.minimum(left, x), left), np.where(crossed, np.maximum(right, x), right)
+    first = np.clip(np.ceil(np.clip(left, -1.0, width) - _EDGE).astype(int), 0, None)
+    last = np.minimum(np.floor(np.clip(right, -1.0, width) + _EDGE).astype(int), width - 1)
+    some = last >= first
+    t, y, first, last = t[some], y[some], first[some], last[some]
+    dx = (u[t, 2] * v[t, 1] - v[t, 2] * u[t, 1]) / twice_area[t]
+    dy = (v[t, 2] * u[t, 0] - u[t, 2] * v[t, 0]) / twice_area[t]
+    z = corner[t, 0, 2] - dx * corner[t, 0, 0] + dy * (y - corner[t, 0, 1])
+    return _Rows(t, y, first, last - first + 1, z, dx)
+
+
+def _barycentric(corner: np.ndarray, t: np.ndarray, px: np.ndarray, py: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (p, 3) of pixel centres in triangles t."""
     a, b, c = corner[t, 0], corner[t, 1], corner[t, 2]
     twice_area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
-    safe = np.where(twice_area == 0.0, 1.0, twice_area)  # seen edge-on: no pixel
-    u = ((b[:, 0] - px) * (c[:, 1] - py) - (c[:, 0] - px) * (b[:, 1] - py)) / safe
-    v = ((c[:, 0] - px) * (a[:, 1] - py) - (a[:, 0] - px) * (c[:, 1] - py)) / safe
-    bary = np.stack([u, v, 1.0 - u - v], axis=1)
-    inside = (twice_area != 0.0) & (bary >= -1e-9).all(axis=1)  # shared edges leave no cracks
-    return bary, inside
+    u = ((b[:, 0] - px) * (c[:, 1] - py) - (c[:, 0] - px) * (b[:, 1] - py)) / twice_area
+    v = ((c[:, 0] - px) * (a[:, 1] - py) - (a[:, 0] - px) * (c[:, 1] - py)) / twice_area
+    return np.stack([u, v, 1.0 - u - v], axis=1)
 
 
 def normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from twin.diagnose.plan.suspicion import Suspicion
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.verdict import over_histories
 from twin.logs.run import Run
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
@@ -128,14 +129,14 @@ def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made:
     for k, batch, p in s.batches(detector):
         chosen = s.histories(batch)
         information = now.ready[k].information[p, chosen]
-        today = min(today, _limit(information, threshold, batch, detector.policy.power))
+        today = min(today, _limit(information, threshold, batch, chosen, detector.policy.power))
         rows = [_among(basis.columns, batch.columns[p], batch.histories[h].weights) for h in chosen]
         W = np.stack([basis.spread(of_history) for of_history in rows])  # (h, q, 2 u)
         for e, f in enumerate(made):
             without, then = (_information(F, W) for F in (f.before, f.after))
             share = np.clip(information / np.maximum(without, 1e-30), LEAST, 1.0)
             more = information + share * np.maximum(then - without, 0.0)
-            best[e] = min(best[e], _limit(more, threshold, batch, detector.policy.power))
+            best[e] = min(best[e], _limit(more, threshold, batch, chosen, detector.policy.power))
     proposals = [
         Proposal(f.name, f.words, told(float(size)), float(today / size)) for f, size in zip(made, best, strict=True)
     ]
@@ -148,10 +149,10 @@ def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made:
     )  # fmt: skip
 
 
-def _limit(information: np.ndarray, threshold: float, batch: Batch, power: float) -> float:
-    """The median over histories (h,), as `verdict.limits_at` takes it."""
+def _limit(information: np.ndarray, threshold: float, batch: Batch, chosen: Sequence[int], power: float) -> float:
+    """Of the information (h,) of chosen histories, as `verdict.limits_at` takes it."""
     sizes = (np.sqrt(threshold) + power) / np.sqrt(np.maximum(information, 1e-30))
-    return float(np.median(np.maximum(sizes, batch.smallest)))
+    return float(over_histories([batch.histories[h] for h in chosen], np.maximum(sizes, batch.smallest)))
 
 
 def _hour(detector: Detector, key: Key) -> tuple[str, str, int] | None:

@@ -26,11 +26,14 @@ class Suspicion:
     windowed: bool  # whether its limit is that of causes that switch, for want of others: as `limits_of` takes them
 
     def batches(self, detector: Detector) -> list[tuple[int, Batch, int]]:
-        """Number among the detector's batches, batch, and place in it."""
+        """Number among the detector's batches, batch, and place in it; of those with such histories."""
         return [
             (k, b, b.places.index(self.place))
             for k, b in enumerate(detector.columns.batches)
-            if not b.fixed and (b.family, b.unit) == (self.family, self.unit) and self.place in b.places
+            if not b.fixed
+            and (b.family, b.unit) == (self.family, self.unit)
+            and self.place in b.places
+            and self.histories(b)
         ]
 
     def histories(self, batch: Batch) -> list[int]:

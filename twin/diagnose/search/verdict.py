@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Batch, Hypothesis
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.evidence.sight import sight
 from twin.diagnose.evidence.unknown import history
@@ -262,15 +262,27 @@ def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
             yield own.batch, np.maximum(sizes, own.batch.smallest)
 
 
+def over_histories(histories: Sequence[History], sizes: np.ndarray) -> np.ndarray:
+    """(...,) what stands for the limits (..., h) of so many histories, all of which switch or none does.
+
+    The median over those that follow no signal ("always", or windows). Where every one follows a signal the largest, as
+    which of them it will be is not known: their median may be a third of what the one that acts needs.
+    """
+    steady = [i for i, h in enumerate(histories) if not h.signal]
+    return np.asarray(np.median(sizes[..., steady], axis=-1) if steady else sizes.max(axis=-1))
+
+
 def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
-    """(family, unit, place, whether it switches) -> the median of `limits_in` over histories, the least of batches."""
+    """(family, unit, place, whether it switches) -> `limits_in`, `over_histories`, the least of batches."""
     result: dict[tuple[str, str, str, bool], float] = {}
     for batch, sizes in limits_in(detector):
         for windowed in (False, True):
             chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
-            for p, name in enumerate(batch.places if chosen else ()):
-                key = (batch.family, batch.unit, name, windowed)
-                result[key] = min(float(np.median(sizes[p, chosen])), result.get(key, np.inf))
+            if chosen:
+                told = over_histories([batch.histories[i] for i in chosen], sizes[:, chosen])
+                for name, size in zip(batch.places, told.tolist(), strict=True):
+                    key = (batch.family, batch.unit, name, windowed)
+                    result[key] = min(size, result.get(key, np.inf))
     return result
 
 
