@@ -45,7 +45,20 @@ class Fitter:
         """For parameters with Jacobian J; more: white columns without prior (large variance), (m, k)."""
         own = self.whiten(J) if more is None else np.hstack([self.whiten(J), more])
         cross = own.T @ self.others
-        return Projector.of(np.hstack([own, self.others]), np.block([[own.T @ own, cross], [cross.T, self.gram]]))
+        return Projector.of(own, self.others, gram=np.block([[own.T @ own, cross], [cross.T, self.gram]]))
+
+    @cached_property
+    def _described(self) -> tuple[np.ndarray, np.ndarray, Projector]:
+        f, J = self.surrogate.at(np.zeros(len(self.surrogate.scale)))
+        return f, J, self.projector(J)
+
+    def linear(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Projector]:
+        """Outputs (m,) of the surrogate at parameters x (n,), their Jacobian (m, n) and its projector; at the
+        description, where every fit begins, made once."""
+        if not np.any(x):
+            return self._described
+        f, J = self.surrogate.at(x)
+        return f, J, self.projector(J)
 
     def __call__(self, y: np.ndarray) -> Fitted:
         """Most likely parameters of measurements y (m,), NaN where missing."""
@@ -55,17 +68,17 @@ class Fitter:
         for _ in range(PASSES):
             before = x
             for _ in range(INNER):
-                f, J = self.surrogate.at(x)
-                found = np.clip(self.projector(J).most_likely(self.whiten(y - offset - f + J @ x))[:n], low, high)
+                f, J, projector = self.linear(x)
+                found = np.clip(projector.most_likely(self.whiten(y - offset - f + J @ x))[:n], low, high)
                 moved, x = float(np.abs(found - x).max(initial=0.0)), found
                 if moved < CLOSE:
                     break
             exact = self.study.all_outputs(x)
-            f, J = self.surrogate.at(x)
+            f, J, projector = self.linear(x)
             offset = exact - f
             if np.abs(x - before).max(initial=0.0) < 5 * CLOSE:
                 break
-        return Fitted(x, J, y - exact + J @ x, self.projector(J))
+        return Fitted(x, J, y - exact + J @ x, projector)
 
 
 def bounds(study: Study) -> tuple[np.ndarray, np.ndarray]:

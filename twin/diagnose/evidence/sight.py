@@ -71,12 +71,13 @@ class Sight:
 
 def sight(columns: Columns, projector: Projector, white: np.ndarray) -> Sight:
     """The scores of white residuals (m,)."""
-    N, lower = projector.N, np.tril(projector.factor[0])
-    own = N.shape[1] - len(columns.others)  # the first ones belong to these data: parameters, accepted causes
-    product = _product(np.column_stack([N[:, :own], white]), columns.raw)
+    lower = np.tril(projector.factor[0])
+    # the first ones belong to these data: parameters, accepted causes
+    own = projector.N[:, : len(lower) - len(columns.others)]
+    product = _product(np.column_stack([own, white]), columns.raw)
     B, g = np.vstack([product[:-1], columns.others]), product[-1]
     half = scipy.linalg.solve_triangular(lower, B, lower=True)  # F = D^T D - half^T half
-    g = g - half.T @ scipy.linalg.solve_triangular(lower, N.T @ white, lower=True)
+    g = g - half.T @ scipy.linalg.solve_triangular(lower, projector.seen(white), lower=True)
     blocks = []
     for batch, gram in zip(columns.batches, columns.grams, strict=True):
         of_place = half[:, batch.columns].transpose(1, 0, 2)  # (p, q, L)

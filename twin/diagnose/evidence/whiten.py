@@ -12,6 +12,7 @@ Rasmussen, Williams, Gaussian Processes for Machine Learning, 2006, section 2.7,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -54,22 +55,35 @@ class Whitener:
 class Projector:
     """Pi for nuisance columns N (m, q) of unit prior variance."""
 
-    N: np.ndarray
+    blocks: tuple[np.ndarray, ...]  # of columns of N; side by side only where all are asked for
     factor: tuple[np.ndarray, bool]  # Cholesky of 1 + N^T N
 
     @classmethod
-    def of(cls, N: np.ndarray, gram: np.ndarray | None = None) -> Projector:
+    def of(cls, *blocks: np.ndarray, gram: np.ndarray | None = None) -> Projector:
         """From the columns; gram: N^T N, where it is known."""
-        known = N.T @ N if gram is None else gram
-        return cls(N, scipy.linalg.cho_factor(np.eye(N.shape[1]) + known, lower=True))
+        known = np.block([[a.T @ b for b in blocks] for a in blocks]) if gram is None else gram
+        return cls(blocks, scipy.linalg.cho_factor(np.eye(len(known)) + known, lower=True))
+
+    @cached_property
+    def N(self) -> np.ndarray:
+        return self.blocks[0] if len(self.blocks) == 1 else np.hstack(self.blocks)
 
     def __call__(self, white: np.ndarray) -> np.ndarray:
         """Pi @ white (m, ...)."""
-        return np.asarray(white - self.N @ scipy.linalg.cho_solve(self.factor, self.N.T @ white))
+        return white - self.outputs(self.most_likely(white))
 
     def most_likely(self, white: np.ndarray) -> np.ndarray:
-        """(q,) coordinates of the nuisance in white (m,)."""
-        return np.asarray(scipy.linalg.cho_solve(self.factor, self.N.T @ white))
+        """(q, ...) coordinates of the nuisance in white (m, ...)."""
+        return np.asarray(scipy.linalg.cho_solve(self.factor, self.seen(white)))
+
+    def seen(self, white: np.ndarray) -> np.ndarray:
+        """(q, ...) N^T @ white (m, ...)."""
+        return np.concatenate([block.T @ white for block in self.blocks])
+
+    def outputs(self, coordinates: np.ndarray) -> np.ndarray:
+        """(m, ...) N @ coordinates (q, ...)."""
+        ends = np.cumsum([block.shape[1] for block in self.blocks])
+        return np.asarray(sum(b @ own for b, own in zip(self.blocks, np.split(coordinates, ends[:-1]), strict=True)))
 
 
 def missing(study: Study) -> np.ndarray:

@@ -52,8 +52,10 @@ class Surrogate:
     def at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Outputs (m,) and their Jacobian (m, n) by x."""
         t = self.t(x)
-        bent = self.H @ t.astype(np.float32)
-        return self.y0 + self.J @ t + 0.5 * (bent @ t), (self.J + bent) * self.rate(x)
+        D = self.J + self.H @ t.astype(np.float32)
+        f = self.y0 + 0.5 * (self.J @ t + D @ t)
+        D *= self.rate(x)  # in place: it is large, and `at` is called for every step of every fit
+        return f, D
 
 
 def jacobian_of(study: Study, x: np.ndarray) -> np.ndarray:

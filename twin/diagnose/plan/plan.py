@@ -93,8 +93,8 @@ def make_plan(
     key_of = {c: key for key, c in detector.index.items()}
     keys: tuple[Key, ...] = tuple(key_of[c] for c in columns)
     made = list(foreseen(detector, machine, runs, experiments, keys, noise, progress))
-    _, J = detector.fitter.surrogate.at(np.zeros(len(study.probed.parameters)))
-    now = sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J)))
+    f, _, projector = detector.fitter.linear(np.zeros(len(study.probed.parameters)))
+    now = sight(detector.columns, projector, np.zeros(len(f)))
     basis = Basis(tuple(columns), tuple(_hour(detector, key) for key in keys))
     lone = tuple(_foresight(detector, now, s, basis, made) for s in suspicions)
     return Plan(lone, tuple(_apart(a, b, basis, made, detector.policy.apart) for a, b in pairs), ASSUMPTIONS)

@@ -133,8 +133,8 @@ def _sum(drive: Drive, more: Drive, less: Drive, moving: list[int]) -> Drive:
 def _promising(detector: Detector, y: np.ndarray, of: Callable[[Fault], bool]) -> list[tuple[Hypothesis, np.ndarray]]:
     """Those of some faults and their white responses (m,), to first order, first those that leave least beside the
     description."""
-    f, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
-    projector, white = detector.fitter.projector(J), detector.whiten(y - f)[:, None]
+    f, _, projector = detector.fitter.linear(np.zeros(len(detector.study.probed.parameters)))
+    white = detector.whiten(y - f)[:, None]
     found: list[tuple[float, Hypothesis, np.ndarray]] = []
     for batch in (b for b in detector.columns.batches if of(fault_of(b))):
         D = detector.columns.raw[:, batch.columns[:, 0]].astype(float)
@@ -149,8 +149,7 @@ def _fitted_with(detector: Detector, y: np.ndarray, change: np.ndarray) -> float
     low, high = bounds(detector.study)
     x, left = np.zeros_like(low), np.inf
     for _ in range(detector.policy.first_order_passes):
-        f, J = detector.fitter.surrogate.at(x)
-        projector = detector.fitter.projector(J)
+        f, J, projector = detector.fitter.linear(x)
         white = detector.whiten(y - f + J @ x) - change
         left = float(white @ projector(white))
         x = np.clip(projector.most_likely(white)[: len(x)], low, high)

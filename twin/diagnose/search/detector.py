@@ -138,7 +138,7 @@ def _null_residual(shared: _Nulls, seed: int) -> np.ndarray:
     """What a calibration leaves of a null (m,)."""
     fitter, fitted = shared[0], _fitted_null(shared, seed)
     white = fitter.whiten(fitted.residual)
-    explained = fitted.projector.N @ fitted.projector.most_likely(white)
+    explained = fitted.projector.outputs(fitted.projector.most_likely(white))
     return fitter.whiten.colour(white - explained)
 
 

@@ -113,7 +113,7 @@ def sized_candidates(detector: Detector, projector: Projector, white: np.ndarray
     nominal = motion(detector, None)
     D = detector.whiten(np.column_stack([curved_change(detector, h, h.amplitude[0], nominal) for h in tried]))
     # all at once: N is large, and would be read twice for each of them
-    B = projector.N.T @ np.column_stack([D, white])
+    B = projector.seen(np.column_stack([D, white]))
     half = scipy.linalg.solve_triangular(projector.factor[0], B, lower=True)
     explained = white @ D - half[:, -1] @ half[:, :-1]  # D^T Pi r
     own = (D**2).sum(axis=0) - (half[:, :-1] ** 2).sum(axis=0)  # D^T Pi D

@@ -128,7 +128,7 @@ def _untied(fitted: Fitted, j: int) -> tuple[float, float]:
 
 def _variance(fitted: Fitted, j: int) -> float:
     """Of a parameter beside all nuisances, in prior variances: below 1."""
-    unit = np.zeros(fitted.projector.N.shape[1])
+    unit = np.zeros(len(fitted.projector.factor[0]))
     unit[j] = 1.0
     return min(float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j]), 1.0 - 1e-12)
 
@@ -150,7 +150,7 @@ def _signals(
 def _factors(detector: Detector, j: int) -> Iterator[tuple[Hypothesis, float, float]]:
     """Exact factors of signals: with the cosine of what each and a declared number do, and times what heat, were that
     number a source's, each multiplies it by."""
-    own = detector.whiten(detector.fitter.surrogate.at(np.zeros(len(detector.study.scale)))[1][:, j])
+    own = detector.whiten(detector.fitter.linear(np.zeros(len(detector.study.scale)))[1][:, j])
     own = own / detector.study.scale[j]
     size = float(own @ own)
     for batch in detector.columns.batches:

@@ -229,7 +229,7 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
     low, high = bounds(study)
     sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     x = np.clip(found.x, low, high)
-    moves = _moves(found.detector.fitter.surrogate.at(np.zeros(len(x)))[1] * x, study)
+    moves = _moves(found.detector.fitter.linear(np.zeros(len(x)))[1] * x, study)
     pulls = [
         Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit,
              temperature_change=float(T), displacement_change=float(w))
@@ -254,8 +254,8 @@ def with_faults(
 def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
     """Of every batch whose size is free (p, h): the amplitude that would have been named in 95 of 100 cases, at each
     place with each history."""
-    _, J = detector.fitter.surrogate.at(np.zeros(len(detector.study.probed.parameters)))
-    for own in sight(detector.columns, detector.fitter.projector(J), np.zeros(len(J))).ready:
+    f, _, projector = detector.fitter.linear(np.zeros(len(detector.study.probed.parameters)))
+    for own in sight(detector.columns, projector, np.zeros(len(f))).ready:
         if not own.batch.fixed:
             sigmas = np.sqrt(detector.thresholds[own.batch.family]) + detector.policy.power
             sizes = sigmas / np.sqrt(np.maximum(own.information, 1e-30))
