@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import islice
 
 import numpy as np
 import scipy.linalg
@@ -51,10 +50,15 @@ def closed(
         """What bends scores more than it removes, which a refit tells: each takes seconds, so no more than is asked."""
         return not bent(detector, more[i]) or exact(detector, y, before, more[i]).statistic > removed
 
-    if any(map(removes_more, sorted(passing, key=lambda i: bent(detector, more[i])))):
-        leading = islice(filter(removes_more, range(len(more))), detector.policy.others)
-        if not _stays(detector, before, one, [more[i] for i in leading]):
-            return None
+    def leads(i: int) -> bool:
+        """Whether it is among the first that remove more."""
+        most = detector.policy.others
+        return removes_more(i) and (i < most or sum(map(removes_more, range(i))) < most)
+
+    # beside which it would no longer be as far out of its tolerance: to first order, so that few are refitted
+    instead = [i for i, h in enumerate(more if passing else ()) if not _stays(detector, before, one, h)]
+    if any(map(leads, instead)) and any(map(removes_more, sorted(passing, key=lambda i: bent(detector, more[i])))):
+        return None
     # both begin at the declared number: what either explains is the same but for what is left
     fits = {h.name for h in declared if h.statistic > removed - detector.policy.rival}
     (j,) = freed(detector.study, one.hypothesis)
@@ -188,10 +192,10 @@ def _does_the_same(detector: Detector, one: Accepted, cosine: float, heat: float
     return far and abs(cosine) >= detector.policy.same and heat > 0.0 and abs(np.log(heat) - factor) < 2.0 * sigma
 
 
-def _stays(detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[Hypothesis]) -> bool:
-    """Whether a declared number is as far out of its tolerance beside any of the others, to first order."""
+def _stays(detector: Detector, fitted: Fitted, one: Accepted, other: Hypothesis) -> bool:
+    """Whether a declared number is as far out of its tolerance beside another cause, to first order."""
     (j,) = freed(detector.study, one.hypothesis)
-    return all(abs(_beside(detector, fitted, j, h)) > detector.policy.beyond for h in others)
+    return abs(_beside(detector, fitted, j, other)) > detector.policy.beyond
 
 
 def _beside(detector: Detector, fitted: Fitted, j: int, h: Hypothesis) -> float:
