@@ -6,7 +6,7 @@ import json
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cache, lru_cache
 from itertools import groupby
 from pathlib import Path
@@ -17,19 +17,18 @@ import numpy as np
 from benchmarks.five_axis import EXPERIMENT, machine
 from twin.atomic import atomic_path
 from twin.build.spread import spread
-from twin.calibrate.channels.judge import judge
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.search.accepted import settled
-from twin.diagnose.search.detector import Detector, emptied
+from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
+from twin.diagnose.search.witness import other_measurements
 from twin.inject.draw.trial import draw
 from twin.inject.hidden import Hidden, Trial
 from twin.inject.judge.items import Item, items
@@ -72,12 +71,7 @@ def limit(hidden: Hidden) -> float | None:
 def judged(detector: Detector, trial: Trial) -> dict[str, Any]:
     """One trial: what was hidden, what was said, and what it was worth on the sealed run (of a null nothing)."""
     began = time.perf_counter()
-    names = [planned.run.name for planned in detector.study.runs[:2]]
-    usable, faults = channels_at_fault(trial.runs[:2], judge(trial.runs[:2]), detector.study.probed.base.sensors, names)
-    trial = replace(trial, runs=(*usable, *trial.runs[2:]))
-    plans = plans_of(detector, trial)
-    own = emptied(detector, plans)
-    y = measured_of(with_measured(detector.study, plans))
+    own, plans, y, faults = other_measurements(detector, trial.runs)
     found, _ = searched(own, y)
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
     unknown = unknown_of(found) if verdict == "unknown" else None

@@ -22,20 +22,15 @@ from typing import Any
 
 import numpy as np
 
-from twin.calibrate.channels.judge import judge
-from twin.calibrate.fit.measured import measured
 from twin.cli.main import run as command
-from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.faults.channels_check import channels_at_fault
-from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.report.recalibration import large
 from twin.diagnose.report.text import alike
-from twin.diagnose.search.detector import emptied
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.sealed import judged as on_sealed
 from twin.diagnose.search.verdict import pulls_of, verdict_of, with_faults
+from twin.diagnose.search.witness import other_measurements
 from twin.inject.machines.drawn import HOURS, NOISE, RUNS, SAMPLINGS, DrawnMachine, draw_machine
 from twin.inject.machines.draws import between, one_of
 from twin.inject.machines.loads import loads_of_run
@@ -283,15 +278,7 @@ def _in_log(healthy: Sequence[Path], out: Path, hidden: tuple[str, str, str]) ->
 
 def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     began = time.perf_counter()
-    study = detector.study
-    names = [p.run.name for p in study.runs[:2]]
-    usable, faults = channels_at_fault(runs[:2], judge(runs[:2]), study.probed.base.sensors, names)
-    plans = [
-        measured(study.probed.base, run, p.run.drive, p.run.name)
-        for run, p in zip([*usable, *runs[2:]], study.runs, strict=True)
-    ]
-    own = emptied(detector, plans)
-    y = measured_of(with_measured(study, plans))
+    own, plans, y, faults = other_measurements(detector, runs)
     found, left = searched(own, y)
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
     opened = on_sealed(found, y, verdict, causes, FAMILIES, plans[2:], 1)

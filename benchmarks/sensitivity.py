@@ -16,17 +16,13 @@ from functools import cache
 
 from benchmarks.five_axis import EXPERIMENT, FOLDER, TRUTHS
 from twin.build.workers import each
-from twin.calibrate.channels.judge import judge
-from twin.calibrate.fit.measured import measured
-from twin.diagnose.evidence.whiten import measured_of
-from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.faults.table import FAMILIES
-from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
-from twin.diagnose.search.detector import Detector, emptied
+from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.policy import POLICY, SearchPolicy, rules
 from twin.diagnose.search.verdict import verdict_of, with_faults
+from twin.diagnose.search.witness import other_measurements
 from twin.errors import TwinError
 from twin.inject.stored.recipe import trial_of
 from twin.inject.stored.table import table
@@ -64,13 +60,7 @@ def detector() -> Detector:
 def said(trial: str, policies: list[SearchPolicy]) -> list[Said]:
     """The diagnosis of a trial by each policy."""
     runs, made = trial_of(EXPERIMENT, table(EXPERIMENT)[trial], TRUTHS).runs, detector()
-    study, names = made.study, [p.run.name for p in made.study.runs[:2]]
-    usable, faults = channels_at_fault(runs[:2], judge(runs[:2]), study.probed.base.sensors, names)
-    plans = [
-        measured(study.probed.base, run, p.run.drive, p.run.name)
-        for run, p in zip([*usable, runs[2]], study.runs, strict=True)
-    ]
-    y, own = measured_of(with_measured(study, plans)), emptied(made, plans)
+    own, _, y, faults = other_measurements(made, runs)
     result = []
     for policy in policies:
         verdict, causes = with_faults(*verdict_of(searched(replace(own, policy=policy), y)[0], FAMILIES), faults)

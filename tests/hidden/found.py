@@ -11,18 +11,14 @@ import numpy as np
 from tests.hidden.trials import MODEL, STATES, trial
 from twin.build.cache import folder
 from twin.build.project import orthonormalise, project
-from twin.calibrate.channels.judge import judge
-from twin.calibrate.fit.measured import measured
-from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.faults.channels_check import channels_at_fault
 from twin.diagnose.faults.coarse_model import Coarse, too_coarse
-from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.result.diagnosis import Cause, Verdict
-from twin.diagnose.search.detector import Detector, emptied
+from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.verdict import unknown_of, verdict_of, with_faults
+from twin.diagnose.search.witness import other_measurements
 from twin.machine.load import load_machine
 from twin.rom.model import MachineModel
 
@@ -61,13 +57,8 @@ def said(settings: Settings, name: str) -> Said:
     else:
         detector = made_detector(settings)
     study = detector.study
-    names, sensors = [p.run.name for p in study.runs[:2]], study.probed.base.sensors
-    usable, faults = channels_at_fault(runs[:2], judge(runs[:2]), sensors, names)
-    plans = [
-        measured(study.probed.base, run, p.run.drive, p.run.name)
-        for run, p in zip([*usable, runs[2]], study.runs, strict=True)
-    ]
-    found, _ = searched(emptied(detector, plans), measured_of(with_measured(study, plans)))
+    own, _, y, faults = other_measurements(detector, runs)
+    found, _ = searched(own, y)
     verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
     states, coarse = STATES.get(name), None
     if states:

@@ -44,6 +44,7 @@ from twin.diagnose.search.poor import poor_note
 from twin.diagnose.search.sealed import judged
 from twin.diagnose.search.support import support_of
 from twin.diagnose.search.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
+from twin.diagnose.search.witness import upheld
 from twin.errors import ArtefactError, LogError
 from twin.logs.run import Run
 from twin.logs.trace import Trace
@@ -165,12 +166,14 @@ def diagnose(
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     logged = {n for run in runs if run.temperatures is not None for n in run.temperatures.columns}
     judgement = judge(runs, logged - set(settings.exclude))
-    usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
+    usable, _ = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
-    _, study, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
+    _, _, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     asked = named(settings.plan, detector) if settings.plan else []
-    y = measured_of(study)
+    detector, plans, judgement = upheld(detector, plans, runs, judgement)
+    usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
+    study, y = detector.study, measured_of(detector.study)
     found, dispersion = searched(detector, y)
     detector = raised(detector, dispersion)  # what was searched with in the end
     poor = dispersion.share > settings.policy.dispersed

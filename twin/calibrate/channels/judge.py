@@ -127,12 +127,19 @@ def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
     return replace(run, temperatures=replace(run.temperatures, columns=columns))
 
 
+def share(time: np.ndarray, f: Finding, begins: bool) -> np.ndarray:
+    """(n,) of the size of a leap, offset or drift, what the channel reads too much at times [s] of one of its runs.
+
+    begins: it is at fault from some time of this run on.
+    """
+    since = time >= f.start if begins else np.ones(len(time), dtype=bool)
+    return since * (np.clip((time - f.start) / max(f.end - f.start, 1.0), 0.0, 1.0) if f.what == "drift" else 1.0)
+
+
 def _corrected(values: np.ndarray, time: np.ndarray, f: Finding, begins: bool) -> np.ndarray:
     """A channel less what it reads too much. begins: it is at fault from some time of this run on."""
-    since = time >= f.start if begins else np.ones(len(time), dtype=bool)
-    share = np.clip((time - f.start) / max(f.end - f.start, 1.0), 0.0, 1.0) if f.what == "drift" else 1.0
     unsure = (f.what == "leap") & begins & (np.abs(time - f.start) <= NEAR)
-    return np.where(unsure, np.nan, values - f.size * share * since)
+    return np.where(unsure, np.nan, values - f.size * share(time, f, begins))
 
 
 def _exchanged(columns: Mapping[str, np.ndarray], time: np.ndarray, f: Finding, begins: bool) -> dict[str, np.ndarray]:
