@@ -32,3 +32,8 @@ class Finding:
     interval: tuple[float, float]  # 95 %; that of the size itself where it is read and not estimated
     statistic: float  # twice a log-likelihood ratio; inf where rows of the run itself show it
     least: float = 0.0  # of the statistic, for a name; 0 where rows of the run itself show it
+
+    @property
+    def sized(self) -> bool:
+        """Whether a channel reads too much by a size, from some time on or throughout: what can be corrected."""
+        return self.what in ("leap", "offset", "drift")

@@ -113,7 +113,7 @@ def _without(run: Run, number: int, found: Sequence[Finding]) -> Run:
         if f.what == "swapped" and set(f.channels) <= set(columns):
             columns |= _exchanged(columns, time, f, number == f.runs[0])
             continue
-        if f.what in ("leap", "offset", "drift") and np.ptp(f.interval) <= 2.0 * KNOWN:
+        if f.sized and np.ptp(f.interval) <= 2.0 * KNOWN:
             columns[f.channels[0]] = _corrected(columns[f.channels[0]], time, f, number == f.runs[0])
             continue
         wrong = np.ones(len(time), dtype=bool)

@@ -17,14 +17,11 @@ from twin.calibrate.channels.judge import Judgement, judge, set_aside, share
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.fitter import Fitter
 from twin.diagnose.evidence.whiten import measured_of
-from twin.diagnose.faults.channels_check import channels_at_fault
+from twin.diagnose.faults.channels_check import FAMILY, channels_at_fault
 from twin.diagnose.model.study import Study, with_measured
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.detector import Detector, emptied
 from twin.logs.run import Run
-
-SENSOR = "sensor"  # the family whose threshold a finding must pass
-SIZED = ("leap", "offset", "drift")  # what has a size and a history: no swapped pair
 
 
 def upheld(
@@ -59,8 +56,8 @@ def other_measurements(
 def _stands(
     detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], findings: Sequence[Finding], f: Finding
 ) -> bool:
-    threshold = detector.thresholds.get(SENSOR)
-    if threshold is None or f.what not in SIZED or not np.isfinite(f.statistic):
+    threshold = detector.thresholds.get(FAMILY)
+    if threshold is None or not f.sized or not np.isfinite(f.statistic):
         return True
     fitter, _ = _with_readings(detector, plans, set_aside(runs, [g for g in findings if g is not f]))
     D = fitter.whiten(_column(fitter.study, f))
