@@ -208,13 +208,13 @@ def test_what_one_more_part_of_a_warm_body_explains_is_not_unknown(causes, next_
     assert _more_alike(found, left) == wanted
 
 
-def test_a_limit_is_that_of_what_always_acts_or_of_the_worst_signal():
+def test_a_limit_is_the_median_or_that_of_the_worst_signal():
     always, x, y = (
         History("always", np.ones((1, 1))),
         *(History(name, np.ones((1, 1)), signal=name) for name in ("x_speed", "y_speed")),
     )
     sizes = np.array([[3.0, 8.0, 36.0]])
-    assert over_histories([always, x, y], sizes) == 3.0
+    assert over_histories([always, x, y], sizes) == 8.0
     assert over_histories([x, y], sizes[:, 1:]) == 36.0
     windows = [replace(always, name=f"window {k}", windows=((0, k, k + 1),)) for k in range(3)]
     assert over_histories(windows, sizes) == 8.0

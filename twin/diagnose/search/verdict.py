@@ -265,11 +265,11 @@ def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
 def over_histories(histories: Sequence[History], sizes: np.ndarray) -> np.ndarray:
     """(...,) what stands for the limits (..., h) of so many histories, all of which switch or none does.
 
-    The median over those that follow no signal ("always", or windows). Where every one follows a signal the largest, as
-    which of them it will be is not known: their median may be a third of what the one that acts needs.
+    The median. Where every one follows a signal the largest, as which of them it will be is not known: their median may
+    be a third of what the one that acts needs.
     """
-    steady = [i for i, h in enumerate(histories) if not h.signal]
-    return np.asarray(np.median(sizes[..., steady], axis=-1) if steady else sizes.max(axis=-1))
+    follow = all(h.signal for h in histories)
+    return np.asarray(sizes.max(axis=-1) if follow else np.median(sizes, axis=-1))
 
 
 def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
