@@ -50,6 +50,8 @@ class Fitter:
     @cached_property
     def _described(self) -> tuple[np.ndarray, np.ndarray, Projector]:
         f, J = self.surrogate.at(np.zeros(len(self.surrogate.scale)))
+        for shared in (f, J):
+            shared.flags.writeable = False
         return f, J, self.projector(J)
 
     def linear(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Projector]:
