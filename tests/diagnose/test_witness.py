@@ -11,20 +11,23 @@ from tests.diagnose import small_case
 from twin.calibrate.channels.finding import Finding
 from twin.calibrate.channels.judge import Judgement, set_aside
 from twin.calibrate.fit.measured import Measured, measured
+from twin.diagnose.model.study import Study
 from twin.diagnose.search.detector import emptied
 from twin.diagnose.search.witness import upheld
 from twin.logs.run import Run
+from twin.rom.drive import measured_air
 
 DRIFT, SURE, UNSURE = 2.0, 0.3, 1.0  # K, and half of the intervals of what is corrected and of what is set aside
 
 
-def as_measured(drift: float) -> tuple[list[Run], str]:
+def as_measured(drift: float, study: Study | None = None) -> tuple[list[Run], str]:
     """The two fitted runs as the model has them, with noise; the first sensor drifts [K] through the first one."""
-    study, rng, made = small_case.study(), np.random.default_rng(5), []
+    study, rng, made = study or small_case.study(), np.random.default_rng(5), []
     name = study.runs[0].measured.sensors[0]
     for k, run in enumerate(small_case.runs()[:2]):
         planned, table = study.runs[k], run.temperatures
-        T, _ = planned.split(study.outputs(k, np.zeros(len(study.probed.parameters))))
+        T, w = planned.split(study.outputs(k, np.zeros(len(study.probed.parameters))))
+        tcp = replace(run.tcp, displacement=w + small_case.TCP_NOISE * rng.standard_normal(w.shape))
         time = table.time
         columns = {
             s: np.interp(time, planned.measured.bin_time, T[:, i]) + small_case.NOISE * rng.standard_normal(len(time))
@@ -32,7 +35,7 @@ def as_measured(drift: float) -> tuple[list[Run], str]:
         }
         if k == 0:
             columns[name] = columns[name] + drift * time / time[-1]
-        made.append(replace(run, temperatures=replace(table, columns=columns)))
+        made.append(replace(run, temperatures=replace(table, columns=columns), tcp=tcp))
     return made, name
 
 
@@ -41,24 +44,47 @@ def plans_of(runs: list[Run]) -> list[Measured]:
     return [measured(study.probed.base, run, p.run.drive, p.run.name) for run, p in zip(runs, study.runs, strict=True)]
 
 
+def findings(name: str, runs: list[Run], half: float) -> tuple[Finding, Finding]:
+    """A drift through the first run, by all other channels, and noise in the second, by rows of that run itself."""
+    end = float(runs[0].temperatures.time[-1])
+    told = Finding("drift", (name,), (0,), 0.0, end, DRIFT, (DRIFT - half, DRIFT + half), 80.0, 70.0)
+    return told, replace(told, what="noise", runs=(1,), end=600.0, statistic=np.inf)
+
+
 @pytest.mark.parametrize("half", [SURE, UNSURE])
 @pytest.mark.parametrize("drift", [0.0, DRIFT])
 def test_a_drift_that_the_model_explains_as_it_is_is_none(drift: float, half: float):
     runs, name = as_measured(drift)
-    end = float(runs[0].temperatures.time[-1])
-    told = Finding("drift", (name,), (0,), 0.0, end, DRIFT, (DRIFT - half, DRIFT + half), 80.0, 70.0)
-    noise = replace(told, what="noise", runs=(1,), end=600.0, statistic=np.inf)  # by rows of the run itself
+    told, noise = findings(name, runs, half)
     judgement = Judgement((told, noise), (), ())
     plans = plans_of([*set_aside(runs, judgement.findings), *small_case.runs()[2:]])
-    detector = emptied(small_case.made_detector(), plans)
-    own, left, kept = upheld(detector, plans, runs, judgement)
-    refuted = drift == 0.0 and half == SURE  # of readings that were taken out nothing is asked
-    assert kept.findings == ((noise,) if refuted else judgement.findings)
-    column = plans[0].sensors.index(name)
-    before, after, raw = (p[0].temperature[:, column] for p in (plans, left, plans_of([*runs, *small_case.runs()[2:]])))
-    assert np.isfinite(before).any() == (half == SURE)  # else no reading of that run is kept
-    known = np.isfinite(before)
-    np.testing.assert_allclose(after[known], raw[known] if refuted else before[known])
-    assert not np.isfinite(after[~known]).any()
-    if refuted:
-        np.testing.assert_array_equal(own.study.runs[0].measured.temperature, left[0].temperature)
+    known = np.isfinite(plans[0].temperature[:, plans[0].sensors.index(name)])
+    assert known.any() == (half == SURE)  # else no reading of that run is kept
+    kept = upheld(emptied(small_case.made_detector(), plans), plans, runs, judgement)
+    assert kept.findings == (judgement.findings if drift else (noise,))
+
+
+@pytest.mark.parametrize(("log", "sensor", "stands"), [(0.0, 0.0, False), (0.0, DRIFT, True), (DRIFT, DRIFT, True)])
+def test_air_is_as_measured_where_the_machine_felt_it(log: float, sensor: float, stands: bool):
+    """log, sensor: K by which what drives the model, and the sensor in that air, drift in the first run."""
+    study = small_case.study()
+    base = study.probed.base
+    ((name, e),) = base.ambient_sensors
+    real, made = list(study.runs), list[Run]()
+    ramp = np.linspace(0.0, log, study.runs[0].run.drive.n_steps)
+    air = np.array(real[0].run.loads.environment)
+    air[:, e] -= ramp
+    real[0] = replace(real[0], run=replace(real[0].run, loads=replace(real[0].run.loads, environment=air)))
+    clean, _ = as_measured(0.0, replace(study, runs=tuple(real)))
+    for k, run in enumerate(clean):
+        table, drive = run.temperatures, study.runs[k].run.drive
+        own = np.interp(table.time, drive.time[:-1], measured_air(base.load_model, drive)[:, e])
+        if k == 0:
+            own = own + (sensor - log) * table.time / table.time[-1]
+        units = {**table.units, name: "degC"}
+        made.append(replace(run, temperatures=replace(table, columns={**table.columns, name: own}, units=units)))
+    told, noise = findings(name, made, UNSURE)
+    judgement = Judgement((noise, told), (), ())
+    plans = plans_of([*set_aside(made, judgement.findings), *small_case.runs()[2:]])
+    kept = upheld(emptied(small_case.made_detector(), plans), plans, made, judgement)
+    assert kept.findings == ((noise, told) if stands else (noise,))

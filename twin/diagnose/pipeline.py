@@ -166,13 +166,15 @@ def diagnose(
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     logged = {n for run in runs if run.temperatures is not None for n in run.temperatures.columns}
     judgement = judge(runs, logged - set(settings.exclude))
-    usable, _ = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
+    usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
     _, _, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     asked = named(settings.plan, detector) if settings.plan else []
-    detector, plans, judgement = upheld(detector, plans, runs, judgement)
-    usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
+    told, judgement = judgement, upheld(detector, plans, runs, judgement)
+    if len(judgement.findings) < len(told.findings):
+        usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
+        _, _, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
     study, y = detector.study, measured_of(detector.study)
     found, dispersion = searched(detector, y)
     detector = raised(detector, dispersion)  # what was searched with in the end

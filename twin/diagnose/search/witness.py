@@ -1,8 +1,10 @@
 """The machine's model as a witness beside all other channels: what these refute and it explains is no fault.
 
-Few channels say little of one that is far from all of them: a sensor on a column that heats differently in each run
-looks like one that drifts. The model knows the loads. A finding stands where the model, calibrated to the readings as
-they are, leaves as much as a faulty sensor must explain.
+Few channels say little of one that is far from all of them: a sensor on a column that heats differently in each run, or
+in air that the machine hardly follows, looks like one that drifts. The model knows the loads. A finding stands where
+the model, calibrated to the readings as they are, leaves as much as a faulty sensor must explain; of air, where the
+machine tells that it felt another one. Of readings that were taken out no response is known: what the model predicts
+there must be nearer to them less the fault than to what they are.
 """
 
 from __future__ import annotations
@@ -22,21 +24,14 @@ from twin.diagnose.model.study import Study, with_measured
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.detector import Detector, emptied
 from twin.logs.run import Run
+from twin.rom.drive import measured_air
 
 
-def upheld(
-    detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement
-) -> tuple[Detector, list[Measured], Judgement]:
-    """What is left of a judgement, and detector and plans with the readings of what is not.
-
-    plans: of the fitted runs with all findings set aside, then of sealed ones. runs: the fitted ones as they were
-    measured. Only what was corrected is asked about: for readings that were taken out the detector has no responses.
-    """
-    stands = tuple(f for f in judgement.findings if _stands(detector, plans, runs, judgement.findings, f))
-    if len(stands) == len(judgement.findings):
-        return detector, list(plans), judgement
-    fitter, left = _with_readings(detector, plans, set_aside(runs, stands))
-    return replace(detector, study=fitter.study, fitter=fitter), left, replace(judgement, findings=stands)
+def upheld(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement) -> Judgement:
+    """What is left of a judgement. Detector and plans: of the runs with all findings set aside, `runs` being the fitted
+    ones as they were measured; who made them makes them anew where something of it is not left."""
+    told = judgement.findings
+    return replace(judgement, findings=tuple(f for f in told if _stands(detector, plans, runs, told, f)))
 
 
 def other_measurements(
@@ -46,10 +41,17 @@ def other_measurements(
     fitted ones measured (m,), and the channels at fault. For campaigns: `twin diagnose` makes a detector of its own."""
     study, n = detector.study, len(detector.study.fitted)
     names, sensors, judgement = [p.run.name for p in study.runs[:n]], study.probed.base.sensors, judge(runs[:n])
-    sound = [*channels_at_fault(runs[:n], judgement, sensors, names)[0], *runs[n:]]
-    plans = [measured(study.probed.base, r, p.run.drive, p.run.name) for r, p in zip(sound, study.runs, strict=True)]
-    own, plans, judgement = upheld(emptied(detector, plans), plans, runs[:n], judgement)
-    faults = channels_at_fault(runs[:n], judgement, sensors, names)[1]
+
+    def beside(judgement: Judgement) -> tuple[Detector, list[Measured], list[Cause]]:
+        sound, faults = channels_at_fault(runs[:n], judgement, sensors, names)
+        every = zip([*sound, *runs[n:]], study.runs, strict=True)
+        plans = [measured(study.probed.base, run, p.run.drive, p.run.name) for run, p in every]
+        return emptied(detector, plans), plans, faults
+
+    own, plans, faults = beside(judgement)
+    kept = upheld(own, plans, runs[:n], judgement)
+    if len(kept.findings) < len(judgement.findings):
+        own, plans, faults = beside(kept)
     return own, plans, measured_of(with_measured(study, plans)), faults
 
 
@@ -59,27 +61,92 @@ def _stands(
     threshold = detector.thresholds.get(FAMILY)
     if threshold is None or not f.sized or not np.isfinite(f.statistic):
         return True
-    fitter, _ = _with_readings(detector, plans, set_aside(runs, [g for g in findings if g is not f]))
+    base = detector.study.probed.base
+    air = dict(base.ambient_sensors).get(f.channels[0])
+    if air is not None:
+        return _air_stands(detector, plans, runs, f, air, threshold)
+    fitter = _with_readings(detector, plans, set_aside(runs, [g for g in findings if g is not f]))
     D = fitter.whiten(_column(fitter.study, f))
-    if not D.any():  # no sensor of the machine, or its readings were taken out
-        return True
+    if not D.any():
+        return f.channels[0] not in base.sensors or _nearer_corrected(detector, plans, runs, f)
     fitted = fitter(measured_of(fitter.study))
     seen = fitted.projector(D)
     return float(seen @ fitter.whiten(fitted.residual)) ** 2 > threshold * float(seen @ D)
 
 
-def _with_readings(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run]) -> tuple[Fitter, list[Measured]]:
-    """The fitter and plans with the readings of the fitted runs, where the plans have any; sealed ones stay."""
-    study, left = detector.study, list(plans)
+def _nearer_corrected(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], f: Finding) -> bool:
+    """Of readings that were taken out, for which the detector has no responses: whether what the model predicts beside
+    the others is nearer to the readings less the fault than to what they are."""
+    study = detector.study
+    y, name = measured_of(with_measured(study, plans)), f.channels[0]
+    outputs = study.all_outputs(detector.fitter(y).x)
+    off, of_fault = list[np.ndarray](), list[np.ndarray]()
+    for number, (planned, T, _) in enumerate(study.split(outputs)):
+        m = planned.measured
+        raw = measured(study.probed.base, runs[number], planned.run.drive, m.name)
+        if name in raw.sensors and name in m.sensors and raw.temperature.shape[0] == len(T):
+            off.append(raw.temperature[:, raw.sensors.index(name)] - T[:, m.sensors.index(name)])
+            of_fault.append(_of_run(m.bin_time, f, number))
+    difference, column = np.concatenate([np.zeros(0), *off]), np.concatenate([np.zeros(0), *of_fault])
+    known = np.isfinite(difference)
+    if not column[known].any():
+        return True
+    A = column[known, None] if np.ptp(column[known]) == 0.0 else np.column_stack([column, np.ones(len(column))])[known]
+    return float(np.linalg.lstsq(A, difference[known], rcond=None)[0][0]) / f.size > 0.5
+
+
+def _air_stands(
+    detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], f: Finding, e: int, threshold: float
+) -> bool:
+    """Of a sensor in the air that drives the model: whether the machine felt another air than was measured, and one
+    nearer to what was measured less the fault."""
+    study, blocks = detector.study, detector.elements.histories.blocks
+    load = study.probed.base.load_model
+    name = load.environments[e].name
+    columns = [
+        detector.index[key] for b in range(len(blocks)) if (key := ("air", name, f"block {b}")) in detector.index
+    ]
+    if not load.environments[e].signal or len(columns) < len(blocks):
+        return True
+    means, off, of_fault = np.zeros(len(blocks)), list[np.ndarray](), list[np.ndarray]()
+    for number, k in enumerate(study.fitted):
+        drive, table = study.runs[k].run.drive, runs[number].temperatures
+        middle = (drive.time[:-1] + drive.time[1:]) / 2
+        of_run = f.size * _of_run(middle, f, number)
+        for b, (i, first, end) in enumerate(blocks):
+            means[b] = of_run[first:end].mean() if i == number else means[b]
+        if table is not None and f.channels[0] in table.columns:
+            values = table.columns[f.channels[0]]
+            known = np.isfinite(values)
+            off.append(np.interp(middle, table.time[known], values[known]) - measured_air(load, drive)[:, e])
+            of_fault.append(of_run)
+    warmer = detector.columns.raw[:, columns].astype(float) @ means
+    if not warmer.any():
+        return True
+    fitted = detector.fitter(measured_of(with_measured(study, plans)))
+    seen = fitted.projector(warmer)
+    difference, column = np.concatenate(off), np.concatenate(of_fault)
+    taken_off = float(column @ difference) / float(column @ column)  # of the fault, before the model was driven by it
+    total = taken_off - float(seen @ detector.whiten(fitted.residual)) / float(seen @ warmer)
+    return total > 0.5 and total**2 * float(seen @ warmer) > threshold
+
+
+def _of_run(time: np.ndarray, f: Finding, number: int) -> np.ndarray:
+    """(n,) of the size of a finding, what its channel reads too much at times [s] of a fitted run."""
+    return share(time, f, number == f.runs[0]) if number in f.runs else np.zeros(len(time))
+
+
+def _with_readings(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run]) -> Fitter:
+    """The fitter with the readings of the fitted runs, where the plans have any."""
+    study, told = detector.study, [p.measured for p in detector.study.runs]
     for k, run in zip(study.fitted, runs, strict=True):
         unused = [s for s in study.probed.base.sensors if s not in plans[k].sensors]
         own = measured(study.probed.base, run, study.runs[k].run.drive, plans[k].name, exclude=unused)
         if own.temperature.shape == plans[k].temperature.shape:
             known = np.isfinite(plans[k].temperature)
-            left[k] = replace(plans[k], temperature=np.where(known, own.temperature, np.nan))
-    told = [left[k] if k in study.fitted else p.measured for k, p in enumerate(study.runs)]
+            told[k] = replace(plans[k], temperature=np.where(known, own.temperature, np.nan))
     study = with_measured(study, told)
-    return replace(detector.fitter, study=study, whiten=replace(detector.whiten, study=study)), left
+    return replace(detector.fitter, study=study, whiten=replace(detector.whiten, study=study))
 
 
 def _column(study: Study, f: Finding) -> np.ndarray:
@@ -88,7 +155,7 @@ def _column(study: Study, f: Finding) -> np.ndarray:
     for number, k in enumerate(study.fitted):
         m = study.runs[k].measured
         reads, tcp = np.zeros(m.temperature.shape), np.zeros(m.tcp.shape)
-        if number in f.runs and f.channels[0] in m.sensors:
-            reads[:, m.sensors.index(f.channels[0])] = share(m.bin_time, f, number == f.runs[0])
+        if f.channels[0] in m.sensors:
+            reads[:, m.sensors.index(f.channels[0])] = _of_run(m.bin_time, f, number)
         parts += [reads.ravel(), tcp.ravel()]
     return np.concatenate(parts)
