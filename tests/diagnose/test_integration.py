@@ -16,7 +16,7 @@ from twin.diagnose.faults.elements import elements_of
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.model.bank import nominal_run
-from twin.diagnose.model.integration import loads_for, states_of
+from twin.diagnose.model.integration import loads_for, stands_still, states_of
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.slots import no_slots
 from twin.diagnose.model.study import Study, make_study
@@ -46,8 +46,9 @@ def test_without_slots_it_is_the_integration_of_a_calibration(spread):
     x = spread * np.random.default_rng(1).standard_normal(len(probed.parameters))
     v = np.concatenate([x * study.scale, np.zeros(2)])
     empty = no_slots(planned.run.drive.n_steps, 2, model.n, model)
-    got = states_of(probed.layout, probed.contacts, False, probed.system, study.effects,
-                    loads_for(model, planned.run.drive), empty, planned.z0, v)  # fmt: skip
+    own = loads_for(model, planned.run.drive)
+    got = states_of(probed.layout, probed.contacts, False, stands_still(probed.layout, own, empty), probed.ports_first,
+                    study.effects, own, empty, planned.z0, v)  # fmt: skip
     loads = plain.loads_for(model, planned.run.drive, 40)
     wanted = plain.trajectory(
         probed.layout, probed.contacts, False, probed.system, study.effects, loads, planned.z0, x * study.scale

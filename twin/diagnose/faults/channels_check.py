@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
+import numpy as np
+
 from twin.calibrate.channels.finding import UNITS, Finding
 from twin.calibrate.channels.judge import Judgement, set_aside
+from twin.diagnose.faults.elements import Elements
 from twin.diagnose.result.diagnosis import Cause, Window
 from twin.logs.faults.usable import BROKEN, usable
 from twin.logs.run import Run
@@ -28,6 +31,11 @@ def channels_at_fault(
     told = {(k, channel) for f in judgement.findings for k in f.runs for channel in f.channels}
     causes = [_cause(f, runs, names) for f in judgement.findings]
     return sound, causes + _leaps(sound, sensors, names, told)
+
+
+def warmer_air(elements: Elements, environment: str) -> np.ndarray:
+    """(blocks,) columns of 1 K warmer air of an environment, one per block; none where no film is in it."""
+    return elements.block_of.get(("air", environment), np.zeros(0, dtype=int))
 
 
 def _cause(f: Finding, runs: Sequence[Run], names: Sequence[str]) -> Cause:

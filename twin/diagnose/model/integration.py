@@ -26,7 +26,7 @@ from jax.scipy.linalg import cho_solve
 
 from twin.calibrate.fit.effects import Effects, Factors, factors_at
 from twin.calibrate.fit.integration import Rows, displacements, temperatures
-from twin.diagnose.model.ports_first import Basis, basis, turned, within
+from twin.diagnose.model.ports_first import PortsFirst, packed, unpacked, within
 from twin.diagnose.model.slots import Slots
 from twin.rom.contact_matrix import ContactEntries, ContactPlaces, dense, entries_by_contact, product, scaled
 from twin.rom.drive import Drive
@@ -34,7 +34,7 @@ from twin.rom.model import MachineModel
 from twin.rom.step_loads import Tabulated, film_loads, source_powers
 from twin.rom.tableau import SDIRK2
 from twin.run.integrator import integrate, solved
-from twin.run.system import Array, Layout, System
+from twin.run.system import Array, Layout
 
 LITTLE = 0.5  # K, of a surface above its air: the room's own draught is left below it
 
@@ -118,38 +118,47 @@ def _change(places: ContactPlaces, many: bool) -> Callable[[_Fixed, tuple[jax.Ar
 
 @dataclass(frozen=True)
 class Operators:
-    """What stays during a trajectory, in the coordinates of `twin.diagnose.model.ports_first`."""
+    """What stays during a trajectory, in the coordinates of `twin.diagnose.model.ports_first`; t = r (r + 1) / 2."""
 
-    A: jax.Array  # (p, r, r): terms of films and joints, then of slots
-    terms: jax.Array  # (q, r, r): of E: of the model's capacities, then of slots
-    factors: jax.Array  # (q,) of these
+    A: jax.Array  # (p, t): terms of films, of joints unless these are still, then of slots
+    still: jax.Array  # (t,): A0 with the terms of still joints
     E: jax.Array  # (r, r), many: its derivatives left out
-    ports: Basis
+    packed_E: jax.Array  # (t,)
+    terms: jax.Array  # (q, r, r), many: all that is added to A0, then of E: of the model's capacities, then of slots
+    factors: jax.Array  # (c,) of the terms of E
     B: jax.Array  # (r, n_sources)
     reads: jax.Array  # (l, r): temperatures that sources follow
     M: jax.Array  # (K, r) of slots
 
     @classmethod
     def of(
-        cls, system: System, effects: Effects, slots: Slots, f: Factors, a: jax.Array, ports: Basis, many: bool
-    ) -> Operators:
-        """At factors f and amplitudes a; system: turned."""
-        T = ports.T
-        A = jnp.concatenate([jnp.asarray(system.A[0]), within(T, slots.A)])
+        cls, layout: Layout, many: bool, still: jax.Array | None, machine: PortsFirst, effects: Effects, slots: Slots,
+        f: Factors, a: jax.Array,
+    ) -> Operators:  # fmt: skip
+        """At factors f and amplitudes a. still: (n_joints,) W/K of joints over their nominal ones in all steps."""
+        n, T, system = layout.n_films, machine.ports.T, machine.system
+        A, of_slots = jnp.asarray(system.A[0]), packed(within(T, slots.A))
         terms = within(T, jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)]))
         factors = jnp.concatenate([f.capacity - 1.0, a])
-        E = T.T @ T + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
+        E = machine.E + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
+        moving = jnp.concatenate([A if still is None else A[:n], of_slots])
+        rest = jnp.asarray(system.A0[0])
+        if still is not None:
+            rest = rest + (lax.stop_gradient(still) if many else still) @ A[n:]
+        r = len(T)
+        every = jnp.concatenate([unpacked(jnp.concatenate([A, of_slots]), r), terms]) if many else jnp.zeros((0, r, r))
         B = jnp.asarray(system.B) + jnp.tensordot(a, T.T @ jnp.asarray(slots.B), 1)
         reads = jnp.asarray(system.source_rows) + jnp.tensordot(a, jnp.asarray(slots.reads) @ T, 1)
-        return cls(A, terms, factors, E, ports, B, reads, jnp.asarray(slots.M) @ T)
+        return cls(moving, rest, E, packed(E), every, factors, B, reads, jnp.asarray(slots.M) @ T)
 
 
 def _step(
-    layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, f: Factors, a: jax.Array,
+    layout: Layout, places: ContactPlaces, many: bool, still: bool, machine: PortsFirst, f: Factors, a: jax.Array,
     fixed: Operators, z: jax.Array, now: tuple[ProbedLoads, Slots],
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     """The state (r,) after a step, twice."""
     loads, slots = now
+    system = machine.system
     n, T_ref = layout.n_films, system.reference_temperature
     losing = np.array(layout.following_losses, dtype=int)
     environment = jnp.asarray(loads.environment) + f.environment + a @ jnp.asarray(slots.environment)
@@ -167,19 +176,19 @@ def _step(
     contact = f.contact * jnp.maximum(1.0 + a @ jnp.asarray(slots.contact), 0.02)
     P, rate = jnp.asarray(system.P[0]), jnp.asarray(loads.rate) / SDIRK2.diagonal
     gate = a * jnp.asarray(slots.gate)
-    coefficients = jnp.concatenate([jnp.concatenate([films.total, joints]) - jnp.asarray(system.nominal), gate])
-    valued = lax.stop_gradient(coefficients) if many else coefficients
-    matrix = rate * fixed.E + jnp.asarray(system.A0[0]) + jnp.tensordot(valued, fixed.A, 1)
-    if many:
-        c, terms = jnp.concatenate([coefficients, rate * fixed.factors]), jnp.concatenate([fixed.A, fixed.terms])
-    else:
-        c, terms = matrix, jnp.zeros(())
+    nominal = jnp.asarray(system.nominal)
+    coefficients = jnp.concatenate([films.total - nominal[:n], joints - nominal[n:], gate])
+    moving = jnp.concatenate([coefficients[:n], gate]) if still else coefficients
+    total = rate * fixed.packed_E + fixed.still + (lax.stop_gradient(moving) if many else moving) @ fixed.A
+    matrix = unpacked(total, len(z))
+    c = jnp.concatenate([coefficients, rate * fixed.factors]) if many else matrix
 
     def capacity(x: jax.Array) -> jax.Array:
         if not many:
             return rate * (fixed.E @ x)
         change = fixed.factors - lax.stop_gradient(fixed.factors)
-        return rate * (fixed.E @ x + change @ (fixed.terms @ lax.stop_gradient(x)))
+        own = fixed.terms[len(coefficients) :]
+        return rate * (fixed.E @ x + change @ (own @ lax.stop_gradient(x)))
 
     told = Tabulated(
         jnp.asarray(loads.power) * f.source, layout.following_losses,
@@ -191,8 +200,9 @@ def _step(
     forcing = forcing + fixed.B @ power + ports
     forcing = forcing + (gate * jnp.asarray(slots.rise)) @ fixed.M + a @ jnp.asarray(slots.forcing)
     gamma = dense(jnp, places, scaled(jnp, places, loads.contacts, lax.stop_gradient(contact)))
-    factor = jnp.linalg.cholesky(fixed.ports.joined(lax.stop_gradient(matrix), gamma))
-    known = _Fixed(factor, terms, loads.contacts, P)
+    coupled = machine.ports.joined(lax.stop_gradient(matrix), gamma)
+    factor = lax.linalg.cholesky(coupled, symmetrize_input=False)  # it reads the lower triangle
+    known = _Fixed(factor, fixed.terms, loads.contacts, P)
     change = _change(places, many)
 
     def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -204,62 +214,71 @@ def _step(
 
 
 def trajectory(
-    layout: Layout, places: ContactPlaces, many: bool, system: System, effects: Effects, loads: ProbedLoads,
-    slots: Slots, start: Array, v: Array,
+    layout: Layout, places: ContactPlaces, many: bool, still: bool, machine: PortsFirst, effects: Effects,
+    loads: ProbedLoads, slots: Slots, start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
-    """States (n + 1, r) from start (r,); v: parameters u of the machine, then amplitudes a (K,)."""
+    """States (n + 1, r) from start (r,); v: parameters u of the machine, then amplitudes a (K,) of all slots.
+
+    still: joints conduct alike in all steps (`stands_still`), which takes their terms out of every step.
+    """
     n = effects.source.shape[1]
     v = jnp.asarray(v)
     u, a = v[:n], v[n:]
     f = factors_at(effects, u)
-    ports = basis(system.P[0])
-    T = ports.T
+    T = machine.ports.T
     z0 = jnp.asarray(start) + a @ jnp.asarray(slots.initial)
-    system = turned(system, T)
-    fixed = Operators.of(system, effects, slots, f, a, ports, many)
+    films = layout.n_films
+    joints = jnp.asarray(loads.theta)[0, films:] * f.joint - jnp.asarray(machine.system.nominal)[films:]
+    fixed = Operators.of(layout, many, joints if still else None, machine, effects, slots, f, a)
     loads = replace(loads, contact_heat=jnp.asarray(loads.contact_heat) @ T)
     unused = jnp.zeros(len(loads.rate))
     steps = replace(
         slots, A=unused, M=unused, E=unused, B=unused, reads=unused, initial=unused,
         forcing=jnp.asarray(slots.forcing) @ T,
     )  # fmt: skip
-    one = partial(_step, layout, places, many, system, effects, f, a, fixed)
+    one = partial(_step, layout, places, many, still, machine, f, a, fixed)
     _, states = lax.scan(one, jnp.linalg.solve(T, z0), (loads, steps))
     return jnp.concatenate([z0[None], states @ T.T])
 
 
+def stands_still(layout: Layout, loads: ProbedLoads, slots: Slots) -> bool:
+    """Whether joints conduct in all steps of a run as in the first."""
+    joints = np.asarray(loads.theta)[:, layout.n_films :]
+    return bool(np.all(joints == joints[:1]) and not np.any(slots.joint))
+
+
 def outputs_of(
-    layout: Layout, places: ContactPlaces, many: bool, from_first: bool, system: System, effects: Effects,
-    loads: ProbedLoads, slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
+    layout: Layout, places: ContactPlaces, many: bool, still: bool, from_first: bool, machine: PortsFirst,
+    effects: Effects, loads: ProbedLoads, slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
     """Means of sensors over bins (b s,) [degC], then TCP rows (k 3,) [m]."""
-    states = trajectory(layout, places, many, system, effects, loads, slots, start, v)
+    states = trajectory(layout, places, many, still, machine, effects, loads, slots, start, v)
     mean_of, column = bins
-    T = jnp.asarray(mean_of) @ temperatures(system, states)[:, column]
+    T = jnp.asarray(mean_of) @ temperatures(machine.system, states)[:, column]
     w = displacements(effects, rows, states, jnp.asarray(v))
     return jnp.concatenate([T.ravel(), (w - w[0] if from_first else w).ravel()])
 
 
-outputs = partial(jax.jit, static_argnums=(0, 1, 2, 3))(outputs_of)
-states_of = partial(jax.jit, static_argnums=(0, 1, 2))(trajectory)
+outputs = partial(jax.jit, static_argnums=(0, 1, 2, 3, 4))(outputs_of)
+states_of = partial(jax.jit, static_argnums=(0, 1, 2, 3))(trajectory)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def jacobian(layout: Layout, places: ContactPlaces, from_first: bool, *rest: object) -> jax.Array:
+@partial(jax.jit, static_argnums=(0, 1, 2, 3))
+def jacobian(layout: Layout, places: ContactPlaces, still: bool, from_first: bool, *rest: object) -> jax.Array:
     """Derivatives (b s + k 3, n + K) of `outputs_of` by v."""
-    return jax.jacfwd(partial(outputs_of, layout, places, True, from_first), argnums=len(rest) - 1)(*rest)
+    return jax.jacfwd(partial(outputs_of, layout, places, True, still, from_first), argnums=len(rest) - 1)(*rest)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
+@partial(jax.jit, static_argnums=(0, 1, 2, 3))
 def by_amplitudes(
-    layout: Layout, places: ContactPlaces, from_first: bool, system: System, effects: Effects, loads: ProbedLoads,
-    slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, u: Array, a: Array,
+    layout: Layout, places: ContactPlaces, still: bool, from_first: bool, machine: PortsFirst, effects: Effects,
+    loads: ProbedLoads, slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, u: Array, a: Array,
 ) -> tuple[jax.Array, jax.Array]:  # fmt: skip
     """Derivatives (b s + k 3, K) of `outputs_of` by the amplitudes alone, and the outputs."""
 
     def both(a: jax.Array) -> tuple[jax.Array, jax.Array]:
         v = jnp.concatenate([jnp.asarray(u), a])
-        y = outputs_of(layout, places, False, from_first, system, effects, loads, slots, rows, bins, start, v)
+        y = outputs_of(layout, places, False, still, from_first, machine, effects, loads, slots, rows, bins, start, v)
         return y, y
 
     return jax.jacfwd(both, has_aux=True)(jnp.asarray(a))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from twin.calibrate.fit.measured import tcp_positions
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
 from twin.diagnose.model.integration import ProbedLoads, loads_for
+from twin.diagnose.model.ports_first import PortsFirst
 from twin.diagnose.model.rich_probed_model import Mesh, RichProbedModel, rich_probed_model
 from twin.errors import LogError
 from twin.logs.run import Run
@@ -72,6 +74,11 @@ class ProbedModel:
     displaced: np.ndarray  # (n_sensors, r): sensors moved aside; the sensors themselves on lumped machines
     runs: tuple[ProbedRun, ...]
     reduction: tuple[float, float]  # K, m: rms of what the window leaves of held-out trajectories at the worst output
+
+    @cached_property
+    def ports_first(self) -> PortsFirst:
+        """The system as it is stepped."""
+        return PortsFirst.of(self.system)
 
 
 def drive_of(model: MachineModel, run: Run, dt: float = STEP) -> Drive:

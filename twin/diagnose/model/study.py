@@ -12,7 +12,7 @@ import numpy as np
 from twin.calibrate.fit.effects import Effects, effects_of
 from twin.calibrate.fit.integration import Rows, displacements
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.model.integration import by_amplitudes, jacobian, outputs, states_of
+from twin.diagnose.model.integration import by_amplitudes, jacobian, outputs, stands_still, states_of
 from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.probed_model import ProbedModel, ProbedRun
 from twin.diagnose.model.slots import Slots, first_slots, no_slots
@@ -104,25 +104,29 @@ class Study:
 
     def outputs(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """(size,) of run k at x (n,) in prior standard deviations, with hypotheses of amplitudes a."""
-        layout, contacts, from_first = self._fixed(k)
-        return np.asarray(outputs(layout, contacts, False, from_first, *self._arguments(k, slots), self._v(x, a)))
+        own = self._acting(k, slots, a)
+        layout, contacts, *rest = self._fixed(k, own)
+        return np.asarray(outputs(layout, contacts, False, *rest, *self._arguments(k, own), self._v(x, a)))
 
     def jacobian(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
-        """(size, n + K) derivatives by x and the amplitudes."""
-        J = jacobian(*self._fixed(k), *self._arguments(k, slots), self._v(x, a))
-        return np.asarray(J) * np.concatenate([self.scale, np.ones(K)])
+        """(size, n + len(a)) derivatives by x and the amplitudes."""
+        own = self._acting(k, slots, a)
+        J = jacobian(*self._fixed(k, own), *self._arguments(k, own), self._v(x, a))
+        return np.asarray(J) * np.concatenate([self.scale, np.ones(len(a))])
 
     def by_amplitudes(self, k: int, x: np.ndarray, slots: Slots, a: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Outputs (size,) of run k and their derivatives (size, len(a)) by the amplitudes of the first len(a) slots."""
-        arguments = self._arguments(k, first_slots(slots, len(a)))
-        D, y = by_amplitudes(*self._fixed(k), *arguments, self._v(x, ())[:-K], np.array(a, dtype=float))
+        own = self._acting(k, slots, a)
+        arguments = self._arguments(k, own)
+        D, y = by_amplitudes(*self._fixed(k, own), *arguments, self._v(x, ()), np.array(a, dtype=float))
         return np.asarray(y), np.asarray(D)
 
     def states(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """z (n + 1, r) of run k."""
-        system, effects, loads, filled, _, _, z0 = self._arguments(k, slots)
-        layout, contacts, _ = self._fixed(k)
-        return np.asarray(states_of(layout, contacts, False, system, effects, loads, filled, z0, self._v(x, a)))
+        own = self._acting(k, slots, a)
+        layout, contacts, still, _ = self._fixed(k, own)
+        machine, effects, loads, _, _, _, z0 = self._arguments(k, own)
+        return np.asarray(states_of(layout, contacts, False, still, machine, effects, loads, own, z0, self._v(x, a)))
 
     def read(self, k: int, states: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What sensors (b, s) [degC] and the TCP (k, 3) [m] show of states of run k, as `outputs` reads them."""
@@ -134,19 +138,22 @@ class Study:
         return T, w - w[0] if m.from_first else w
 
     def _v(self, x: np.ndarray, a: Sequence[float]) -> np.ndarray:
-        amplitudes = np.zeros(K)
-        amplitudes[: len(a)] = a
-        return np.concatenate([np.asarray(x) * self.scale, amplitudes])
+        return np.concatenate([np.asarray(x) * self.scale, np.asarray(a, dtype=float)])
 
-    def _fixed(self, k: int) -> tuple[Layout, ContactPlaces, bool]:
+    def _acting(self, k: int, slots: Slots | None, a: Sequence[float]) -> Slots:
+        """As many slots as there are amplitudes: every other one costs a step what a film does."""
+        return first_slots(self.slots(k) if slots is None else slots, len(a))
+
+    def _fixed(self, k: int, slots: Slots) -> tuple[Layout, ContactPlaces, bool, bool]:
         """What the integration of run k is compiled for."""
-        return self.probed.layout, self.probed.contacts, self.runs[k].measured.from_first
+        probed, planned = self.probed, self.runs[k]
+        still = stands_still(probed.layout, planned.run.loads, slots)
+        return probed.layout, probed.contacts, still, planned.measured.from_first
 
-    def _arguments(self, k: int, slots: Slots | None) -> tuple:
+    def _arguments(self, k: int, slots: Slots) -> tuple:
         planned = self.runs[k]
         m = planned.measured
-        filled = self.slots(k) if slots is None else slots
-        return (self.probed.system, self.effects, planned.run.loads, filled, planned.rows, (m.mean_of, m.column),
+        return (self.probed.ports_first, self.effects, planned.run.loads, slots, planned.rows, (m.mean_of, m.column),
                 planned.z0)  # fmt: skip
 
 

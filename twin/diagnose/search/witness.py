@@ -19,7 +19,7 @@ from twin.calibrate.channels.judge import Judgement, judge, set_aside, share
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.fitter import Fitter
 from twin.diagnose.evidence.whiten import measured_of
-from twin.diagnose.faults.channels_check import FAMILY, channels_at_fault
+from twin.diagnose.faults.channels_check import FAMILY, channels_at_fault, warmer_air
 from twin.diagnose.model.study import Study, with_measured
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.detector import Detector, emptied
@@ -103,10 +103,8 @@ def _air_stands(
     study, blocks = detector.study, detector.elements.histories.blocks
     load = study.probed.base.load_model
     name = load.environments[e].name
-    columns = [
-        detector.index[key] for b in range(len(blocks)) if (key := ("air", name, f"block {b}")) in detector.index
-    ]
-    if not load.environments[e].signal or len(columns) < len(blocks):
+    columns = warmer_air(detector.elements, name)
+    if not load.environments[e].signal or not len(columns):
         return True
     means, off, of_fault = np.zeros(len(blocks)), list[np.ndarray](), list[np.ndarray]()
     for number, k in enumerate(study.fitted):
