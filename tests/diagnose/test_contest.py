@@ -272,10 +272,10 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
     monkeypatch.setattr(contest, "exact", exact)
     monkeypatch.setattr(contest, "bent", lambda detector, h: h.batch.kind == "moved")
     nothing = np.zeros(0)
-    order = contest._fair(SEARCHED, nothing, None, [far, bent, straight])
+    order = contest._fair(SEARCHED, nothing, None, [far, bent, straight], {})
     assert [h.statistic for h in order] == [97.0, 95.0, 50.0]
     assert refitted == [straight]
-    assert contest._fair(SEARCHED, nothing, None, [straight, far]) == [straight, far]  # nothing near it was refitted
+    assert contest._fair(SEARCHED, nothing, None, [straight, far], {}) == [straight, far]  # nothing near it was refitted
     assert refitted == [straight]
 
 

@@ -9,7 +9,7 @@ nearly linear.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -69,8 +69,7 @@ def judged(
     worthy = partial(worth, policy=detector.policy)
     starts = {id(first): (first, *more) for first, *more in candidates}
     waiting = sorted((c[0] for c in candidates), key=worthy, reverse=True)
-    done: list[Hypothesis] = []
-    left: list[Hypothesis] = []
+    done, left, scores = list[Hypothesis](), list[Hypothesis](), dict[int, float]()
     lead, leads_by, count = -np.inf, -np.inf, Counter[str]()
     for h in waiting:
         behind = detector.policy.saturates if fault_of(h).saturates else detector.policy.behind
@@ -86,8 +85,9 @@ def judged(
             lead = worthy(now)
             leads_by = min(lead, max(worthy(h), (1.0 - detector.policy.saturates) * lead))
         done.append(now)
+        scores[id(now)] = worthy(h)
     straight = [h for h in left if not bent(detector, h)]
-    return _fair(detector, y, fitted, [*done, *straight]), [h for h in left if bent(detector, h)]
+    return _fair(detector, y, fitted, [*done, *straight], scores), [h for h in left if bent(detector, h)]
 
 
 def tried(
@@ -108,15 +108,28 @@ def tried(
     return sorted(passed, key=lambda starts: -worth(starts[0], detector.policy))
 
 
-def _fair(detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Candidates, most worthy first. One that leads by its score while another near it was refitted is refitted, too:
-    the exact model takes some hundredths from each, and that alone would decide between the two. Beside a leader that
-    was refitted what acts on readings alone is, too: parameters may have bent to it."""
+def _fair(
+    detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Hypothesis], scores: Mapping[int, float]
+) -> list[Hypothesis]:
+    """Candidates, most worthy first; scores: of those that may have been refitted, by id, before they were. One that
+    leads by its score while another near it was refitted is refitted, too: the exact model takes some hundredths from
+    each, and that alone would decide between the two. Beside a leader that was refitted what acts on readings alone is,
+    too, and the best of every other kind whose score is near that of the leader: parameters may have bent to either, so
+    that what the leader has gained by being refitted others may gain as well. A misplaced source, and a change of a size
+    that is known, are scored from the description, where nothing has bent: beside those more is near."""
     worthy = partial(worth, policy=detector.policy)
     order, exactly = sorted(candidates, key=worthy, reverse=True), set[int]()
-    if order and bent(detector, order[0]):
-        least = (1.0 - detector.policy.behind) * worthy(order[0])
-        order = [exact(detector, y, fitted, h) if _follows(h) and worthy(h) > least else h for h in order]
+    if order and (bent(detector, order[0]) or order[0].batch.fixed):
+        lead, kinds = order[0], set[str]()
+        from_description = fault_of(lead).elsewhere or lead.batch.fixed
+        behind = detector.policy.saturates if from_description else detector.policy.behind
+        least = (1.0 - detector.policy.behind) * worthy(lead)
+        score = (1.0 - behind) * scores.get(id(lead), worthy(lead))
+        for i, h in enumerate(order):
+            as_near = worthy(h) > score and not (bent(detector, h) or h.batch.fixed)
+            if (_follows(h) and worthy(h) > least) or (as_near and h.batch.kind not in kinds):
+                order[i] = exact(detector, y, fitted, h)
+            kinds |= {h.batch.kind} if as_near else set()
         order.sort(key=worthy, reverse=True)
     while True:
         lead = order[0]

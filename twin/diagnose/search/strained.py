@@ -41,6 +41,8 @@ def closed(
     room = max(detector.thresholds["unknown"], misfits)
     if not _weak(detector, left, misfits) or max(last.parts.values(), default=0.0) > room:
         return None
+    if _explained(detector, y, before, fitted, ranked):
+        return None
     removed = misfit(detector, before) - misfit(detector, fitted)
     more = [h for h in ranked if h.statistic - detector.policy.rival * any(h is d for d in declared) > removed]
     passing = [i for i, h in enumerate(more) if h.statistic > detector.thresholds[h.family]]
@@ -84,6 +86,19 @@ def closed(
         detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
         misfit_of_each(detector, fitted), loose,
     )  # fmt: skip
+
+
+def _explained(detector: Detector, y: np.ndarray, before: Fitted, fitted: Fitted, ranked: Sequence[Hypothesis]) -> bool:
+    """Whether another cause alone leaves no more than chance does, where the freed number leaves more: parameters that
+    a sensor at fault has bent say by many standard deviations that they are, and allow for as much."""
+    policy, count = detector.policy, int(np.isfinite(y).sum())
+    by_chance = count + policy.chance * float(np.sqrt(2.0 * count))
+    if misfit(detector, fitted) <= by_chance:
+        return False
+    needed = misfit(detector, before) - by_chance
+    least = (1.0 - policy.saturates) * needed
+    likely = [h for h in ranked if h.statistic > max(least, detector.thresholds[h.family])][: policy.closely]
+    return any((h if h.batch.fixed else exact(detector, y, before, h)).statistic > needed for h in likely)
 
 
 @dataclass(frozen=True)
