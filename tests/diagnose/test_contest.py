@@ -28,6 +28,7 @@ from twin.diagnose.search.contest import (
 )
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.strained import strained
 from twin.diagnose.search.verdict import cause_of
 
 pytestmark = pytest.mark.long
@@ -275,8 +276,41 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
     order = contest._fair(SEARCHED, nothing, None, [far, bent, straight], {})
     assert [h.statistic for h in order] == [97.0, 95.0, 50.0]
     assert refitted == [straight]
-    assert contest._fair(SEARCHED, nothing, None, [straight, far], {}) == [straight, far]  # nothing near it was refitted
+    assert contest._fair(SEARCHED, nothing, None, [straight, far], {}) == [
+        straight,
+        far,
+    ]  # nothing near it was refitted
     assert refitted == [straight]
+
+
+def test_what_a_leader_gained_by_being_refitted_the_best_of_other_kinds_may_gain_too(monkeypatch):
+    """Parameters had bent to either: heat that scores as a misplaced source did explains more once it is refitted."""
+    contest = sys.modules[worth.__module__]
+    monkeypatch.setattr(contest, "exact", lambda detector, y, fitted, h: replace(h, statistic=2.7 * h.statistic))
+    monkeypatch.setattr(contest, "bent", lambda detector, h: h.batch.kind == "film")
+    lead = replace(hypothesis(), batch=replace(hypothesis().batch, kind="film"), statistic=630.0)
+    heat, second, far = (replace(hypothesis(), statistic=s) for s in (250.0, 248.0, 150.0))
+    nothing = np.zeros(0)
+    order = contest._fair(SEARCHED, nothing, None, [lead, heat, second, far], {id(lead): 280.0})
+    assert [h.statistic for h in order] == [pytest.approx(675.0), 630.0, 248.0, 150.0]
+    order = contest._fair(SEARCHED, nothing, None, [lead, heat, far], {id(lead): 620.0})  # which was far ahead before
+    assert order == [lead, heat, far]
+    known = replace(lead, batch=replace(lead.batch, kind="moved"))  # what is scored from the description: more is near
+    order = contest._fair(SEARCHED, nothing, None, [known, heat], {id(known): 400.0})
+    assert order[0].statistic == pytest.approx(675.0)
+
+
+@pytest.mark.parametrize(("alone", "freed", "closes"), [(2900.0, 3000.0, False), (2500.0, 3000.0, True),
+                                                        (2900.0, 1100.0, True)])  # fmt: skip
+def test_one_cause_that_leaves_chance_alone_beats_a_number_that_leaves_more(monkeypatch, alone, freed, closes):
+    """Of 1000 numbers chance leaves 1134 at most; without anything 4000 are left, with a number freed `freed`."""
+    module = sys.modules[strained.__module__]
+    monkeypatch.setattr(module, "misfit", lambda detector, left: left)
+    monkeypatch.setattr(module, "exact", lambda detector, y, fitted, h: replace(h, statistic=alone))
+    detector = SimpleNamespace(policy=POLICY, thresholds={"heat_source": 36.0})
+    drift, weak = replace(hypothesis(), statistic=2000.0), replace(hypothesis(), statistic=1500.0)
+    assert module._explained(detector, np.zeros(1000), 4000.0, freed, [drift]) != closes
+    assert not module._explained(detector, np.zeros(1000), 4000.0, freed, [weak])
 
 
 def test_a_coolants_film_has_a_discrepancy_of_its_own():

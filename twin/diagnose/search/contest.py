@@ -129,6 +129,7 @@ def _fair(
             as_near = worthy(h) > score and not (bent(detector, h) or h.batch.fixed)
             if (_follows(h) and worthy(h) > least) or (as_near and h.batch.kind not in kinds):
                 order[i] = exact(detector, y, fitted, h)
+                exactly.add(id(order[i]))
             kinds |= {h.batch.kind} if as_near else set()
         order.sort(key=worthy, reverse=True)
     while True:
