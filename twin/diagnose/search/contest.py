@@ -115,8 +115,8 @@ def _fair(
     leads by its score while another near it was refitted is refitted, too: the exact model takes some hundredths from
     each, and that alone would decide between the two. Beside a leader that was refitted what acts on readings alone is,
     too, and the best of every other kind whose score is near that of the leader: parameters may have bent to either, so
-    that what the leader has gained by being refitted others may gain as well. A misplaced source, and a change of a size
-    that is known, are scored from the description, where nothing has bent: beside those more is near."""
+    that what the leader has gained by being refitted others may gain as well. A misplaced source, and a change of a
+    known size, are scored from the description, where nothing has bent: beside those more is near."""
     worthy = partial(worth, policy=detector.policy)
     order, exactly = sorted(candidates, key=worthy, reverse=True), set[int]()
     if order and (bent(detector, order[0]) or order[0].batch.fixed):
