@@ -170,11 +170,11 @@ def diagnose(
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
     _, _, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
-    asked = named(settings.plan, detector) if settings.plan else []
     told, judgement = judgement, upheld(detector, plans, runs, judgement)
     if len(judgement.findings) < len(told.findings):
         usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
         _, _, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
+    asked = named(settings.plan, detector) if settings.plan else []
     study, y = detector.study, measured_of(detector.study)
     found, dispersion = searched(detector, y)
     detector = raised(detector, dispersion)  # what was searched with in the end
