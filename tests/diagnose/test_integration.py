@@ -18,7 +18,7 @@ from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.model.bank import nominal_run
 from twin.diagnose.model.integration import loads_for, stands_still, states_of
 from twin.diagnose.model.probed_model import make_probed_model
-from twin.diagnose.model.slots import no_slots
+from twin.diagnose.model.slots import first_slots, no_slots
 from twin.diagnose.model.study import Study, make_study
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
@@ -77,6 +77,23 @@ def test_coarse_steps_stay_near_fine_ones():
     assert (error > 0.0).all()
     assert (error[:2] < 0.01 * size[:2]).all()
     assert error[2] < 0.1 * size[2]
+
+
+def test_joints_that_stand_still_need_no_term_in_every_step():
+    study = small_case.study()
+    probed, planned = study.probed, study.runs[0]
+    loads, x = planned.run.loads, 0.3 * np.random.default_rng(4).standard_normal(len(probed.parameters))
+    none = first_slots(study.slots(0), 0)
+    assert stands_still(probed.layout, loads, none)
+    switched = study.slots(0)
+    switched.joint[60:, 0, 0] = 1.0
+    assert not stands_still(probed.layout, loads, switched)
+    still, moving = (
+        states_of(probed.layout, probed.contacts, False, alike, probed.ports_first, study.effects, loads, none,
+                  planned.z0, x * study.scale) for alike in (True, False)
+    )  # fmt: skip
+    assert np.ptp(still) > 1.0
+    np.testing.assert_allclose(still, moving, rtol=1e-9, atol=1e-9)
 
 
 def test_derivatives_by_parameters_and_amplitudes():

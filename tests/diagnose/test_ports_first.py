@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.model.ports_first import basis, turned, within
+from twin.diagnose.model.ports_first import basis, packed, turned, unpacked, within
 
 
 def some(states, ports, rank, seed):
@@ -42,3 +42,10 @@ def test_a_turned_machine_has_its_ports_first_and_reads_the_same():
     y = np.random.default_rng(1).standard_normal(len(T))
     np.testing.assert_allclose(after.film_rows @ y, system.film_rows @ (T @ y), rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(after.A0[0] @ y, T.T @ (system.A0[0] @ (T @ y)), rtol=1e-9, atol=1e-9)
+
+
+def test_a_packed_triangle_holds_all_of_symmetric_matrices():
+    X = np.random.default_rng(3).standard_normal((2, 5, 5))
+    X = X + np.swapaxes(X, 1, 2)
+    assert packed(X).shape == (2, 15)
+    np.testing.assert_array_equal(unpacked(packed(X), 5), X)

@@ -89,8 +89,8 @@ def closed(
 
 
 def _explained(detector: Detector, y: np.ndarray, before: Fitted, fitted: Fitted, ranked: Sequence[Hypothesis]) -> bool:
-    """Whether another cause alone leaves no more than chance does, where the freed number leaves more: parameters that
-    a sensor at fault has bent say by many standard deviations that they are, and allow for as much."""
+    """Whether another cause alone leaves no more than chance does, where the freed number leaves more: a faulty sensor
+    moves parameters by many of their standard deviations, of which a tenth may be as much as the fault."""
     policy, count = detector.policy, int(np.isfinite(y).sum())
     by_chance = count + policy.chance * float(np.sqrt(2.0 * count))
     if misfit(detector, fitted) <= by_chance:

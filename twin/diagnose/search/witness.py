@@ -1,10 +1,11 @@
 """The machine's model as a witness beside all other channels: what these refute and it explains is no fault.
 
-Few channels say little of one that is far from all of them: a sensor on a column that heats differently in each run, or
-in air that the machine hardly follows, looks like one that drifts. The model knows the loads. A finding stands where
-the model, calibrated to the readings as they are, leaves as much as a faulty sensor must explain; of air, where the
-machine tells that it felt another one. Of readings that were taken out no response is known: what the model predicts
-there must be nearer to them less the fault than to what they are.
+Few channels say little of one that is far from all of them: the temperature of a column that heats differently in each
+run looks like that of a sensor that drifts, and so does the air's, which falls while the machine warms up. The loads
+are inputs of the model. A finding is kept where the model, calibrated to the readings as they are, leaves as much as a
+faulty sensor must explain; of a sensor in the air, where other temperatures of the machine say that the air was another
+one. Of readings that were taken out no response is known: what the model predicts there must be nearer to the readings
+less the fault than to the readings.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.detector import Detector, emptied
 from twin.logs.run import Run
 from twin.rom.drive import measured_air
+
+NEARER = 0.5  # of a fault, from which readings less it are nearer than readings as they are: half of it, by geometry
 
 
 def upheld(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement) -> Judgement:
@@ -92,14 +95,14 @@ def _nearer_corrected(detector: Detector, plans: Sequence[Measured], runs: Seque
     if not column[known].any():
         return True
     A = column[known, None] if np.ptp(column[known]) == 0.0 else np.column_stack([column, np.ones(len(column))])[known]
-    return float(np.linalg.lstsq(A, difference[known], rcond=None)[0][0]) / f.size > 0.5
+    return float(np.linalg.lstsq(A, difference[known], rcond=None)[0][0]) / f.size > NEARER
 
 
 def _air_stands(
     detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], f: Finding, e: int, threshold: float
 ) -> bool:
-    """Of a sensor in the air that drives the model: whether the machine felt another air than was measured, and one
-    nearer to what was measured less the fault."""
+    """Of a sensor in the air that drives the model: whether other temperatures say that the air was another one
+    than was measured, and nearer to what was measured less the fault."""
     study, blocks = detector.study, detector.elements.histories.blocks
     load = study.probed.base.load_model
     name = load.environments[e].name
@@ -126,7 +129,7 @@ def _air_stands(
     difference, column = np.concatenate(off), np.concatenate(of_fault)
     taken_off = float(column @ difference) / float(column @ column)  # of the fault, before the model was driven by it
     total = taken_off - float(seen @ detector.whiten(fitted.residual)) / float(seen @ warmer)
-    return total > 0.5 and total**2 * float(seen @ warmer) > threshold
+    return total > NEARER and total**2 * float(seen @ warmer) > threshold
 
 
 def _of_run(time: np.ndarray, f: Finding, number: int) -> np.ndarray:
