@@ -27,8 +27,6 @@ from twin.diagnose.search.detector import Detector, emptied
 from twin.logs.run import Run
 from twin.rom.drive import measured_air
 
-NEARER = 0.5  # of a fault, from which readings less it are nearer than readings as they are: half of it, by geometry
-
 
 def upheld(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], judgement: Judgement) -> Judgement:
     """What is left of a judgement. Detector and plans: of the runs with all findings set aside, `runs` being the fitted
@@ -95,7 +93,8 @@ def _nearer_corrected(detector: Detector, plans: Sequence[Measured], runs: Seque
     if not column[known].any():
         return True
     A = column[known, None] if np.ptp(column[known]) == 0.0 else np.column_stack([column, np.ones(len(column))])[known]
-    return float(np.linalg.lstsq(A, difference[known], rcond=None)[0][0]) / f.size > NEARER
+    too_much = float(np.linalg.lstsq(A, difference[known], rcond=None)[0][0])
+    return abs(too_much - f.size) < abs(too_much)
 
 
 def _air_stands(
@@ -129,7 +128,7 @@ def _air_stands(
     difference, column = np.concatenate(off), np.concatenate(of_fault)
     taken_off = float(column @ difference) / float(column @ column)  # of the fault, before the model was driven by it
     total = taken_off - float(seen @ detector.whiten(fitted.residual)) / float(seen @ warmer)
-    return total > NEARER and total**2 * float(seen @ warmer) > threshold
+    return abs(total - 1.0) < abs(total) and total**2 * float(seen @ warmer) > threshold
 
 
 def _of_run(time: np.ndarray, f: Finding, number: int) -> np.ndarray:
