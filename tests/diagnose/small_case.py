@@ -20,8 +20,8 @@ from twin.diagnose.model.bank import Nominal, nominal_run, respond
 from twin.diagnose.model.probed_model import ProbedModel, make_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.search.detector import Detector, instruments_of, make_detector
-from twin.diagnose.search.forward import afresh
 from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.start import afresh
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table, Tcp
 from twin.machine.description import Machine

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import scipy.linalg
+import scipy.optimize
 
 from tests.diagnose import small_case
 from twin.calibrate.fit.noise import Channels
@@ -225,3 +229,18 @@ def test_evidence_is_that_of_a_gaussian_process(seen):
     found = evidence(heat, white.T @ projector(r))["housing"]
     # the best of some amplitudes is no more than that of all, and little less
     assert 0.75 * max(ratios) < found < (1.0 + 1e-3) * max(ratios)
+
+
+@pytest.mark.parametrize("size", [(3.0, 2.0, 1.0), (3.0, -2.0, 1.0), (2.0, -1.0, -3.0), (3.0, 0.5, -4.0)])
+def test_days_that_would_cool_are_left_out(made, size):
+    """Against non-negative least squares with the dense covariance."""
+    D, projector, r = made
+    W = np.random.default_rng(2).standard_normal((3, L))
+    of = replace(batch([History("a bell a day", W)], sign=1), positive=True)
+    y = r + D[:, :L] @ W.T @ size
+    found = score(prepared(of, blocks(D, projector, of)), D.T @ projector(y))
+    half = scipy.linalg.cholesky(np.linalg.inv(np.eye(M) + projector.N @ projector.N.T))
+    a, left = scipy.optimize.nnls(half @ D[:, :L] @ W.T, half @ y)
+    assert (a > 0.0).sum() < 3 or min(size) > 0.0
+    np.testing.assert_allclose(found.amplitude[0, 0], a, rtol=1e-5, atol=1e-9)
+    assert found.statistic[0, 0] == pytest.approx(y @ projector(y) - left**2, rel=1e-6)

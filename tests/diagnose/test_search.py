@@ -16,9 +16,10 @@ from twin.diagnose.faults.readings import play
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import exchanged
 from twin.diagnose.search.dispersion import raised, searched
-from twin.diagnose.search.forward import begun, search, search_again
+from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.start import begun
 from twin.diagnose.search.strained import strained
 from twin.diagnose.search.verdict import limits_at, limits_of, pulls_of, verdict_of
 
@@ -197,6 +198,17 @@ def test_what_is_left_beyond_noise_must_be_explained_by_less_than_a_cause():
     named, same = searched(detector, measured("heat", "housing", 400.0, seed=3) + slow_discrepancy(0.07))
     assert same.share < POLICY.dispersed
     assert [a.hypothesis.name for a in named.accepted] == ["housing"]
+
+
+def test_where_the_fit_bends_parameters_others_score_little_at_the_description():
+    """Heat that a fit without it makes parameters imitate, from where others look half as good."""
+    start = begun(small_case.made_detector(), measured("heat", "housing", 400.0, seed=3))
+    assert np.abs(start.fitted.x).max() > POLICY.bends
+    lead, *others = start.scored[1]
+    assert max(h.statistic for h in others) > 0.5 * lead.statistic
+    lead, *others = start.glance[1]
+    assert (lead.family, lead.name, lead.when.name) == ("heat_source", "housing", "always")
+    assert max(h.statistic for h in others) < 0.25 * lead.statistic
 
 
 @pytest.mark.long

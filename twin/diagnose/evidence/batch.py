@@ -48,6 +48,7 @@ class Batch:
     fixed: bool = False  # amplitudes are one
     smallest: float = 0.0  # first amplitude worth naming, in `unit`
     largest: tuple[float, ...] = ()  # per place, beyond which physics has no such cause; empty: none known
+    positive: bool = False  # no amplitude is below nought
 
     @property
     def q(self) -> int:
@@ -97,6 +98,8 @@ def score(ready: Prepared, g: np.ndarray) -> Scores:
     batch = ready.batch
     num = np.einsum("hql,pl->phq", ready.W, g[batch.columns], optimize=True)
     a = np.einsum("phqr,phr->phq", ready.inverse, num)
+    if batch.positive:
+        a = _without_negatives(a, ready.inverse)
     if batch.fixed:
         return Scores(np.maximum(2.0 * num.sum(axis=2) - ready.total, 0.0), np.ones_like(a))
     statistic = np.einsum("phq,phq->ph", num, a)
@@ -104,6 +107,18 @@ def score(ready: Prepared, g: np.ndarray) -> Scores:
     if batch.sign:
         wrong |= batch.sign * a[..., 0] < 0.0
     return Scores(np.where(wrong, 0.0, np.maximum(statistic, 0.0)), a)
+
+
+def _without_negatives(a: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+    """Most likely amplitudes (p, h, q), inverse (p, h, q, q), those below nought held there, the surest of them first;
+    the first amplitude has a sign of its own."""
+    for _ in range(a.shape[-1] - 1):
+        sigma = np.sqrt(np.diagonal(inverse, axis1=-2, axis2=-1))
+        k = np.argmin(a / np.maximum(sigma, 1e-150), axis=-1)[..., None]
+        least, column = np.take_along_axis(a, k, -1), np.take_along_axis(inverse, k[..., None], -1)[..., 0]
+        per = np.where(least < 0.0, column / np.maximum(np.take_along_axis(column, k, -1), 1e-300), 0.0)
+        a, inverse = a - per * least, inverse - per[..., None] * column[..., None, :]
+    return a
 
 
 @dataclass(frozen=True)

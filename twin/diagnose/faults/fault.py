@@ -112,6 +112,7 @@ class Fault:
     least: float = 0.0  # first amplitude worth naming
     # beyond which the model is wrong, not the machine: generous, chosen without looking at cases but for the one named
     largest: float | None = None
+    positive: bool = False  # no amplitude is below nought
     fixed: bool = False  # amplitudes are one
     own: float = 0.05  # relative standard deviation of its size, by what the form of the model may have wrong
     curve: Curve = Curve.LINEAR
@@ -163,6 +164,7 @@ class Fault:
         return [Batch(
             self.family, self.kind, self.unit, tuple(self.prefix + p for p, _ in rows),
             np.array([c for _, c in rows], dtype=int), tuple(histories), self.sign, self.fixed, self.least, of_places,
+            self.positive,
         )]  # fmt: skip
 
     def log_change(self, amplitude: float, sigma: float = 0.0) -> tuple[float, float]:
@@ -199,7 +201,7 @@ class Fault:
 
     def lowest(self, study: Study, nominal: Sequence[Nominal], h: Hypothesis) -> np.ndarray:
         """(q,) below which no amplitude goes."""
-        return np.full(h.batch.q, -np.inf)
+        return np.full(h.batch.q, 0.0 if self.positive else -np.inf)
 
     def limited(self, study: Study, name: str, a: np.ndarray) -> np.ndarray:
         """(q,) amplitudes that physics allows together."""

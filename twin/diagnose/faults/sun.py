@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from twin.diagnose.evidence import bells
-from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.batch import Batch, History
 from twin.diagnose.faults.context import Context
 from twin.diagnose.faults.fault import Described, Family
 from twin.diagnose.faults.heat_source import Heat
-from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 
 HOUR = 3600.0  # s
@@ -23,10 +21,6 @@ BELLS = (4 * HOUR, 6 * HOUR, 8 * HOUR, 10 * HOUR)
 @dataclass(frozen=True)
 class Sun(Heat):
     """Heat at a place, an amplitude per run."""
-
-    def lowest(self, study: Study, nominal: Sequence[Nominal], h: Hypothesis) -> np.ndarray:
-        """On no day does it cool."""
-        return np.zeros(h.batch.q)
 
     def described(self, study: Study, d: Described, a: np.ndarray, covariance: np.ndarray) -> Described:
         """One size, a level per day."""
@@ -40,7 +34,7 @@ class Sun(Heat):
         return replace(d, size=(value, low, high), windows=windows)
 
 
-SUN = Sun("sun", "heat", "W", "", 1, 2.0, own=0.12, grows=False)
+SUN = Sun("sun", "heat", "W", "", 1, least=2.0, positive=True, own=0.12, grows=False)  # on no day does it cool
 FAULTS = (SUN,)
 
 

@@ -36,10 +36,11 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.contest import beginning, misfit, worth
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.forward import afresh, begun, search, search_again
+from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.refit import refit
+from twin.diagnose.search.start import afresh, begun
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,13 @@ too small to name or negative, is dropped and not looked at again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.consistency import differs
 from twin.diagnose.evidence.fitter import Fitted
-from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
@@ -22,36 +21,14 @@ from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, exchanged, settled
 from twin.diagnose.search.contest import beginning, judged, misfit_of_each, proof, tried
-from twin.diagnose.search.declared import (
-    declared_candidates,
-    declared_exactly,
-    misplaced_candidates,
-    swapped_candidates,
-)
 from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Search, Step, cosines, distinct, look, scored
+from twin.diagnose.search.look import Search, Step, cosines, distinct, look
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
-from twin.diagnose.search.strained import Freed, closed, loose_ones, strained
-
-Glance = tuple[Sight, list[Hypothesis], Step]
-
-
-@dataclass(frozen=True)
-class Start:
-    """What is known before anything is named."""
-
-    detector: Detector  # with the model discrepancy of what gets hotter than described
-    fitted: Fitted
-    x0: np.ndarray  # (n,) settled without a cause
-    covariance: np.ndarray  # (n, n) of it
-    scored: Glance  # all hypotheses
-    declared: list[Hypothesis]
-    glance: Glance  # with the exact fits of those that are declared
-    loose: tuple[Loose, ...]
-    freed: Freed
+from twin.diagnose.search.start import Start, afresh, begun
+from twin.diagnose.search.strained import closed, loose_ones, strained
 
 
 def search(described: Detector, y: np.ndarray, start: Start | None = None) -> Search:
@@ -131,32 +108,6 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         detector, start.x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance,
         misfit_of_each(detector, fitted), loose,
     )  # fmt: skip
-
-
-def afresh(detector: Detector) -> Detector:
-    """The detector with no derivatives yet: a diagnosis is the same whatever was searched before."""
-    return replace(detector, derivatives=[])
-
-
-def begun(described: Detector, y: np.ndarray) -> Start:
-    """What a search of measurements y (m,) begins with."""
-    fitted = described.fitter(y)
-    if (detector := hotter(described, fitted.x)) is not described:
-        fitted = detector.fitter(y)
-    x0, covariance = settled(detector, y, ())
-    declared = [*declared_candidates(detector, y, fitted), *swapped_candidates(detector, y, fitted)]
-    known, freed = scored(detector, fitted), Freed()
-    first = glance = look(detector, fitted, declared, known)
-    loose = loose_ones(detector, y, fitted, x0, freed)
-    if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
-        closer = [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
-        exact = {h.name: h for h in closer}
-        # an exact fit ends where it cannot reach half a threshold: of what promises less to first order it says nothing
-        told = {h.name: h for h in declared if h.statistic < 0.5 * detector.thresholds[h.family]}
-        exact |= {name: told[name] for name, h in exact.items() if name in told and h.statistic <= 0.0}
-        declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
-        glance = look(detector, fitted, declared, known)
-    return Start(detector, fitted, x0, covariance, first, declared, glance, loose, freed)
 
 
 def _limits(detector: Detector, accepted: Sequence[Accepted]) -> dict[str, float]:

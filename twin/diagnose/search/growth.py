@@ -97,22 +97,22 @@ def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:
 
 def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy) -> Hypothesis:
     """A bell with its best hour in every run: runs may start at other hours of the day. Greedy, run by run."""
-    own, current = g[h.batch.columns[h.place]], h
+    alone = replace(h.batch, places=(h.name,), columns=h.batch.columns[h.place : h.place + 1])
+    current = h
     for i in range(2 * h.batch.q):
         run, bell = i % h.batch.q, current.when.bell
         assert bell is not None
+        others = []
         for other in h.batch.histories:
-            if other.bell is None or other.bell.length != bell.length:
-                continue
-            weights = current.when.weights.copy()
-            weights[run] = other.weights[run]
-            F = weights @ block @ weights.T
-            a = np.linalg.solve(F + (np.trace(F) * RIDGE + 1e-12) * np.eye(len(F)), weights @ own)
-            statistic = float(a @ weights @ own)
-            if statistic > current.statistic + policy.growth and a[0] >= h.batch.smallest:
+            if other.bell is not None and other.bell.length == bell.length:
+                weights = current.when.weights.copy()
+                weights[run] = other.weights[run]
                 centres = tuple(other.bell.centres[run] if r == run else c for r, c in enumerate(bell.centres))
-                when = replace(current.when, weights=weights, bell=replace(bell, centres=centres))
-                current = replace(current, when=when, statistic=statistic, amplitude=tuple(map(float, a)))
-                bell = when.bell
-                assert bell is not None
+                others.append(replace(current.when, weights=weights, bell=replace(bell, centres=centres)))
+        ready = prepared(replace(alone, histories=tuple(others)), block[None])
+        scores = score(ready, g)
+        k = int(np.argmax(scores.statistic))
+        statistic, a = float(scores.statistic[0, k]), scores.amplitude[0, k]
+        if statistic > current.statistic + policy.growth:
+            current = replace(h, when=others[k], statistic=statistic, amplitude=tuple(map(float, a)))
     return current

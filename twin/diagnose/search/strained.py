@@ -62,11 +62,11 @@ def closed(
     if any(map(leads, instead)) and any(map(removes_more, sorted(passing, key=lambda i: bent(detector, more[i])))):
         return None
     # both begin at the declared number: what either explains is the same but for what is left
-    fits = {h.name for h in declared if h.statistic > removed - detector.policy.rival}
+    fits = {h.name for h in declared if h.statistic > removed - detector.policy.close}
     (j,) = freed(detector.study, one.hypothesis)
     rivals = tuple(
         (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in _factors(detector, j)
-        if _does_the_same(detector, one, cosine, heat, h.name in fits)
+        if h.name in fits or _does_the_same(detector, one, cosine, heat)
     )  # fmt: skip
     # a part that expands too much moves the expansion of its material, or of another: with the part's free it stays
     family = [h for h in ranked if h.family == one.hypothesis.family and h.name != one.hypothesis.name]
@@ -193,14 +193,9 @@ def _size(one: Accepted, loose: Loose, detector: Detector) -> tuple[float, float
     return amplitude, sigma**2
 
 
-def _does_the_same(detector: Detector, one: Accepted, cosine: float, heat: float, fits: bool) -> bool:
-    """Whether a factor of a signal does what a declared number does: it is read there, and nearly nowhere else.
-
-    Where it does not fit to first order (fits), it must do just what a source does (cosine, heat: see `_factors`), and
-    be of the fitted size, far from the description.
-    """
-    if fits:
-        return abs(cosine) >= detector.policy.alike
+def _does_the_same(detector: Detector, one: Accepted, cosine: float, heat: float) -> bool:
+    """Whether a factor of a signal does just what a source's number does (cosine, heat: see `_factors`), and is of the
+    fitted size: far from the description it may not fit to first order."""
     factor = float(one.amplitude[0])
     sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), detector.policy.form * factor))
     far = fault_of(one.hypothesis).parameter and abs(factor) > detector.policy.distant

@@ -1,0 +1,91 @@
+"""What a search begins with: the fit without a cause, what is seen at a glance, numbers out of their tolerance.
+
+A fit without a cause may bend parameters towards a strong one by many standard deviations. Derivatives there say little
+of the machine: where it has, hypotheses are scored at the description, and against what that fit leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.fitter import Fitted
+from twin.diagnose.evidence.pulls import Loose
+from twin.diagnose.evidence.sight import Sight
+from twin.diagnose.search.accepted import settled
+from twin.diagnose.search.contest import misfit
+from twin.diagnose.search.declared import (
+    declared_candidates,
+    declared_exactly,
+    misplaced_candidates,
+    swapped_candidates,
+)
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.hotter import hotter
+from twin.diagnose.search.look import Step, distinct, look, scored
+from twin.diagnose.search.strained import Freed, loose_ones
+
+Glance = tuple[Sight, list[Hypothesis], Step]
+
+
+@dataclass(frozen=True)
+class Start:
+    """What is known before anything is named."""
+
+    detector: Detector  # with the model discrepancy of what gets hotter than described
+    fitted: Fitted
+    x0: np.ndarray  # (n,) settled without a cause
+    covariance: np.ndarray  # (n, n) of it
+    scored: Glance  # all hypotheses
+    declared: list[Hypothesis]
+    glance: Glance  # with the exact fits of those that are declared
+    loose: tuple[Loose, ...]
+    freed: Freed
+
+
+def afresh(detector: Detector) -> Detector:
+    """The detector with no derivatives yet: a diagnosis is the same whatever was searched before."""
+    return replace(detector, derivatives=[])
+
+
+def begun(described: Detector, y: np.ndarray) -> Start:
+    """What a search of measurements y (m,) begins with."""
+    fitted = described.fitter(y)
+    if (detector := hotter(described, fitted.x)) is not described:
+        fitted = detector.fitter(y)
+    x0, covariance = settled(detector, y, ())
+    declared = [*declared_candidates(detector, y, fitted), *swapped_candidates(detector, y, fitted)]
+    known, freed = scored(detector, fitted), Freed()
+    first = look(detector, fitted, declared, known)
+    glance = _from_description(detector, y, fitted, declared, first)
+    loose = loose_ones(detector, y, fitted, x0, freed)
+    if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
+        closer = [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
+        exact = {h.name: h for h in closer}
+        # an exact fit ends where it cannot reach half a threshold: of what promises less to first order it says nothing
+        told = {h.name: h for h in declared if h.statistic < 0.5 * detector.thresholds[h.family]}
+        exact |= {name: told[name] for name, h in exact.items() if name in told and h.statistic <= 0.0}
+        declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
+        glance = _from_description(detector, y, fitted, declared, look(detector, fitted, declared, known))
+    return Start(detector, fitted, x0, covariance, first, declared, glance, loose, freed)
+
+
+def _from_description(
+    detector: Detector, y: np.ndarray, fitted: Fitted, declared: Sequence[Hypothesis], glance: Glance
+) -> Glance:
+    """What is seen at the description, where the fit without a cause has bent parameters and something passes there.
+    Statistics count against what that fit leaves, where it is less."""
+    if np.abs(fitted.x).max(initial=0.0) < detector.policy.bends:
+        return glance
+    f, J, projector = detector.fitter.linear(np.zeros(len(fitted.x)))
+    unbent = Fitted(np.zeros(len(fitted.x)), J, y - f, projector)
+    less = max(misfit(detector, unbent) - misfit(detector, fitted), 0.0)
+    seen, ranked, step = look(detector, unbent)
+    own = [replace(h, statistic=h.statistic - less) for h in ranked if h.statistic > less]
+    if not any(h.statistic > detector.thresholds[h.family] for h in own):
+        return glance
+    parts = {part: evidence - less for part, evidence in step.parts.items()}
+    return seen, distinct(sorted([*own, *declared], key=lambda h: -h.statistic)), replace(step, parts=parts)
