@@ -15,6 +15,7 @@ from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.readings import play
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import exchanged
+from twin.diagnose.search.contest import misfit, misfit_of_each
 from twin.diagnose.search.dispersion import raised, searched
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.gain import predicted
@@ -209,6 +210,17 @@ def test_where_the_fit_bends_parameters_others_score_little_at_the_description()
     lead, *others = start.glance[1]
     assert (lead.family, lead.name, lead.when.name) == ("heat_source", "housing", "always")
     assert max(h.statistic for h in others) < 0.25 * lead.statistic
+
+
+@pytest.mark.parametrize(("size", "bent"), [(0.0, False), (3000.0, True)])
+def test_what_better_parameters_remove_is_no_causes(size, bent):
+    """Where a fit is bent, the description says that another can leave less; else both say the same."""
+    detector = small_case.made_detector()
+    fitted = detector.fitter(measured("heat", "housing", size, seed=3))
+    left = float(misfit_of_each(detector, fitted).sum())
+    assert (np.abs(fitted.x).max() > POLICY.bends) == bent
+    assert misfit(detector, fitted) == min(left, fitted.reachable)
+    assert (fitted.reachable < 0.8 * left) if bent else (fitted.reachable == pytest.approx(left, rel=0.1))
 
 
 @pytest.mark.long

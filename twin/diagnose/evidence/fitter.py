@@ -25,6 +25,7 @@ class Fitted:
     projector: Projector
     beside: np.ndarray | float = 0.0  # (m,) what accepted causes add to the outputs
     more: np.ndarray | None = None  # (m, k) their white columns in the projector
+    reachable: float = np.inf  # misfit that a fit can leave by what is linear at the description
 
 
 @dataclass(frozen=True)
@@ -66,12 +67,14 @@ class Fitter:
         """Most likely parameters of measurements y (m,), NaN where missing."""
         low, high = bounds(self.study)
         n = len(low)
-        x, offset = np.zeros(n), np.zeros(len(y))
+        x, offset, reachable = np.zeros(n), np.zeros(len(y)), np.inf
         for _ in range(PASSES):
             before = x
             for _ in range(INNER):
                 f, J, projector = self.linear(x)
-                found = np.clip(projector.most_likely(self.whiten(y - offset - f + J @ x))[:n], low, high)
+                white = self.whiten(y - offset - f + J @ x)
+                found = np.clip(projector.most_likely(white)[:n], low, high)
+                reachable = float(white @ projector(white)) if np.isinf(reachable) else reachable
                 moved, x = float(np.abs(found - x).max(initial=0.0)), found
                 if moved < CLOSE:
                     break
@@ -80,7 +83,7 @@ class Fitter:
             offset = exact - f
             if np.abs(x - before).max(initial=0.0) < 5 * CLOSE:
                 break
-        return Fitted(x, J, y - exact + J @ x, projector)
+        return Fitted(x, J, y - exact + J @ x, projector, reachable=reachable)
 
 
 def bounds(study: Study) -> tuple[np.ndarray, np.ndarray]:

@@ -28,8 +28,9 @@ from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
 def misfit(detector: Detector, fitted: Fitted) -> float:
-    """Sum of squares of what a fit leaves, in units of noise and model discrepancy."""
-    return float(misfit_of_each(detector, fitted).sum())
+    """Sum of squares of what a fit leaves, in units of noise and model discrepancy; where the description says that one
+    can leave less, this: what better parameters remove is no cause's."""
+    return min(float(misfit_of_each(detector, fitted).sum()), fitted.reachable)
 
 
 def misfit_of_each(detector: Detector, fitted: Fitted) -> np.ndarray:

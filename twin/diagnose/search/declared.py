@@ -66,7 +66,7 @@ def _better(
     left: Callable[[Hypothesis, np.ndarray], float],
 ) -> list[Hypothesis]:  # fmt: skip
     """The most promising of some faults with which less misfit is left (of it and its response) than without."""
-    before, tried = _without(detector, y, fitted), _promising(detector, y, of)[: detector.policy.closely]
+    before, tried = misfit(detector, fitted), _promising(detector, y, of)[: detector.policy.closely]
     found = [replace(h, statistic=before - left(h, D)) for h, D in tried]
     return [h for h in found if h.statistic > 0.0]
 
@@ -74,7 +74,7 @@ def _better(
 def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Likewise with the model that has the corrected signal, and also those that explain nothing: the best factor of
     each of the SIGNALS most promising; where that explains half of what a signal must, CLOSELY of them."""
-    before, found = _without(detector, y, fitted), list[Hypothesis]()
+    before, found = misfit(detector, fitted), list[Hypothesis]()
     factors = dict[str, list[Hypothesis]]()
     for h, _ in _promising(detector, y, lambda fault: fault.corrects):
         factors.setdefault(fault_of(h).factor(h.name)[0], []).append(h)
@@ -142,14 +142,6 @@ def _promising(detector: Detector, y: np.ndarray, of: Callable[[Fault], bool]) -
         always = [Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0) for i in range(len(batch.places))]
         found += zip(remains.tolist(), always, D.T, strict=True)
     return [(h, D) for _, h, D in sorted(found, key=lambda made: made[0])]
-
-
-def _without(detector: Detector, y: np.ndarray, fitted: Fitted) -> float:
-    """The misfit without a cause: what the description says a fit can leave, where the fit has ended with more. As in
-    `contest.exact`, what better parameters remove is no cause's."""
-    f, _, projector = detector.fitter.linear(np.zeros(len(fitted.x)))
-    white = detector.whiten(y - f)
-    return min(misfit(detector, fitted), float(white @ projector(white)))
 
 
 def _fitted_with(detector: Detector, y: np.ndarray, change: np.ndarray) -> float:

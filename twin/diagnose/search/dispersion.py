@@ -34,7 +34,7 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted
-from twin.diagnose.search.contest import beginning, misfit, worth
+from twin.diagnose.search.contest import beginning, misfit_of_each, worth
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.look import Search, look
@@ -103,7 +103,7 @@ def _with_errors(own: Dispersion, detector: Detector, y: np.ndarray) -> Dispersi
             size[0] = max(size[0], detector.policy.lowest_change)
         named = Accepted(h, units_of(detector.study, h), size, np.eye(h.batch.q), h.statistic, 0.0, ())
         plain = refit(detector, y, beginning(plain.x, detector.policy), [named])[0]
-    return replace(own, errors=slow_errors(detector, plain), beside=misfit(wide, fitted) - most)
+    return replace(own, errors=slow_errors(detector, plain), beside=float(misfit_of_each(wide, fitted).sum()) - most)
 
 
 def wrong_temperatures(found: Search) -> bool:
