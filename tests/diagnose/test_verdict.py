@@ -23,6 +23,7 @@ from twin.diagnose.search.strained import Freed, loose_ones, strained
 from twin.diagnose.search.verdict import (
     CALIBRATED,
     _more_alike,
+    cause_of,
     limits_at,
     limits_of,
     over_histories,
@@ -59,6 +60,18 @@ def test_candidates_and_causes_have_their_sizes_in_the_same_words(kind, wanted, 
     batch = Batch("family", kind, "1", ("p",), np.zeros((1, 1), dtype=int), (History("always", np.ones((1, 1))),))
     found = rival_of(Hypothesis(batch, 0, batch.histories[0], 25.0, (0.5,), 100.0), 1.0)
     assert (found.amplitude, found.ci95) == (pytest.approx(wanted), pytest.approx((low, high)))
+
+
+@pytest.mark.parametrize(("sign", "ends"), [(0, (-0.46, 1.46)), (1, (0.0, 1.46)), (-1, (-1.46, 0.0))])
+def test_an_interval_ends_where_physics_does(sign, ends):
+    always = (History("always", np.ones((1, 1))),)
+    batch = Batch("heat_source", "heat", "W", ("housing",), np.zeros((1, 1), dtype=int), always, sign)
+    size = np.array([0.5 * (sign or 1)])
+    one = Accepted(
+        Hypothesis(batch, 0, always[0], 9.0, (float(size[0]),), 1.0), (), size, 0.24 * np.eye(1), 9.0, 36.0, ()
+    )
+    found = cause_of(one, small_case.study())
+    assert found.ci95 == pytest.approx(ends, abs=0.01)
 
 
 def test_an_exact_factor_is_told_as_a_factor_without_an_interval():

@@ -31,7 +31,10 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), fault.uncertain(value)))
     told = fault.curve.told
-    size = told(value), told(value - 1.96 * sigma), told(value + 1.96 * sigma)
+    low, high = value - 1.96 * sigma, value + 1.96 * sigma
+    if h.batch.sign:  # the interval ends where physics does
+        low, high = (max(low, 0.0), high) if h.batch.sign > 0 else (low, min(high, 0.0))
+    size = told(value), told(low), told(high)
     said = fault.described(study, Described(h.name, size, h.when.windows), a.amplitude, a.covariance)
     value, low, high = said.size
     if fault.corrects:
