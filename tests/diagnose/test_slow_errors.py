@@ -12,6 +12,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.search.dispersion import modes_of, searched, with_errors
 from twin.diagnose.search.look import look
+from twin.diagnose.search.policy import POLICY
 
 ROWS = 400
 
@@ -68,7 +69,18 @@ def test_a_score_beyond_no_conductance_at_all_is_held(monkeypatch):
     h = Hypothesis(batch, 0, batch.histories[0], 1e6, (-3.0,) * batch.q, 1.0)
     seen, ranked, step = look(detector, detector.fitter(detector.fitter.surrogate.y0))
     monkeypatch.setattr(sys.modules[searched.__module__], "look", lambda *_: (seen, [h, *ranked], step))
-    y = detector.fitter.surrogate.y0 + 5.0 * np.random.default_rng(3).standard_normal(len(detector.fitter.surrogate.y0))
+    y0 = detector.fitter.surrogate.y0
+    y = y0 + 30.0 * detector.whiten.colour(np.random.default_rng(3).standard_normal(len(y0)))
     _, own = searched(detector, y)
     assert own.errors is not None
     assert np.isfinite(own.errors).all()
+
+
+@pytest.mark.long
+def test_measurements_beyond_all_reason_are_no_error():
+    """A TCP that is metres off, and temperatures of which no model knows: steps of a refit go too far for the model."""
+    detector = small_case.made_detector()
+    y0 = detector.fitter.surrogate.y0
+    found, own = searched(detector, y0 + 5.0 * np.random.default_rng(3).standard_normal(len(y0)))
+    assert np.isfinite(found.residual).any()
+    assert own.share > POLICY.dispersed

@@ -96,6 +96,9 @@ def refit(
         else:
             f = study.all_outputs(there)
             exact = shapes = np.zeros((len(y), 0))
+        if best is not None and not np.isfinite(f).all():  # a step too far for the model: the best one before counts
+            misfit = np.inf
+            break
         residual = y - f + J @ x + exact @ amplitude[stepped] + bent
         white = detector.whiten(residual)
         for q, _ in gains:
