@@ -66,7 +66,10 @@ def test_a_machine_that_climbs_in_air_that_is_warmer_above(tmp_path, apart):
     assert apart(tmp_path / "a.h5", ROOT / "tests" / "machines" / "spindle" / "runs" / "warm_up") < SAME
 
 
-@pytest.fixture(scope="module", params=["ball_screw_axis/mixed_load", "five_axis/experiment_a"])
+@pytest.fixture(
+    scope="module",
+    params=["ball_screw_axis/mixed_load", pytest.param("five_axis/experiment_a", marks=pytest.mark.slow)],
+)
 def shipped(request, tmp_path_factory):
     """An artefact and a run of many hours."""
     machine, run = request.param.split("/")
