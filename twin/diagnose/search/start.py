@@ -60,7 +60,8 @@ def begun(described: Detector, y: np.ndarray) -> Start:
     declared = [*declared_candidates(detector, y, fitted), *swapped_candidates(detector, y, fitted)]
     known, freed = scored(detector, fitted), Freed()
     first = look(detector, fitted, declared, known)
-    glance = _from_description(detector, y, fitted, declared, first)
+    unbent = _from_description(detector, y, fitted)
+    glance = _with(unbent, declared) if unbent else first
     loose = loose_ones(detector, y, fitted, x0, freed)
     if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
         closer = [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
@@ -69,23 +70,26 @@ def begun(described: Detector, y: np.ndarray) -> Start:
         told = {h.name: h for h in declared if h.statistic < 0.5 * detector.thresholds[h.family]}
         exact |= {name: told[name] for name, h in exact.items() if name in told and h.statistic <= 0.0}
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
-        glance = _from_description(detector, y, fitted, declared, look(detector, fitted, declared, known))
+        glance = _with(unbent, declared) if unbent else look(detector, fitted, declared, known)
     return Start(detector, fitted, x0, covariance, first, declared, glance, loose, freed)
 
 
-def _from_description(
-    detector: Detector, y: np.ndarray, fitted: Fitted, declared: Sequence[Hypothesis], glance: Glance
-) -> Glance:
+def _from_description(detector: Detector, y: np.ndarray, fitted: Fitted) -> Glance | None:
     """What is seen at the description, where the fit without a cause has bent parameters and something passes there.
     Statistics count against what that fit leaves, where it is less."""
     if np.abs(fitted.x).max(initial=0.0) < detector.policy.bends:
-        return glance
+        return None
     f, J, projector = detector.fitter.linear(np.zeros(len(fitted.x)))
     unbent = Fitted(np.zeros(len(fitted.x)), J, y - f, projector)
     less = max(misfit(detector, unbent) - misfit(detector, fitted), 0.0)
     seen, ranked, step = look(detector, unbent)
     own = [replace(h, statistic=h.statistic - less) for h in ranked if h.statistic > less]
     if not any(h.statistic > detector.thresholds[h.family] for h in own):
-        return glance
-    parts = {part: evidence - less for part, evidence in step.parts.items()}
-    return seen, distinct(sorted([*own, *declared], key=lambda h: -h.statistic)), replace(step, parts=parts)
+        return None
+    return seen, own, replace(step, parts={part: evidence - less for part, evidence in step.parts.items()})
+
+
+def _with(glance: Glance, declared: Sequence[Hypothesis]) -> Glance:
+    """What is seen, and the fits of what is declared among it."""
+    seen, ranked, step = glance
+    return seen, distinct(sorted([*ranked, *declared], key=lambda h: -h.statistic)), step
