@@ -15,8 +15,9 @@ from twin.diagnose.faults.readings import late
 from twin.diagnose.search.accepted import Accepted, curved_change, freed, motion, parameter_of
 from twin.diagnose.search.contest import exact
 from twin.diagnose.search.forward import search
-from twin.diagnose.search.gain import gains
+from twin.diagnose.search.gain import channels_of, gains
 from twin.diagnose.search.look import sized_candidates
+from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.refit import refit
 from twin.diagnose.search.verdict import verdict_of
 
@@ -254,7 +255,8 @@ def test_swapped_sensors_are_swapped_back_on_the_sealed_run():
     T, w = study.runs[2].split(study.outputs(2, x))
     T = T + small_case.NOISE / np.sqrt(5) * np.random.default_rng(5).standard_normal(T.shape)
     sealed = replace(sealed, temperature=T[:, [1, 0, *range(2, T.shape[1])]], tcp=w)
-    table = {g.channel: g for g in gains(found, 2, sealed, 1, (np.full(T.shape[1], 0.05), np.full(3, 3e-7)))}
+    channels = channels_of(found, 2, sealed, (np.full(T.shape[1], 0.05), np.full(3, 3e-7)))
+    table = {g.channel: g for g in gains(channels, 1, POLICY)}
     for name in sealed.sensors[:2]:
         assert table[name].affected
         assert table[name].extended < 0.2 * table[name].recalibrated

@@ -34,7 +34,7 @@ from twin.diagnose.result.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Lim
 from twin.diagnose.result.numbers import customary, number, quantity, size_words
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.forward import search
-from twin.diagnose.search.gain import gains
+from twin.diagnose.search.gain import channels_of
 from twin.diagnose.search.verdict import pulls_of, verdict_of
 from twin.errors import TwinError
 
@@ -368,7 +368,7 @@ def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
     assert pull.value == pytest.approx(pull.nominal * causes[0].amplitude)
     assert 0.0 < pull.sigma < 1.0
     assert verdict_sentence(d).startswith(f"Declared values cannot hold: {path} is {pull.value / pull.nominal:.1f}")
-    told = gains(found, 2, study.runs[2].measured, 1, (np.ones(3), np.ones(3)))
+    told = channels_of(found, 2, study.runs[2].measured, (np.ones(3), np.ones(3)))
     assert {g.run for g in told} == {study.runs[2].run.name}
     result = Result(replace(d, series=()), found, causes)
     write_extension(result, lumped_case.artefact(), small_case.machine(), (), tmp_path, build=False)

@@ -15,11 +15,11 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.accepted import Accepted, settled
 from twin.diagnose.search.forward import search
-from twin.diagnose.search.gain import gains
+from twin.diagnose.search.gain import Channel, channels_of, likelihood_ratio
 from twin.diagnose.search.look import Search
+from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.sealed import judged, other_sizes
 from twin.diagnose.search.verdict import strained_of, verdict_of
 
@@ -35,11 +35,12 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     def opened(gain: float, smaller: float | None = None) -> tuple[str, int, str]:
         """gain: share of a sensor's error that the cause takes from it in the sealed run; smaller: a smaller one."""
 
-        def table(of: Search, *_: object) -> tuple[Gain, ...]:
+        def channels(of: Search, *_: object) -> tuple[Channel, ...]:
             own = gain if of.accepted is found.accepted or smaller is None else smaller
-            return (Gain("sealed", "housing", "K", 1.0, 1.0, 1.0 - own, (own - 0.1, own + 0.1), True),)
+            errors = [np.full(10, e) for e in (1.0, 1.0, 1.0 - own)]
+            return (Channel("sealed", "housing", "K", 300.0 * np.arange(10), errors, True, 0.1),)
 
-        monkeypatch.setattr(sys.modules[judged.__module__], "gains", table)
+        monkeypatch.setattr(sys.modules[judged.__module__], "channels_of", channels)
         told = judged(found, y, verdict, causes, FAMILIES, [detector.study.runs[2].measured], 1)
         return told.verdict, len(told.extension), told.note or told.size
 
@@ -47,6 +48,7 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     refuted, extension, note = opened(-0.5)
     assert (refuted, extension) == ("unknown", 0)
     assert cause.place in note
+    assert "housing, of which it leaves 1.50 K (rms), and a calibration without it 1.00 K" in note
     kept, extension, note = opened(-0.5, smaller=0.2)  # the cause predicts the sealed run, and its size does not
     assert (kept, extension) == (verdict, 0)
     assert note.startswith("not written")
@@ -122,6 +124,31 @@ def test_an_expansion_is_not_judged_by_temperatures():
     found = replace(search(detector, y), accepted=(one,))
     m = study.runs[2].measured
     T, w = study.runs[2].split(study.outputs(2, found.x))
-    table = gains(found, 2, replace(m, temperature=T, tcp=w), 1, (np.full(len(m.sensors), 0.01), np.full(3, 1e-8)))
-    assert {g.unit for g in table if g.affected} == {"m"}
-    assert any(abs(g.recalibrated - g.extended) > 0.01 for g in table if g.unit == "K")
+    sigma = np.full(len(m.sensors), 0.01), np.full(3, 1e-8)
+    channels = channels_of(found, 2, replace(m, temperature=T, tcp=w), sigma)
+    assert {c.unit for c in channels if c.moved} == {"m"}
+    assert any(np.abs(c.errors[1] - c.errors[2]).max() > 0.01 for c in channels if c.unit == "K")
+
+
+def channel(before: np.ndarray, after: np.ndarray, run: str = "sealed", moved: bool = True) -> Channel:
+    return Channel(run, "housing", "K", 300.0 * np.arange(len(before)), [before, before, after], moved, 0.1)
+
+
+def test_the_sealed_runs_are_judged_by_likelihood():
+    rng = np.random.default_rng(5)
+    noise = 0.1 * rng.standard_normal(144)  # 12 h, six blocks
+    half = channel(0.5 + noise, noise), channel(noise, 0.1 + noise), channel(noise, 0.1 + noise)
+    low, high = likelihood_ratio(half, 1, POLICY)
+    told = 0.5 * sum(float(np.sum(c.errors[1] ** 2 - c.errors[2] ** 2)) for c in half) / 0.1**2
+    assert 0.0 < low < told < high  # the error that is gone outweighs both that are made
+    assert likelihood_ratio((channel(noise, 0.1 + noise),), 1, POLICY)[1] < 0.0
+    assert likelihood_ratio((channel(noise, 0.1 + noise, moved=False),), 1, POLICY) == (0.0, 0.0)
+    once = np.where(np.arange(144) < 24, 0.5, 0.0)  # better in one block, and much: that may be chance
+    low, high = likelihood_ratio((channel(once + noise, noise + 0.01),), 1, POLICY)
+    assert low < 0.0 < high
+    gap = np.where(np.arange(144) < 100, np.nan, noise)
+    assert np.isfinite(likelihood_ratio((channel(gap, 0.1 + noise),), 1, POLICY)).all()
+    one, two = (channel(0.5 + noise, noise, run) for run in ("sealed", "other"))
+    assert np.mean(likelihood_ratio((one, two), 1, POLICY)) == pytest.approx(
+        2.0 * np.mean(likelihood_ratio((one,), 1, POLICY)), rel=0.05
+    )

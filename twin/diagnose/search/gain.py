@@ -14,6 +14,7 @@ from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.accepted import in_place, states_with, stepped, with_shifts
 from twin.diagnose.search.look import Search
+from twin.diagnose.search.policy import SearchPolicy
 
 
 @dataclass(frozen=True)
@@ -55,32 +56,74 @@ def _read(found: Search, k: int) -> np.ndarray:
     return result
 
 
-def gains(
-    found: Search, k: int, sealed: Measured, seed: int, floors: tuple[np.ndarray, np.ndarray]
-) -> tuple[Gain, ...]:
-    """Per channel of the sealed run k; its measurements are opened here. floors: noise of sensors (s,) and TCP (3,).
+@dataclass(frozen=True)
+class Channel:
+    """What three models leave of a channel of a sealed run."""
 
-    A channel is affected that causes move, and that the extended model predicts otherwise than the recalibrated one: an
+    run: str
+    name: str  # a sensor, or "dx", "dy", "dz"
+    unit: str  # K or m
+    time: np.ndarray  # (n,) s
+    errors: Sequence[np.ndarray]  # (n,) each: of the delivered, the recalibrated, the extended model
+    moved: bool  # whether the causes move it noticeably
+    noise: float = np.nan  # in unit
+
+
+def channels_of(found: Search, k: int, sealed: Measured, sigma: tuple[np.ndarray, np.ndarray]) -> tuple[Channel, ...]:
+    """Of the sealed run k, whose measurements are opened here. sigma: noise of sensors (s,) and TCP (3,).
+
+    A channel is moved that causes move, and that the extended model predicts otherwise than the recalibrated one: an
     expansion is not judged by temperatures that a calibration beside it has shifted.
     """
     study, policy = found.detector.study, found.detector.policy
     planned = study.runs[k]
     models = [planned.split(v) for v in vars(predicted(found, k)).values()]
     bare = planned.split(study.outputs(k, found.x if found.accepted else found.x0))  # without its causes
-    rng = np.random.default_rng(seed)
     readings = sealed.temperature, sealed.temperature, in_place(sealed.temperature, sealed.sensors, found.accepted)
+
+    def channel(
+        name: str, unit: str, time: np.ndarray, errors: list[np.ndarray], alone: np.ndarray, noise: float
+    ) -> Channel:
+        moved = _least_rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * noise
+        return Channel(sealed.name, name, unit, time, errors, moved, noise)
+
     result = []
     for i, name in enumerate(sealed.sensors):
         errors = [read[:, i] - T[:, i] for read, (T, _) in zip(readings, models, strict=True)]
         alone = readings[1][:, i] - bare[0][:, i]
-        affected = _least_rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * floors[0][i]
-        result.append(gain_of(sealed.name, name, "K", errors, sealed.bin_time, affected, rng, policy.block))
+        result.append(channel(name, "K", sealed.bin_time, errors, alone, sigma[0][i]))
     for c in range(3 if len(sealed.tcp) else 0):
         errors = [sealed.tcp[:, c] - w[:, c] for _, w in models]
         alone = sealed.tcp[:, c] - bare[1][:, c]
-        affected = _least_rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * floors[1][c]
-        result.append(gain_of(sealed.name, COMPONENTS[c], "m", errors, sealed.tcp_time, affected, rng, policy.block))
+        result.append(channel(COMPONENTS[c], "m", sealed.tcp_time, errors, alone, sigma[1][c]))
     return tuple(result)
+
+
+def gains(channels: Sequence[Channel], seed: int, policy: SearchPolicy) -> tuple[Gain, ...]:
+    """Per channel of a run."""
+    rng = np.random.default_rng(seed)
+    return tuple(gain_of(c, rng, policy) for c in channels)
+
+
+def likelihood_ratio(channels: Sequence[Channel], seed: int, policy: SearchPolicy) -> tuple[float, float]:
+    """95 % interval, by a block bootstrap, of the logarithm of the likelihood ratio of the extended model and the
+    recalibrated one, of all channels that are moved: half of what it takes from their squared errors, in variances of
+    noise. A block holds all channels of a run for some time: their errors are not independent. (0, 0) of none moved.
+
+    Channels are not counted: one that loses an error of a kelvin outweighs four that gain a twentieth of one.
+    """
+    blocks: dict[tuple[str, int], float] = {}
+    for c in channels:
+        less = 0.5 * (c.errors[1] ** 2 - c.errors[2] ** 2) / c.noise**2
+        for i in np.flatnonzero(np.isfinite(less)) if c.moved else ():
+            key = c.run, int(c.time[i] // policy.block)
+            blocks[key] = blocks.get(key, 0.0) + float(less[i])
+    if not blocks:
+        return 0.0, 0.0
+    values, rng = np.array(list(blocks.values())), np.random.default_rng(seed)
+    draws = values[rng.integers(len(values), size=(policy.draws, len(values)))].sum(axis=1)
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return float(low), float(high)
 
 
 def _least_rms(changes: Sequence[np.ndarray]) -> float:
@@ -89,27 +132,19 @@ def _least_rms(changes: Sequence[np.ndarray]) -> float:
     return min(float(np.sqrt(np.mean(change**2))) if len(change) else 0.0 for change in measured)
 
 
-def gain_of(
-    run: str,
-    name: str,
-    unit: str,
-    errors: list[np.ndarray],
-    time: np.ndarray,
-    affected: bool,
-    rng: np.random.Generator,
-    length: float,
-) -> Gain:
-    """Of what three models leave of a channel (n,) at times (n,); length [s] of the blocks of the bootstrap."""
+def gain_of(channel: Channel, rng: np.random.Generator, policy: SearchPolicy) -> Gain:
+    """Of what three models leave of a channel."""
+    run, name, unit, errors = channel.run, channel.name, channel.unit, channel.errors
     good = np.all(np.isfinite(errors), axis=0)
     if not good.any():
         return Gain(run, name, unit, np.nan, np.nan, np.nan, (np.nan, np.nan), False)
-    own = [e[good] for e in errors]
+    time, own = channel.time[good], [e[good] for e in errors]
     rms = [float(np.sqrt(np.mean(e**2))) for e in own]
-    block = ((time[good] - time[good][0]) // length).astype(int)
+    block = ((time - time[0]) // policy.block).astype(int)
     members = [np.flatnonzero(block == b) for b in np.unique(block)]
     draws = []
-    for _ in range(400):
+    for _ in range(policy.draws):
         chosen = np.concatenate([members[b] for b in rng.integers(len(members), size=len(members))])
         draws.append(np.sqrt(np.mean(own[1][chosen] ** 2)) - np.sqrt(np.mean(own[2][chosen] ** 2)))
     low, high = np.quantile(draws, [0.025, 0.975])
-    return Gain(run, name, unit, rms[0], rms[1], rms[2], (float(low), float(high)), affected)
+    return Gain(run, name, unit, rms[0], rms[1], rms[2], (float(low), float(high)), channel.moved)

@@ -20,7 +20,7 @@ from twin.calibrate.members.select import SURE, Joined
 from twin.diagnose.faults.missing_member import FAMILY
 from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Cause, Gain
-from twin.diagnose.search.gain import gain_of, predicted
+from twin.diagnose.search.gain import Channel, gain_of, predicted
 from twin.diagnose.search.look import Search
 from twin.errors import TwinError
 from twin.logs.run import Run
@@ -115,7 +115,7 @@ def _gains(
     found: Search, artefact: Artefact, members: Found, plans: Sequence[Measured], runs: Sequence[Run],
     sealed: Sequence[Run], seed: int,
 ) -> tuple[Gain, ...]:  # fmt: skip
-    rng, block, result = np.random.default_rng(seed), found.detector.policy.block, list[Gain]()
+    rng, policy, result = np.random.default_rng(seed), found.detector.policy, list[Gain]()
     for k, run in enumerate(sealed, start=len(runs)):
         m = plans[k]
         if not len(m.tcp):
@@ -123,7 +123,7 @@ def _gains(
         delivered, extended = errors_of(members, artefact, run)
         errors = [delivered, _left(found, k, m, extended=False), extended]
         result += [
-            gain_of(m.name, COMPONENTS[c], "m", [e[:, c] for e in errors], m.tcp_time, True, rng, block)
+            gain_of(Channel(m.name, COMPONENTS[c], "m", m.tcp_time, [e[:, c] for e in errors], True), rng, policy)
             for c in members.axes
         ]
     return tuple(result)

@@ -97,6 +97,7 @@ class SearchPolicy:
     power: float = _rule(1.645, DERIVED, "one-sided 95 %, of a detection limit", "standard deviations")
     remainder: float = _rule(0.35, JUDGED, "of the evidence for heat before all names, that may be left beside them")
     block: float = _rule(7200.0, JUDGED, "of the bootstrap", "s")
+    draws: int = _rule(400, SOLVER, "of the bootstrap")
     noticed: float = _rule(0.5, JUDGED, "of a channel's noise, by which causes must move it to count as affected")
     thermocouple: float = _rule(0.1, JUDGED, "noise of a sensor that no fitted run has", "K")
     # iterations

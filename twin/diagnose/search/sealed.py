@@ -1,9 +1,9 @@
 """The sealed runs judge the headline: what names a cause in the machine must predict runs that were not looked at.
 
 They never make a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But causes
-of the machine that make more of the channels that they move worse than better, beyond chance, are withdrawn. Where
-another size that the data allow makes more of them better than worse, the run refutes the size alone: the name stays,
-and nothing is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
+of the machine are withdrawn with which the sealed runs are less likely, beyond chance, than with a recalibrated model.
+Where they are likelier with another size that the data allow, they refute the size alone: the name stays, and nothing
+is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
 calibration makes of it without its tolerance. What is told of a declared number is judged beside a calibration of all
 others, and a factor of a signal beside one that leaves the sources which read it as declared. A number that
 calibration alone moved out of its tolerance is judged beside the calibration that keeps it in, and needs this
@@ -22,11 +22,13 @@ from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
+from twin.diagnose.result.numbers import quantity
 from twin.diagnose.search.accepted import Accepted, freed, settled
 from twin.diagnose.search.declared import imitating, with_signal
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.gain import gains
+from twin.diagnose.search.gain import Channel, channels_of, gains, likelihood_ratio
 from twin.diagnose.search.look import Search
+from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.verdict import CALIBRATED
 
 
@@ -52,7 +54,7 @@ def judged(
         gone = " and ".join(f"{c.family.replace('_', ' ')} at {c.place}" for c in causes if c not in kept)
         note = f"withdrawn: {gone}. Without its tolerance calibration predicts the sealed run no better"
         left = verdict if any(c.history == CALIBRATED for c in kept) else "sensor" if kept else "nothing"
-        return Judged(left, kept, (), _gains(found, opened, seed), note)
+        return Judged(left, kept, (), gains(_channels(found, opened), seed, found.detector.policy), note)
     found = _beside_declared(found, y)
     entries = {f.name: f for f in families}
     named = verdict in ("named", "out_of_tolerance", "ambiguous", "signal")
@@ -60,14 +62,15 @@ def judged(
         c for c in causes
         if named and c.history != CALIBRATED and c.family in entries and entries[c.family].changes(c)
     )  # fmt: skip
-    table = _gains(found, opened, seed)
+    channels, policy = _channels(found, opened), found.detector.policy
+    table, worth = gains(channels, seed, policy), _worth(channels, seed, policy)
     by_fit = _told_by_fit(found)
-    if not extension or _worth(table) >= (1 if by_fit and opened else 0):
+    if not extension or worth >= (1 if by_fit and opened else 0):
         return Judged(verdict, tuple(causes), extension, table)
     names = " and ".join(dict.fromkeys(f"{c.family.replace('_', ' ')} at {c.place}" for c in extension))
     for accepted in other_sizes(found, y):
         x, _ = settled(found.detector, y, accepted)
-        if _worth(_gains(replace(found, accepted=accepted, x=x), opened, seed)) > 0:
+        if _worth(_channels(replace(found, accepted=accepted, x=x), opened), seed, policy) > 0:
             lead = next(a for a in accepted if a.hypothesis.family == extension[0].family)
             told = f"{fault_of(lead.hypothesis).curve.told(float(lead.amplitude[0])):.3g} {lead.hypothesis.batch.unit}"
             note = f"not written: {names}, since the sealed run speaks for another size, such as {told}"
@@ -78,11 +81,11 @@ def judged(
             f"withdrawn: {names}. Only the fit behind the scores is sure of it, and predicts the sealed run no better"
         )
         return Judged("sensor" if rest else "nothing", rest, (), table, note)
-    moved = [g for g in table if g.affected]
-    worse = sum(g.ci95[1] < 0.0 for g in moved)
+    worst = max((c for c in channels if c.moved), key=lambda c: (_rms(c.errors[2]) - _rms(c.errors[1])) / c.noise)
+    after, before = (quantity(_rms(worst.errors[k]), worst.unit) for k in (2, 1))
     note = (
-        f"withdrawn: {names}. It explains the runs that were looked at, and on the sealed run it makes {worse} of "
-        f"the {len(moved)} channels that it moves worse beyond chance"
+        f"withdrawn: {names}. It explains the runs that were looked at, and predicts the sealed run worse beyond "
+        f"chance; most {worst.name}, of which it leaves {after} (rms), and a calibration without it {before}"
     )
     return Judged("unknown", tuple(c for c in causes if c not in extension), (), table, note)
 
@@ -105,12 +108,12 @@ def _told_by_fit(found: Search) -> bool:
     return any(j in unsettled for a in found.accepted[:1] for j in freed(found.detector.study, a.hypothesis))
 
 
-def _gains(found: Search, opened: Sequence[Measured], seed: int) -> tuple[Gain, ...]:
-    """Per channel of the sealed runs."""
+def _channels(found: Search, opened: Sequence[Measured]) -> tuple[Channel, ...]:
+    """Of all sealed runs."""
     first = len(found.detector.study.runs) - len(opened)
     return tuple(
-        g for k, m in enumerate(opened, start=first) for g in gains(found, k, m, seed, _noise(found.detector, m))
-    )  # fmt: skip
+        c for k, m in enumerate(opened, start=first) for c in channels_of(found, k, m, _noise(found.detector, m))
+    )
 
 
 def _stays(found: Search, y: np.ndarray, cause: Cause, opened: Sequence[Measured], seed: int) -> bool:
@@ -120,14 +123,18 @@ def _stays(found: Search, y: np.ndarray, cause: Cause, opened: Sequence[Measured
     own = next(own for own in found.loose if known[own.index] == cause.parameter)
     x, _ = settled_alone(found.detector.fitter, y, (own.index,))
     x[own.index] = own.x
-    worth = _worth(_gains(replace(found, x=x), opened, seed))
+    worth = _worth(_channels(replace(found, x=x), opened), seed, found.detector.policy)
     return worth > 0 or (worth == 0 and (own.settled or not opened))
 
 
-def _worth(table: Sequence[Gain]) -> int:
-    """How many more of the channels that are moved become better than worse, beyond chance."""
-    moved = [g for g in table if g.affected]
-    return sum(g.ci95[0] > 0.0 for g in moved) - sum(g.ci95[1] < 0.0 for g in moved)
+def _worth(channels: Sequence[Channel], seed: int, policy: SearchPolicy) -> int:
+    """Whether the sealed runs are likelier with the causes (1), less likely (-1), or neither beyond chance."""
+    low, high = likelihood_ratio(channels, seed, policy)
+    return int(low > 0.0) - int(high < 0.0)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))
 
 
 def other_sizes(found: Search, y: np.ndarray) -> Iterator[tuple[Accepted, ...]]:
