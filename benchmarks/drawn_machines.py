@@ -211,9 +211,14 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
 
 
 def same_place(machine: Machine, place: str) -> list[str]:
-    """The surface that is all of a film: both names are right."""
+    """Other names of a place, which are right, too: the surface that is all of a film, and the surface that a fixed
+    contact without a gap joins to it."""
     film = machine.films.get(place.removeprefix("films."))
-    return list(film.surfaces) if film is not None and len(film.surfaces) == 1 and place.startswith("films.") else []
+    found = list(film.surfaces) if film is not None and len(film.surfaces) == 1 and place.startswith("films.") else []
+    for contact in machine.contacts.values():
+        if contact.surfaces and contact.glues and place in contact.surfaces:
+            found += [s for s in contact.surfaces if s != place]
+    return found
 
 
 def moved(runs: Sequence[Run], healthy: Sequence[Run]) -> tuple[float, float]:
