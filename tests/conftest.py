@@ -14,6 +14,9 @@ for variable, value in PINNED.items():
     os.environ.setdefault(variable, value)
 
 ROOT = Path(__file__).parents[1]
+# Test workers are the parallelism here: helpers beside them import and compile all that they need once more. Tests of
+# helpers ask for two (tests/build/test_workers.py, tests/diagnose/test_over_runs.py): no digit depends on their number.
+os.environ.setdefault("TWIN_WORKERS", "1")
 # Builds are keyed by their inputs and by the code that makes them: a second test run finds them here.
 os.environ.setdefault("TWIN_CACHE", str(ROOT / ".cache" / "tests"))
 
