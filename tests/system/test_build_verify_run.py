@@ -170,7 +170,8 @@ def test_equal_input_gives_an_equal_file(built_artefact, tmp_path, monkeypatch):
 @pytest.mark.long
 def test_interrupted_build_leaves_nothing_and_can_be_repeated(tmp_path, stage):
     target = tmp_path / "slide.h5"
-    command = [sys.executable, "-u", "-m", "twin.cli.main", "build", str(SLIDE), "-o", str(target), "--states", "40"]
+    small = ["--states", "40", "--training", "4"]
+    command = [sys.executable, "-u", "-m", "twin.cli.main", "build", str(SLIDE), "-o", str(target), *small]
     environment = os.environ | {"TWIN_CACHE": str(tmp_path / "cache")}
     process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     for line in process.stdout:
