@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.evidence.bells import Bell, by_blocks, name
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.growth import chilled, grown
+from twin.diagnose.search.growth import chilled, grown, sharpened
 
 BLOCKS = 6
 
@@ -108,3 +110,58 @@ def test_no_cold_and_no_coolant_begin_nowhere_else():
     assert chilled(Hypothesis(batch, 0, batch.histories[2], 1.0, (10.0, 2.0), 1.0), hot, block) is None
     heat, block = coolant("heat")
     assert chilled(Hypothesis(heat, 0, heat.histories[1], 1.0, (10.0, 2.0), 1.0), -warm, block) is None
+
+
+def windows_of_heat(hours: int, step: float, decay: float) -> tuple[np.ndarray, Batch]:
+    """(steps, hours) what a sensor reads beside a small mass of a time constant `decay` [s] heated for each hour, and
+    every stretch of hours."""
+    n, per = int(hours * 3600 / step), int(3600 / step)
+    t = step * np.arange(1, n + 1)
+    begun = [np.where(t > 3600.0 * b, 1.0 - np.exp(-np.clip(t - 3600.0 * b, 0.0, None) / decay), 0.0)
+             for b in range(hours + 1)]  # fmt: skip
+    assert per * hours == n
+    D = np.stack([a - b for a, b in pairwise(begun)], axis=1)
+    stretches = [(a, b) for a in range(hours) for b in range(a + 1, hours + 1)]
+    histories = tuple(
+        History(f"{a} to {b}", np.isin(np.arange(hours), np.arange(a, b))[None].astype(float),
+                windows=(Window("a", 3600.0 * a, 3600.0 * b),))
+        for a, b in stretches
+    )  # fmt: skip
+    return D, Batch("heat_source", "heat", "W", ("p",), np.arange(hours)[None], histories, 1)
+
+
+def of(batch: Batch, k: int, g: np.ndarray, F: np.ndarray) -> Hypothesis:
+    w = batch.histories[k].weights[0]
+    return Hypothesis(
+        batch, 0, batch.histories[k], float((w @ g) ** 2 / (w @ F @ w)), (float(w @ g / (w @ F @ w)),), 1.0
+    )
+
+
+def test_windows_begin_and_end_between_the_hours():
+    """Heat from 2.2 to 5.4 h, felt within ten minutes: full hours explain less than the nearest quarters do."""
+    step = 60.0
+    D, batch = windows_of_heat(8, step, 600.0)
+    t = step * np.arange(1, len(D) + 1)
+    grow = [np.where(t > at, 1.0 - np.exp(-np.clip(t - at, 0.0, None) / 600.0), 0.0) for at in (2.2 * 3600, 5.4 * 3600)]
+    y = 10.0 * (grow[0] - grow[1])
+    g, F = D.T @ y, D.T @ D
+    hours = max((of(batch, k, g, F) for k in range(len(batch.histories))), key=lambda h: h.statistic)
+    found = sharpened(hours, g, F)
+    (window,) = found.when.windows
+    assert (window.start, window.end) == pytest.approx((2.25 * 3600, 5.5 * 3600), abs=901.0)
+    assert window.start % 900.0 == window.end % 900.0 == 0.0
+    assert y @ y - found.statistic < 0.6 * (y @ y - hours.statistic)
+    assert found.amplitude[0] == pytest.approx(10.0, rel=0.1)
+    assert found.when.name == f"from {window.start / 3600:.1f} h to {window.end / 3600:.1f} h of a"
+    again = sharpened(found, g, F)  # there is nothing better near it
+    assert again.when.windows == found.when.windows
+
+
+def test_what_lasts_to_the_end_of_a_run_keeps_its_end():
+    D, batch = windows_of_heat(6, 60.0, 600.0)
+    t = 60.0 * np.arange(1, len(D) + 1)
+    y = 5.0 * np.where(t > 2.5 * 3600, 1.0 - np.exp(-np.clip(t - 2.5 * 3600, 0.0, None) / 600.0), 0.0)
+    g, F = D.T @ y, D.T @ D
+    k = next(i for i, h in enumerate(batch.histories) if h.windows[0].start == 7200.0 and h.windows[0].end == 21600.0)
+    found = sharpened(of(batch, k, g, F), g, F)
+    assert (found.when.windows[0].start, found.when.windows[0].end) == (2.5 * 3600, 6 * 3600.0)

@@ -15,6 +15,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.result.diagnosis import Rival
 from twin.diagnose.search.accepted import Accepted, settled
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import Channel, channels_of, likelihood_ratio
@@ -31,6 +32,7 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     verdict, causes = verdict_of(found, FAMILIES)
     assert verdict == "out_of_tolerance"
     (cause,) = causes
+    sealed = [detector.study.runs[2].measured]
 
     def opened(gain: float, smaller: float | None = None) -> tuple[str, int, str]:
         """gain: share of a sensor's error that the cause takes from it in the sealed run; smaller: a smaller one."""
@@ -41,7 +43,7 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
             return (Channel("sealed", "housing", "K", 300.0 * np.arange(10), errors, True, 0.1),)
 
         monkeypatch.setattr(sys.modules[judged.__module__], "channels_of", channels)
-        told = judged(found, y, verdict, causes, FAMILIES, [detector.study.runs[2].measured], 1)
+        told = judged(found, y, verdict, causes, FAMILIES, sealed, 1)
         return told.verdict, len(told.extension), told.note or told.size
 
     assert opened(0.5)[:2] == ("out_of_tolerance", 1)
@@ -49,6 +51,12 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     assert (refuted, extension) == ("unknown", 0)
     assert cause.place in note
     assert "housing, of which it leaves 1.50 K (rms), and a calibration without it 1.00 K" in note
+    assert "nearly as likely" not in note
+    rival = Rival("joint", "contacts.rail", "always", 0.5, "1", 40.0, 0.99, "")
+    told = judged(found, y, verdict, [replace(cause, rivals=(rival, rival))], FAMILIES, sealed, 1)
+    assert (
+        told.note == f"{note}. Not asked of the sealed run, and nearly as likely in the others: joint at contacts.rail"
+    )
     kept, extension, note = opened(-0.5, smaller=0.2)  # the cause predicts the sealed run, and its size does not
     assert (kept, extension) == (verdict, 0)
     assert note.startswith("not written")

@@ -73,8 +73,7 @@ def judged(
     done, left, scores = list[Hypothesis](), list[Hypothesis](), dict[int, float]()
     lead, leads_by, count = -np.inf, -np.inf, Counter[str]()
     for h in waiting:
-        behind = detector.policy.saturates if fault_of(h).saturates else detector.policy.behind
-        led = worthy(h) < (1.0 - behind) * leads_by
+        led = worthy(h) < (1.0 - _behind(h, detector.policy)) * leads_by
         bends = bent(detector, h)
         told_badly = fault_of(h).curved or _saturated(detector, h)
         if (led and not told_badly) or (bends and count[h.batch.kind] >= detector.policy.entrants):
@@ -89,6 +88,13 @@ def judged(
         scores[id(now)] = worthy(h)
     straight = [h for h in left if not bent(detector, h)]
     return _fair(detector, y, fitted, [*done, *straight], scores), [h for h in left if bent(detector, h)]
+
+
+def _behind(h: Hypothesis, policy: SearchPolicy) -> float:
+    """Share of the leader's score that a hypothesis may lack and overtake it by being refitted."""
+    if h.when.windows and h.when.bell is None:
+        return policy.switched
+    return policy.saturates if fault_of(h).saturates else policy.behind
 
 
 def tried(

@@ -76,8 +76,8 @@ def moved(study: Study, elements: Elements, h: Hypothesis, shifts: Sequence[tupl
         centres = tuple(c + by.get(Edge("centre", i), 0.0) for i, c in enumerate(bell.centres))
         bell = bells.Bell(centres, max(bell.length + by.get(Edge("length"), 0.0), BRIEF))
         weights, windows = bells.by_blocks(study.fitted_runs, elements.histories.blocks, bell)
-        named = bells.name(bell, study.fitted_runs)
-        return replace(h, when=replace(h.when, name=named, weights=weights, windows=windows, bell=bell))
+        words = bells.name(bell, study.fitted_runs)
+        return replace(h, when=replace(h.when, name=words, weights=weights, windows=windows, bell=bell))
     ends = list(h.when.windows)
     spans = _spans(study)
     for edge, shift in shifts:
@@ -86,10 +86,11 @@ def moved(study: Study, elements: Elements, h: Hypothesis, shifts: Sequence[tupl
             ends[edge.window] = replace(w, end=float(np.clip(w.end + shift, w.start + SHORTEST, spans[w.run])))
         else:
             ends[edge.window] = replace(w, start=float(np.clip(w.start + shift, 0.0, w.end - SHORTEST)))
-    return replace(h, when=replace(h.when, name=_named(ends, spans), windows=tuple(ends)))
+    return replace(h, when=replace(h.when, name=named(ends, spans), windows=tuple(ends)))
 
 
-def _named(windows: Sequence[Window], spans: dict[str, float]) -> str:
+def named(windows: Sequence[Window], spans: dict[str, float]) -> str:
+    """Windows in words; spans: when every run ends [s]."""
     first, runs = windows[0], [w.run for w in windows]
     lasting = all(w.end >= spans[w.run] - 1.0 for w in windows) and len(set(runs)) == len(runs)
     if lasting and len(windows) > 1 and all(w.start == 0.0 for w in windows[1:]):

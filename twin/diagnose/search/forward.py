@@ -20,7 +20,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, exchanged, settled
-from twin.diagnose.search.contest import beginning, judged, misfit_of_each, proof, tried
+from twin.diagnose.search.contest import beginning, judged, misfit_of_each, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
@@ -78,9 +78,9 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         passing = _passing(detector, ranked, accepted, refused, limits)
         if not passing or len(accepted) >= policy.causes or fruitless >= policy.tries or imitated:
             break
-        ahead = [_starts(seen, h, policy) for h in passing[: policy.ahead]]
+        ahead = sorted((_starts(seen, h, policy) for h in passing), key=lambda starts: -worth(starts[0], policy))
         rest = exchanged(detector.study, y, accepted)
-        proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead))
+        proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead[: policy.ahead]))
         standing = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
         if not any(proof(detector, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)

@@ -46,7 +46,7 @@ class SearchPolicy:
     # what is named
     causes: int = _rule(3, JUDGED, "at most that are named together")
     tries: int = _rule(3, FIVE_AXIS, "rounds of candidates that the exact model refuses")
-    ahead: int = _rule(12, JUDGED, "of those that pass, how many get further windows before the best is chosen")
+    ahead: int = _rule(12, JUDGED, "of those that pass, the worthiest in their best windows, that are compared")
     named: float = _rule(0.7, FIVE_AXIS, "share of its own threshold that a name needs where another one passes")
     stands: float = _rule(0.5, FIVE_AXIS, "of its threshold, and of the least size, that a cause keeps beside others")
     switches: int = _rule(
@@ -61,6 +61,7 @@ class SearchPolicy:
     entrants: int = _rule(5, FIVE_AXIS, "candidates of a kind that are refitted")
     behind: float = _rule(0.15, FIVE_AXIS, "of the leader: who scores less cannot overtake it by being refitted")
     saturates: float = _rule(0.4, FIVE_AXIS, "of the leader, for capacities and coolants: linearity is worse there")
+    switched: float = _rule(0.6, LUMPED, "the same of windows: what is felt at once shows every error of the response")
     edge: float = _rule(4.0, FIVE_AXIS, "that an edge gains where nothing is hidden", "likelihood-ratio units")
     amplitude: float = _rule(8.0, FIVE_AXIS, "that a second amplitude costs", "likelihood-ratio units")
     gone: float = _rule(-0.7, JUDGED, "of a conductance that is nearly gone, and always refitted", "relative change")
@@ -69,6 +70,7 @@ class SearchPolicy:
     )
     growth: float = _rule(12.0, JUDGED, "that another window must bring", "likelihood-ratio units")
     growth_share: float = _rule(0.05, FIVE_AXIS, "and of what the others explain: windows imitate a cause's misfits")
+    sharpens: int = _rule(16, SOLVER, "quarters of blocks by which edges of windows move before a refit")
     most_windows: int = _rule(8, JUDGED, "of one cause")
     # declared numbers and signals
     closely: int = _rule(3, FIVE_AXIS, "factors that are fitted where their parameters are; of a signal exactly")
@@ -102,7 +104,7 @@ class SearchPolicy:
     thermocouple: float = _rule(0.1, JUDGED, "noise of a sensor that no fitted run has", "K")
     # iterations
     passes: int = _rule(3, SOLVER, "of an exact refit without edges")
-    window_passes: int = _rule(8, SOLVER, "of one with edges")
+    window_passes: int = _rule(16, SOLVER, "of one with edges")
     read_passes: int = _rule(6, SOLVER, "of what is read and not in proportion to its size")
     held: int = _rule(2, SOLVER, "passes that find a coolant's heat and edges for its usual film, before all are free")
     trial: int = _rule(4, SOLVER, "passes by which coolants are compared before the best of them are refitted")

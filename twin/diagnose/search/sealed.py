@@ -87,6 +87,8 @@ def judged(
         f"withdrawn: {names}. It explains the runs that were looked at, and predicts the sealed run worse beyond "
         f"chance; most {worst.name}, of which it leaves {after} (rms), and a calibration without it {before}"
     )
+    if rivals := list(dict.fromkeys(f"{r.family.replace('_', ' ')} at {r.place}" for c in extension for r in c.rivals)):
+        note += f". Not asked of the sealed run, and nearly as likely in the others: {', '.join(rivals)}"
     return Judged("unknown", tuple(c for c in causes if c not in extension), (), table, note)
 
 
