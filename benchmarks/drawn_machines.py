@@ -121,7 +121,7 @@ def _pair(place: str) -> str:
     return "sensors." + "<>".join(sorted(place.removeprefix("sensors.").split("<>")))
 
 
-def _simulate(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachine, seed: int) -> list[Path]:
+def simulated(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachine, seed: int) -> list[Path]:
     made = []
     for k, run in enumerate(runs):
         target = out / run.name
@@ -184,7 +184,7 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
     drawn.write(folder / "m")
     machine = drawn.machine(folder / "m")
     logs = [folder / "m" / "runs" / name for name in RUNS]
-    measured_runs: list[Measured] = [_healthy(drawn, folder, logs, k) for k in range(TRUTHS)]
+    measured_runs: list[Measured] = [healthy_runs(drawn, folder, logs, k) for k in range(TRUTHS)]
     runs = [read_run(p) for p in measured_runs[0][1]]
     settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
     nothing: Any = None
@@ -243,12 +243,12 @@ def _largest(values: np.ndarray, rows: int) -> float:
     return float(np.abs(values[:n].reshape(-1, rows).mean(axis=1)).max(initial=0.0))
 
 
-def _healthy(drawn: DrawnMachine, folder: Path, logs: Sequence[Path], k: int) -> Measured:
+def healthy_runs(drawn: DrawnMachine, folder: Path, logs: Sequence[Path], k: int) -> Measured:
     """A real machine with nothing hidden, and its runs."""
     real = folder / f"real_{k}"
     real.mkdir()
     (real / "machine.toml").write_text(other(drawn.text, 1000 * drawn.seed + k, folder / "m"), encoding="utf-8")
-    return ("nothing", "", ""), _simulate(real, logs, folder / f"null_{k}", drawn, 10 + k)
+    return ("nothing", "", ""), simulated(real, logs, folder / f"null_{k}", drawn, 10 + k)
 
 
 def _in_machine(
@@ -257,7 +257,7 @@ def _in_machine(
     """Runs of a real machine with a fault; none where it cannot be hidden there."""
     if command(["hide", *hidden, str(real), "-o", str(out / "real")]):
         return []
-    return _simulate(out / "real", logs, out, drawn, seed)
+    return simulated(out / "real", logs, out, drawn, seed)
 
 
 def _misread(
@@ -268,7 +268,7 @@ def _misread(
     for log, where in zip(logs, saw, strict=True):
         if command(["hide", "signal", hidden[1], f"{1.0 / float(hidden[2]):.12g}", str(log), "-o", str(where)]):
             return []
-    return _simulate(real, saw, out, drawn, seed)
+    return simulated(real, saw, out, drawn, seed)
 
 
 def _in_log(healthy: Sequence[Path], out: Path, hidden: tuple[str, str, str]) -> list[Path]:

@@ -1,0 +1,163 @@
+"""The other families, hidden in drawn networks: `python -m benchmarks.drawn_families FIRST N`.
+
+As `benchmarks.drawn_machines`, of the same machines and beside their measurements with nothing hidden; each has one
+effect of every entry of `effects`: what switches within a run, what follows a signal, what is at another place, what
+acts on one reading. A row per trial goes to out/drawn/families_SEED.jsonl, and files that are there are not made again.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.drawn_machines import OUT, RUNS, SHARE, VISIBLE, Row, drawn_of, healthy_runs, moved, said, simulated
+from twin.cli.main import run as command
+from twin.diagnose.pipeline import Settings, prepare
+from twin.inject.machines.drawn import DrawnMachine
+from twin.logs.read import read_run
+from twin.machine.description import Machine
+
+HEARD = "measurement", "not_thermal", "slip"  # seen at the TCP alone
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One effect as `twin hide` takes it."""
+
+    family: str
+    place: str
+    size: str
+    options: tuple[str, ...] = ()
+    in_log: bool = False
+
+
+def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Hidden]:
+    """One of each kind, places drawn from the machine's seed. power: W, of all sources in the mean."""
+    rng = np.random.default_rng([drawn.seed, 99])
+
+    def one(of: Sequence[str]) -> str:
+        return of[int(rng.integers(len(of)))]
+
+    nodes, hours = list(machine.nodes), float(drawn.hours)
+    sensors = [f"sensors.{n}" for n, s in machine.sensors.items() if s.environment is None]
+    own = [n for n, s in machine.sources.items() if s.contact is None]
+    currents = [n for n, s in machine.signals.items() if str(s.unit) == "A"]
+    environment = next(e for e in machine.environment.values() if e.signal)
+    heat = max(SHARE * power, 5.0)
+    during = ("--from", f"{0.25 * hours:.1f} h", "--to", f"{0.6 * hours:.1f} h")
+    day = ("--from", "0.5 h", "--to", f"{min(hours - 0.3, 5.0):.1f} h")
+    found = [
+        Hidden("zone", f"films.{one(list(machine.films))}", "4 K"),
+        Hidden("heat_source", one(nodes), f"{2.0 * heat:.3g} W", during),
+        Hidden("sun", one(nodes), f"{4.0 * heat:.3g} W", day),
+        Hidden("coolant", one(nodes), "60 W/(m^2*K)", ("--setting", "temperature=14 degC", *during)),
+        Hidden("joint", f"contacts.{one(list(machine.contacts))}", "0.2", ("--from", f"{0.4 * hours:.1f} h")),
+        Hidden("sensor", one(sensors), "900 s", ("--history", "lag"), True),
+        Hidden("sensor", one(sensors), "0.5", ("--history", "detached", "--signal", environment.signal or ""), True),
+        Hidden("measurement", "tcp.dx", "8 um", ("--history", "drift"), True),
+        Hidden("slip", "tcp.dx", "4 um", (), True),
+    ]
+    if own:
+        source = one(own)
+        others = [n for n in nodes if n != (machine.sources[source].surface or "")]
+        found.append(Hidden("misplaced_source", f"sources.{source}", one(others)))
+    if currents:
+        found.append(
+            Hidden("heat_source", one(nodes), f"{2.0 * heat:.3g} W", ("--signal", one(currents), "--exponent", "2"))
+        )
+    return found
+
+
+def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Hidden, seed: int) -> list[Path]:
+    """Runs with an effect; none where it cannot be hidden there. A joint that is lost in the first run stays lost."""
+    logs = [folder / "m" / "runs" / name for name in RUNS]
+    asked = [hidden.family, hidden.place, hidden.size]
+    if hidden.in_log:
+        runs = [folder / "null_1" / name for name in RUNS]
+        made = [out / run.name for run in runs]
+        for run, target in zip(runs, made, strict=True):
+            if command(["hide", *asked, str(run), "-o", str(target), *hidden.options]):
+                return []
+        return made
+    timed = "--from" in hidden.options
+    switched = [word for log in logs for word in ("--run", str(log))] if timed else []
+    real = out / "real"
+    if command(["hide", *asked, str(folder / "real_0"), "-o", str(real), *hidden.options, *switched]):
+        return []
+    if timed:
+        logs = [real / "runs" / log.name for log in logs]
+    if hidden.family != "joint":
+        return simulated(real, logs, out, drawn, seed)
+    lost = out / "lost"
+    if command(["hide", *asked, str(folder / "real_0"), "-o", str(lost)]):
+        return []
+    after = [folder / "m" / "runs" / name for name in RUNS[1:]]
+    return [*simulated(real, logs[:1], out, drawn, seed), *simulated(lost, after, out, drawn, seed + 1000)]
+
+
+def answer(row: Row) -> str:
+    """What a row is worth: "right" (family and place first), "among" (named besides, or one of what cannot be
+    distinguished), "place" (another family at its place), "missed", "too_poor", "unknown" or "wrong"."""
+    family, place = row["hidden"][:2]
+    if row["verdict"] in ("nothing", "too_poor", "unknown"):
+        return "missed" if row["verdict"] == "nothing" else row["verdict"]
+    named = [(c[0], c[1]) for c in row["causes"]]
+    if named and named[0] == (family, place):
+        return "right"
+    told = [*named, *map(tuple, row["rivals"])]
+    return "among" if (family, place) in told else "place" if named and named[0][1] == place else "wrong"
+
+
+def asked(seed: int, folder: Path) -> list[Row]:
+    """A row per effect of one machine."""
+    drawn = drawn_of("lumped", seed)
+    drawn.write(folder / "m")
+    machine = drawn.machine(folder / "m")
+    logs = [folder / "m" / "runs" / name for name in RUNS]
+    healthy = [[read_run(p) for p in healthy_runs(drawn, folder, logs, k)[1]] for k in range(2)]
+    settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
+    nothing: Any = None
+    detector = prepare(nothing, machine, healthy[0][:2], healthy[0][2:], settings)[2]
+    power = float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
+    rows = []
+    for i, hidden in enumerate(effects(drawn, machine, power)):
+        if made := measured(drawn, folder, folder / f"effect_{i}", hidden, 40 + i):
+            own = [read_run(p) for p in made]
+            row = said(detector, (hidden.family, hidden.place, hidden.size, *hidden.options), own)
+            rows.append(row | {"moved": moved(own, healthy[1 if hidden.in_log else 0]), "seed": seed})
+    return rows
+
+
+def main(first: int, count: int) -> None:
+    OUT.mkdir(parents=True, exist_ok=True)
+    rows: list[Row] = []
+    for seed in range(first, first + count):
+        path = OUT / f"families_{seed}.jsonl"
+        if not path.exists():
+            with tempfile.TemporaryDirectory() as folder:
+                made = asked(seed, Path(folder))
+            path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
+        rows += [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    answers: dict[str, Counter[str]] = {}
+    for row in rows:
+        named = [c[:4] for c in row["causes"]]
+        seen = row["hidden"][0] in HEARD or any(m >= least for m, least in zip(row["moved"], VISIBLE, strict=True))
+        print(row["seed"], *row["hidden"], answer(row), row["verdict"], named, "" if seen else "(not visible)")
+        if seen:
+            kind = next((o for o in row["hidden"][3:] if o in ("--from", "--signal", "lag", "detached")), "")
+            answers.setdefault(f"{row['hidden'][0]} {kind.strip('-')}", Counter())[answer(row)] += 1
+    print("of those that are visible")
+    for what, counted in answers.items():
+        print(f"   {what:<22} {', '.join(f'{n} {told}' for told, n in counted.most_common())}")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))
