@@ -7,25 +7,35 @@ acts on one reading. A row per trial goes to out/drawn/families_SEED.jsonl, and 
 
 from __future__ import annotations
 
-import json
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from benchmarks.drawn_machines import OUT, RUNS, SHARE, VISIBLE, Row, drawn_of, healthy_runs, moved, said, simulated
+from benchmarks.drawn_machines import (
+    RUNS,
+    SHARE,
+    TRUTHS,
+    VISIBLE,
+    Row,
+    detector_of,
+    drawn_of,
+    healthy_runs,
+    kept,
+    moved,
+    said,
+    simulated,
+)
 from twin.cli.main import run as command
-from twin.diagnose.pipeline import Settings, prepare
 from twin.inject.machines.drawn import DrawnMachine
 from twin.logs.read import read_run
 from twin.machine.description import Machine
 
-HEARD = "measurement", "not_thermal", "slip"  # seen at the TCP alone
+OF_TCP = "measurement", "slip"  # families that change readings of the TCP alone, and are always asked for
 
 
 @dataclass(frozen=True)
@@ -79,25 +89,25 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Hidden]
 def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Hidden, seed: int) -> list[Path]:
     """Runs with an effect; none where it cannot be hidden there. A joint that is lost in the first run stays lost."""
     logs = [folder / "m" / "runs" / name for name in RUNS]
-    asked = [hidden.family, hidden.place, hidden.size]
+    told = [hidden.family, hidden.place, hidden.size]
     if hidden.in_log:
         runs = [folder / "null_1" / name for name in RUNS]
         made = [out / run.name for run in runs]
         for run, target in zip(runs, made, strict=True):
-            if command(["hide", *asked, str(run), "-o", str(target), *hidden.options]):
+            if command(["hide", *told, str(run), "-o", str(target), *hidden.options]):
                 return []
         return made
     timed = "--from" in hidden.options
     switched = [word for log in logs for word in ("--run", str(log))] if timed else []
     real = out / "real"
-    if command(["hide", *asked, str(folder / "real_0"), "-o", str(real), *hidden.options, *switched]):
+    if command(["hide", *told, str(folder / "real_0"), "-o", str(real), *hidden.options, *switched]):
         return []
     if timed:
         logs = [real / "runs" / log.name for log in logs]
     if hidden.family != "joint":
         return simulated(real, logs, out, drawn, seed)
     lost = out / "lost"
-    if command(["hide", *asked, str(folder / "real_0"), "-o", str(lost)]):
+    if command(["hide", *told, str(folder / "real_0"), "-o", str(lost)]):
         return []
     after = [folder / "m" / "runs" / name for name in RUNS[1:]]
     return [*simulated(real, logs[:1], out, drawn, seed), *simulated(lost, after, out, drawn, seed + 1000)]
@@ -116,40 +126,29 @@ def answer(row: Row) -> str:
     return "among" if (family, place) in told else "place" if named and named[0][1] == place else "wrong"
 
 
-def asked(seed: int, folder: Path) -> list[Row]:
+def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
     """A row per effect of one machine."""
-    drawn = drawn_of("lumped", seed)
     drawn.write(folder / "m")
     machine = drawn.machine(folder / "m")
     logs = [folder / "m" / "runs" / name for name in RUNS]
-    healthy = [[read_run(p) for p in healthy_runs(drawn, folder, logs, k)[1]] for k in range(2)]
-    settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
-    nothing: Any = None
-    detector = prepare(nothing, machine, healthy[0][:2], healthy[0][2:], settings)[2]
-    power = float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
+    healthy = [[read_run(p) for p in healthy_runs(drawn, folder, logs, k)[1]] for k in range(TRUTHS)]
+    detector, power = detector_of(drawn, machine, healthy[0])
     rows = []
     for i, hidden in enumerate(effects(drawn, machine, power)):
         if made := measured(drawn, folder, folder / f"effect_{i}", hidden, 40 + i):
             own = [read_run(p) for p in made]
             row = said(detector, (hidden.family, hidden.place, hidden.size, *hidden.options), own)
-            rows.append(row | {"moved": moved(own, healthy[1 if hidden.in_log else 0]), "seed": seed})
+            rows.append(row | {"moved": moved(own, healthy[1 if hidden.in_log else 0])})
     return rows
 
 
 def main(first: int, count: int) -> None:
-    OUT.mkdir(parents=True, exist_ok=True)
-    rows: list[Row] = []
-    for seed in range(first, first + count):
-        path = OUT / f"families_{seed}.jsonl"
-        if not path.exists():
-            with tempfile.TemporaryDirectory() as folder:
-                made = asked(seed, Path(folder))
-            path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
-        rows += [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    seeds = range(first, first + count)
+    rows = [row for seed in seeds for row in kept("families", seed, partial(judged, drawn_of("lumped", seed)))]
     answers: dict[str, Counter[str]] = {}
     for row in rows:
         named = [c[:4] for c in row["causes"]]
-        seen = row["hidden"][0] in HEARD or any(m >= least for m, least in zip(row["moved"], VISIBLE, strict=True))
+        seen = row["hidden"][0] in OF_TCP or any(m >= least for m, least in zip(row["moved"], VISIBLE, strict=True))
         print(row["seed"], *row["hidden"], answer(row), row["verdict"], named, "" if seen else "(not visible)")
         if seen:
             kind = next((o for o in row["hidden"][3:] if o in ("--from", "--signal", "lag", "detached")), "")

@@ -16,7 +16,8 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.report.recalibration import large
 from twin.diagnose.report.text import alike
+from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.sealed import judged as on_sealed
 from twin.diagnose.search.verdict import pulls_of, verdict_of, with_faults
@@ -122,6 +124,7 @@ def _pair(place: str) -> str:
 
 
 def simulated(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachine, seed: int) -> list[Path]:
+    """What the full model of a machine measures in runs, with the noise of a drawn one."""
     made = []
     for k, run in enumerate(runs):
         target = out / run.name
@@ -134,16 +137,19 @@ def simulated(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachin
 
 
 def main(first: int, count: int, kind: str = "") -> None:
+    seeds = range(first, first + count)
+    counted([row for seed in seeds for row in kept(kind or "any", seed, partial(judged, drawn_of(kind, seed)))])
+
+
+def kept(name: str, seed: int, ask: Callable[[Path], list[Row]]) -> list[Row]:
+    """The rows of a machine in out/drawn/NAME_SEED.jsonl; made in a temporary folder where there are none."""
     OUT.mkdir(parents=True, exist_ok=True)
-    rows: list[Row] = []
-    for seed in range(first, first + count):
-        path = OUT / f"{kind or 'any'}_{seed}.jsonl"
-        if not path.exists():
-            with tempfile.TemporaryDirectory() as folder:
-                made = judged(drawn_of(kind, seed), Path(folder))
-            path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
-        rows += [json.loads(line) | {"seed": seed} for line in path.read_text(encoding="utf-8").splitlines()]
-    counted(rows)
+    path = OUT / f"{name}_{seed}.jsonl"
+    if not path.exists():
+        with tempfile.TemporaryDirectory() as folder:
+            made = ask(Path(folder))
+        path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
+    return [json.loads(line) | {"seed": seed} for line in path.read_text(encoding="utf-8").splitlines()]
 
 
 def counted(rows: Sequence[Row]) -> None:
@@ -185,11 +191,7 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
     machine = drawn.machine(folder / "m")
     logs = [folder / "m" / "runs" / name for name in RUNS]
     measured_runs: list[Measured] = [healthy_runs(drawn, folder, logs, k) for k in range(TRUTHS)]
-    runs = [read_run(p) for p in measured_runs[0][1]]
-    settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
-    nothing: Any = None
-    detector = prepare(nothing, machine, runs[:2], runs[2:], settings)[2]
-    power = float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
+    detector, power = detector_of(drawn, machine, [read_run(p) for p in measured_runs[0][1]])
     for i, hidden in enumerate(trials(drawn, machine, power)):
         out = folder / f"trial_{i}"
         if hidden[0] in IN_MACHINE:
@@ -208,6 +210,14 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
         by = (np.inf, np.inf) if beside is None else moved(own, beside)
         rows.append(said(detector, hidden, own) | {"moved": by, "same": same_place(machine, hidden[1])})
     return rows
+
+
+def detector_of(drawn: DrawnMachine, machine: Machine, runs: Sequence[Run]) -> tuple[Detector, float]:
+    """What all trials of a machine are diagnosed with, and the mean power of all its sources [W]."""
+    settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
+    nothing: Any = None
+    detector = prepare(nothing, machine, runs[:2], runs[2:], settings)[2]
+    return detector, float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
 
 
 def same_place(machine: Machine, place: str) -> list[str]:

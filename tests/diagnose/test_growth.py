@@ -10,7 +10,7 @@ import pytest
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.evidence.bells import Bell, by_blocks, name
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.growth import chilled, grown, sharpened
+from twin.diagnose.search.growth import chilled, grown, refined_edges
 
 BLOCKS = 6
 
@@ -115,11 +115,9 @@ def test_no_cold_and_no_coolant_begin_nowhere_else():
 def windows_of_heat(hours: int, step: float, decay: float) -> tuple[np.ndarray, Batch]:
     """(steps, hours) what a sensor reads beside a small mass of a time constant `decay` [s] heated for each hour, and
     every stretch of hours."""
-    n, per = int(hours * 3600 / step), int(3600 / step)
-    t = step * np.arange(1, n + 1)
+    t = step * np.arange(1, int(hours * 3600 / step) + 1)
     begun = [np.where(t > 3600.0 * b, 1.0 - np.exp(-np.clip(t - 3600.0 * b, 0.0, None) / decay), 0.0)
              for b in range(hours + 1)]  # fmt: skip
-    assert per * hours == n
     D = np.stack([a - b for a, b in pairwise(begun)], axis=1)
     stretches = [(a, b) for a in range(hours) for b in range(a + 1, hours + 1)]
     histories = tuple(
@@ -146,14 +144,14 @@ def test_windows_begin_and_end_between_the_hours():
     y = 10.0 * (grow[0] - grow[1])
     g, F = D.T @ y, D.T @ D
     hours = max((of(batch, k, g, F) for k in range(len(batch.histories))), key=lambda h: h.statistic)
-    found = sharpened(hours, g, F)
+    found = refined_edges(hours, g, F)
     (window,) = found.when.windows
     assert (window.start, window.end) == pytest.approx((2.25 * 3600, 5.5 * 3600), abs=901.0)
     assert window.start % 900.0 == window.end % 900.0 == 0.0
     assert y @ y - found.statistic < 0.6 * (y @ y - hours.statistic)
     assert found.amplitude[0] == pytest.approx(10.0, rel=0.1)
     assert found.when.name == f"from {window.start / 3600:.1f} h to {window.end / 3600:.1f} h of a"
-    again = sharpened(found, g, F)  # there is nothing better near it
+    again = refined_edges(found, g, F)  # there is nothing better near it
     assert again.when.windows == found.when.windows
 
 
@@ -163,5 +161,20 @@ def test_what_lasts_to_the_end_of_a_run_keeps_its_end():
     y = 5.0 * np.where(t > 2.5 * 3600, 1.0 - np.exp(-np.clip(t - 2.5 * 3600, 0.0, None) / 600.0), 0.0)
     g, F = D.T @ y, D.T @ D
     k = next(i for i, h in enumerate(batch.histories) if h.windows[0].start == 7200.0 and h.windows[0].end == 21600.0)
-    found = sharpened(of(batch, k, g, F), g, F)
+    found = refined_edges(of(batch, k, g, F), g, F)
     assert (found.when.windows[0].start, found.when.windows[0].end) == (2.5 * 3600, 6 * 3600.0)
+
+
+def test_a_familys_own_windows_keep_their_edges():
+    """Of histories that act in every run alike, as a user's own family has them, no block is known by itself."""
+    first = tuple(Window(run, 0.0, 3600.0) for run in "ab")
+    longer = tuple(Window(run, 0.0, 7200.0) for run in "ab")
+    histories = (
+        History("1 h", np.array([[1.0, 0.0, 1.0, 0.0]]), windows=first),
+        History("2 h", np.ones((1, 4)), windows=longer),
+    )
+    batch = Batch("heat_source", "heat", "W", ("p",), np.arange(4)[None], histories, 1)
+    g, F = np.array([5.0, 4.0, 5.0, 4.0]), np.eye(4)
+    h = of(batch, 0, g, F)
+    assert refined_edges(h, g, F) is h
+    assert grown(h, g, F).when.windows == first

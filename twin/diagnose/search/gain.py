@@ -100,7 +100,7 @@ def channels_of(found: Search, k: int, sealed: Measured, sigma: tuple[np.ndarray
 
 
 def gains(channels: Sequence[Channel], seed: int, policy: SearchPolicy) -> tuple[Gain, ...]:
-    """Per channel of a run."""
+    """Per channel."""
     rng = np.random.default_rng(seed)
     return tuple(gain_of(c, rng, policy) for c in channels)
 

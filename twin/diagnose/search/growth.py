@@ -32,7 +32,7 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy 
     others = [w for w in h.batch.histories if w.windows]
     W = np.stack([w.weights for w in others])  # (h, q, L)
     spans = _spans(_blocks(h.batch.histories))
-    current = sharpened(h, g, block, policy)
+    current = refined_edges(h, g, block, policy)
     for _ in range(policy.most_windows - 1):
         now = current.when.weights
         free = np.flatnonzero((np.abs(W) * np.abs(now)).sum(axis=(1, 2)) == 0.0)
@@ -49,24 +49,25 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy 
         windows = tuple(sorted((*current.when.windows, *more.windows), key=lambda w: (w.run, w.start)))
         when, a = replace(unions[k], name=named(windows, spans), windows=windows), scores.amplitude[0, k]
         more_of = Hypothesis(h.batch, h.place, when, statistic, tuple(map(float, a)), float(ready.information[0, k]))
-        current = sharpened(more_of, g, block, policy)
+        current = refined_edges(more_of, g, block, policy)
     return current
 
 
-def sharpened(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis:
+def refined_edges(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis:
     """A hypothesis whose windows begin and end at the quarters of blocks that the data like best, one edge after the
     other. What begins or ends with a run stays. A block in which it acts for a part of the time has that part. Not of a
-    coolant: a strong film saturates, and a score that takes it as linear says little of when it began.
+    coolant: a strong film saturates, and a score that takes it as linear says little of when it began. Nor where the
+    histories of a family do not tell what each block does, such as those that begin with every run.
 
     block (L, L): D^T Pi D among the columns of its place.
     """
-    if fault_of(h).wets:
-        return h
     parts = _blocks(h.batch.histories)
+    if fault_of(h).wets or not parts or not np.allclose(_acting(parts, h.when.windows), h.when.weights):
+        return h
     spans = _spans(parts)
     alone = replace(h.batch, places=(h.name,), columns=h.batch.columns[h.place : h.place + 1])
     current = h
-    for _ in range(policy.sharpens):
+    for _ in range(policy.edge_moves):
         tried = [(w, _acting(parts, w)) for w in _shifted(parts, current.when.windows)]
         if not tried:
             break

@@ -70,7 +70,7 @@ class SearchPolicy:
     )
     growth: float = _rule(12.0, JUDGED, "that another window must bring", "likelihood-ratio units")
     growth_share: float = _rule(0.05, FIVE_AXIS, "and of what the others explain: windows imitate a cause's misfits")
-    sharpens: int = _rule(16, SOLVER, "quarters of blocks by which edges of windows move before a refit")
+    edge_moves: int = _rule(16, SOLVER, "quarters of blocks by which edges of windows move before a refit")
     most_windows: int = _rule(8, JUDGED, "of one cause")
     # declared numbers and signals
     closely: int = _rule(3, FIVE_AXIS, "factors that are fitted where their parameters are; of a signal exactly")

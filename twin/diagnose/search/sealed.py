@@ -3,11 +3,11 @@
 They never make a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But causes
 of the machine are withdrawn with which the sealed runs are less likely, beyond chance, than with a recalibrated model.
 Where they are likelier with another size that the data allow, they refute the size alone: the name stays, and nothing
-is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled
-calibration makes of it without its tolerance. What is told of a declared number is judged beside a calibration of all
-others, and a factor of a signal beside one that leaves the sources which read it as declared. A number that
-calibration alone moved out of its tolerance is judged beside the calibration that keeps it in, and needs this
-confirmation where only the fit behind the scores is sure of it.
+is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled calibration
+makes of it without its tolerance. What is told of a declared number is judged beside a calibration of all others, and a
+factor of a signal beside one that leaves the sources which read it as declared. A number that calibration alone moved
+out of its tolerance is judged beside the calibration that keeps it in, and needs this confirmation where only the fit
+behind the scores is sure of it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
-from twin.diagnose.result.numbers import quantity
+from twin.diagnose.result.numbers import quantity, rms
 from twin.diagnose.search.accepted import Accepted, freed, settled
 from twin.diagnose.search.declared import imitating, with_signal
 from twin.diagnose.search.detector import Detector
@@ -81,8 +81,8 @@ def judged(
             f"withdrawn: {names}. Only the fit behind the scores is sure of it, and predicts the sealed run no better"
         )
         return Judged("sensor" if rest else "nothing", rest, (), table, note)
-    worst = max((c for c in channels if c.moved), key=lambda c: (_rms(c.errors[2]) - _rms(c.errors[1])) / c.noise)
-    after, before = (quantity(_rms(worst.errors[k]), worst.unit) for k in (2, 1))
+    worst = max((c for c in channels if c.moved), key=lambda c: float(rms(c.errors[2]) - rms(c.errors[1])) / c.noise)
+    after, before = (quantity(float(rms(worst.errors[k])), worst.unit) for k in (2, 1))
     note = (
         f"withdrawn: {names}. It explains the runs that were looked at, and predicts the sealed run worse beyond "
         f"chance; most {worst.name}, of which it leaves {after} (rms), and a calibration without it {before}"
@@ -133,10 +133,6 @@ def _worth(channels: Sequence[Channel], seed: int, policy: SearchPolicy) -> int:
     """Whether the sealed runs are likelier with the causes (1), less likely (-1), or neither beyond chance."""
     low, high = likelihood_ratio(channels, seed, policy)
     return int(low > 0.0) - int(high < 0.0)
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
 
 
 def other_sizes(found: Search, y: np.ndarray) -> Iterator[tuple[Accepted, ...]]:
