@@ -10,6 +10,8 @@ READY := $(VENV)/.ready
 OUT ?= out
 WHEELS ?= out/wheelhouse
 PYTEST_ARGS ?=
+# tests that read the source alone: `make check` runs them, `make test` does not run them again
+SOURCE_TESTS := tests/test_complexity.py tests/test_constants.py tests/test_imports.py tests/test_words.py
 
 .PHONY: help
 help: ## this list
@@ -33,20 +35,24 @@ setup: $(READY) ## make .venv with the pinned dependencies and this package
 	@echo "ready: $(BIN)/twin --help"
 
 .PHONY: check
-check: $(READY) ## style, format, types, the import rules and the size of functions
+check: $(READY) ## style, format, types, the import rules, the size of functions, constants and words
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --cache-dir .cache/import_linter
-	$(BIN)/python -m pytest -q tests/test_complexity.py
+	$(BIN)/python -m pytest -q -n 2 $(SOURCE_TESTS)
 
 .PHONY: test
-test: $(READY) ## every behaviour, with hidden effects of four families in a small machine (13 min on two cores)
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
+test: $(READY) ## every behaviour, quickly (5 min on two cores)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(SOURCE_TESTS)) $(PYTEST_ARGS)
 
 .PHONY: test-long
-test-long: $(READY) ## the rest of what continuous integration runs (some 16 min)
+test-long: $(READY) ## the rest of what continuous integration runs: hidden effects, exports, servers
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "long and not slow" $(PYTEST_ARGS)
+
+.PHONY: test-slow
+test-slow: $(READY) ## what continuous integration has no time for: before a release, and after a change to what it covers
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "slow and not trials" $(PYTEST_ARGS)
 
 .PHONY: test-hidden
 test-hidden: $(READY) ## effects hidden in the five-axis machine, its stored diagnoses, planned experiments: after a change to what decides

@@ -64,6 +64,7 @@ def test_what_editors_are_told_is_what_there_is():
     assert all(getattr(twin, name) is not None for name in told)
 
 
+@pytest.mark.long
 def test_a_verb_stays_callable_once_its_package_is_imported():
     done = python(
         "import twin.build.pipeline, twin.run, twin\n"
@@ -181,6 +182,7 @@ def test_an_edited_machine_has_the_values_and_the_first_stays(tmp_path):
         machine.edited({"contacts.flange.total": 4.0}, SPINDLE / "machine.toml")
 
 
+@pytest.mark.long
 def test_verifying_gives_a_certificate_with_the_full_model_only_where_asked(tmp_path):
     model = twin.build(SPINDLE, options=QUICK)
     assert model.certificate.passed

@@ -53,7 +53,7 @@ def recipes() -> dict[str, str]:
     return found
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_recipes_run_in_their_order(repository):
     assert len(recipes()) == 10
     names: dict[str, object] = {}

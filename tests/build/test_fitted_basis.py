@@ -91,6 +91,7 @@ def error(reduced: AffineBody, body: AffineBody, films: list[np.ndarray]) -> flo
     return max(off / size for size, off in largest)
 
 
+@pytest.mark.long
 def test_it_has_a_fraction_of_the_error_of_modes_chosen_by_what_they_capture(machine):
     (body,), films = machine.bodies, films_of(machine, 8, 2)
     snapshots = [responses(body, films, 0.3)]

@@ -25,6 +25,8 @@ from twin.machine.parameters import parameters
 from twin.rom.artefact import read_artefact, write_artefact
 from twin.rom.drive import evaluate
 
+pytestmark = pytest.mark.long
+
 BEFORE = "[signals.x_position]"
 HOLDER = """[nodes.holder]
 capacity = "1200 J/K"

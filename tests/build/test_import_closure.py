@@ -71,6 +71,7 @@ def test_a_module_that_is_not_there_is_an_error(tmp_path):
         import_closure("twin.nothing", package(tmp_path))
 
 
+@pytest.mark.long
 def test_everything_that_python_imports_with_a_module_is_in_its_closure():
     module = "twin.diagnose.search.detector"
     show = f"import sys, {module}; print(*(m for m in sys.modules if m.startswith('twin.')))"
@@ -95,6 +96,7 @@ def test_what_only_uses_thresholds_does_not_decide_about_them():
     assert not [name for name in closure if name.startswith(("twin.cli", "twin.pictures", "twin.inject"))]
 
 
+@pytest.mark.long
 def test_an_edit_two_imports_away_in_this_package_is_a_miss(tmp_path):
     """twin.diagnose.search.detector -> twin.diagnose.model.probed_model -> twin.calibrate.fit.window."""
     hashes = {}

@@ -54,6 +54,7 @@ def true_error(machine: Machine, full: FullModel, scenarios: list[Scenario]) -> 
     return T, u.max(axis=0)
 
 
+@pytest.mark.long
 def test_the_estimate_is_within_a_factor_of_two_of_the_error_against_a_much_finer_mesh(
     machine: Machine, full: FullModel, scenarios: list[Scenario], estimate: Part
 ):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from inspect import signature
 
 import numpy as np
+import pytest
 
 from tests.support.descriptions import SLIDE
 from twin.build.acting import Acting
@@ -16,6 +17,8 @@ from twin.logs.signals import signal_values
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
 from twin.rom.drive import evaluate
+
+pytestmark = pytest.mark.long
 
 
 def test_every_contact_is_lost_in_some_draws_and_all_else_stays_near_its_prior():

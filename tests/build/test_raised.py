@@ -63,6 +63,7 @@ def test_at_rest_everything_is_as_warm_as_the_air_where_it_stands(tmp_path, plac
     assert moved == pytest.approx([2.0 * (1.5 + UP * place - 1.0)], abs=1e-9)
 
 
+@pytest.mark.long
 def test_what_rises_and_falls_follows_the_air_it_passes(tmp_path):
     """Against C dT/dt = h A (T_air(t) - T), with a film that what stands still is in, too; both integrators."""
     omega, hours = 2 * np.pi / 1800.0, 2.0

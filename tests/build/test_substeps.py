@@ -24,6 +24,7 @@ def errors() -> dict[int, float]:
     return found
 
 
+@pytest.mark.long
 def test_tighter_limits_take_more_substeps_and_these_hold_them(errors):
     assert errors[2] < 0.7 * errors[1]  # the limits below are apart
     limits = [20.0 * errors[1], *(errors[1] * 2.0**-k for k in range(-2, 3)), errors[4] / 20.0]

@@ -18,6 +18,8 @@ from twin.rom.artefact import read_artefact
 from twin.rom.field_file import SurfaceField
 from twin.rom.surface_motion import is_known, surface_displacements
 
+pytestmark = pytest.mark.long
+
 
 def test_heat_forces_and_rigid_motion_make_the_displacements_of_all_nodes():
     """Any temperatures of the nodes as the one direction of a basis: nothing is lost but rounding."""

@@ -30,6 +30,8 @@ from twin.run.replay import integrate
 from twin.run.stepping import inputs_of
 from twin.run.system import prepare
 
+pytestmark = pytest.mark.long
+
 FACTOR = {"plate": 0.02, "x_guide": 4.0, "x_screw": 0.1}
 CLAMP = '[signals.clamp]\nunit = "1"\nrange = [0, 1]\n\n'
 EDITS = (
@@ -151,7 +153,6 @@ def test_a_factor_kept_while_a_joint_creeps_changes_little(models):
     np.testing.assert_allclose(kept.stored, heat, atol=1e-10 * np.abs(heat).max())
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("value", [1.0, 1.7])
 def test_the_window_model_takes_switched_contacts(machine, models, value):
     """Its step against the runtime's, at the described conductances and at others."""

@@ -155,6 +155,7 @@ def test_a_turning_axis_needs_an_angle(tmp_path):
         assemble(described(tmp_path, ('unit = "deg"\nrange = [-120, 120]', 'unit = "mm"\nrange = [-120, 120]')))
 
 
+@pytest.mark.long
 def test_it_bends_as_if_meshed_as_it_stands(machine, full):
     """Random angles and positions: within 5 % of what turning changes."""
     rng = np.random.default_rng(7)

@@ -14,6 +14,8 @@ from twin.rom.artefact import Artefact, read_artefact
 from twin.run.replay import replay
 from twin.run.results import Result
 
+pytestmark = pytest.mark.long
+
 MODEL = synthetic.machine()
 HALF_STEP = 30.0  # s
 

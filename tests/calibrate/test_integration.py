@@ -12,6 +12,8 @@ from twin.calibrate.fit.problem import problem
 from twin.calibrate.fit.training import fields_of, states_at
 from twin.rom.load_model import LawUse
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def case():
@@ -70,7 +72,6 @@ def test_derivatives_are_those_of_differences(case):
             assert np.abs(got - difference).max() < 2e-3 * scale, made.names[k]
 
 
-@pytest.mark.long
 def test_derivatives_are_exact_where_laws_are_smooth():
     """Constant films: outputs are analytic in the parameters, and differences agree to their rounding."""
     a = lumped_case.artefact()

@@ -18,6 +18,8 @@ from twin.logs.write import write_run
 from twin.rom.artefact import Artefact, read_artefact
 from twin.run.replay import replay
 
+pytestmark = pytest.mark.long
+
 MODEL_MACHINE = synthetic.machine()
 OFFSET = 0.5  # K, of sensor T01
 GAIN = 1.25  # of the measured TCP error
@@ -142,7 +144,6 @@ def test_segments_may_start_anew(artefact):
     assert figure(wrong, "scored", "glued", "first", "T02", MODEL).rms < 0.01
 
 
-@pytest.mark.long
 def test_command_writes_every_figure(path, folders, tmp_path, capsys):
     out = tmp_path / "out"
     arguments = [str(path), folders[0], "--sealed", folders[1], "--train", folders[2], "-o", str(out)]

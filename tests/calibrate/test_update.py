@@ -29,6 +29,8 @@ from twin.rom.drive import evaluate
 from twin.run.replay import replay
 from twin.run.system import prepare
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 SLIDE = ROOT / "tests" / "machines" / "slide"
 NOISE = Noise(0.05, 0.3e-6, 1)
@@ -90,7 +92,6 @@ def share(measured, predicted):
     return 1.0 - np.linalg.norm(measured - predicted) / np.linalg.norm(measured)
 
 
-@pytest.mark.long
 def test_tangent_is_the_derivative_of_the_runtime(artefact):
     """Against central differences of whole runs with other parameter values."""
     model, run = artefact.model, Run(loads(), initial_temperature=20.0)
@@ -125,7 +126,6 @@ def test_tangent_is_the_derivative_of_the_runtime(artefact):
         np.testing.assert_allclose(C @ np.asarray(dz)[:, k], central, atol=2e-4 * np.abs(central).max() + 1e-9)
 
 
-@pytest.mark.long
 def test_state_filter_makes_up_for_parameters_off_by_30_percent(lived, truth):
     """Scored before assimilating, on all rows, used or not; noise included."""
     updated, live, program = lived("state")
@@ -139,7 +139,6 @@ def test_state_filter_makes_up_for_parameters_off_by_30_percent(lived, truth):
     np.testing.assert_allclose(known, final, atol=0.25)
 
 
-@pytest.mark.long
 def test_it_learns_what_it_was_told_about(lived, artefact):
     """The motor is the largest source and has a sensor beside it: planted times 0.7 or 1.3, found within 10 %."""
     _, live, _ = lived("state")
@@ -151,6 +150,7 @@ def test_it_learns_what_it_was_told_about(lived, artefact):
     assert sigma < 0.1
 
 
+@pytest.mark.slow
 def test_uncertainty_covers_what_was_held_out(lived):
     updated, _, _ = lived("state")
     out = ~updated.used

@@ -44,6 +44,7 @@ def calibrated(folder):
 OPTIONS = ("--only", "sources.*", "--noise", "0.05 K", "--form", "0.01")
 
 
+@pytest.mark.long
 def test_writes_the_artefact_the_report_and_the_description(folder, calibrated, capsys):
     A, B, edited = folder / "A.h5", calibrated, folder / "edited.toml"
     report = json.loads((folder / "B.json").read_text(encoding="utf-8"))
@@ -70,7 +71,7 @@ def test_writes_the_artefact_the_report_and_the_description(folder, calibrated, 
     assert max(abs(row["pull"]) for row in again["parameters"] if row["learned"] > 0.9) < 0.5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_calibrated_artefact_is_verified_against_its_own_description(calibrated, capsys):
     assert twin(["verify", str(calibrated)]) == 0  # a lumped machine's artefact is exact
     assert "holds_for" not in read_artefact(calibrated).certificate
@@ -128,7 +129,7 @@ def test_nothing_that_was_there_is_replaced(folder, capsys, target, told):
     assert {p: p.read_bytes() for p in before} == before
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_windows_without_an_r_test_and_rows_without_a_place(folder, tmp_path, capsys):
     run = lumped_case.truth({}, 7)
     position = run.tcp.position.copy()

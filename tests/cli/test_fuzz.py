@@ -38,7 +38,7 @@ MODEL = synthetic.machine(2)
 SPINDLE = SLIDE.parents[1] / "spindle" / "machine.toml"
 
 pytestmark = [
-    pytest.mark.long,
+    pytest.mark.slow,
     pytest.mark.filterwarnings("default::RuntimeWarning:twin"),  # as users have it; a warning is no wrong number
 ]
 

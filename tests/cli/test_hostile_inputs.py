@@ -103,6 +103,7 @@ def test_a_run_that_cannot_be_meant_is_one_clear_error(tmp_path, capsys, case):
     assert what in capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["loads.csv", "temperatures.csv", "tcp.csv", "run.toml", "machine.toml", "a.h5", "block.twb"]
 )

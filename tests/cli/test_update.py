@@ -38,6 +38,7 @@ def invoke(*arguments):
     return CliRunner().invoke(command, [str(a) for a in arguments])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["gain", "paper", "state"])
 def test_writes_what_it_found(slide_artefact, measured, tmp_path, method):
     done = invoke(slide_artefact, measured, "--method", method, "--json", "-o", tmp_path / "u")

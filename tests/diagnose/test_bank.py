@@ -12,6 +12,8 @@ from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.table import FAULTS, OF_KIND
 from twin.diagnose.model.bank import Column, respond
 
+pytestmark = pytest.mark.long
+
 LITTLE = {"heat": 0.5, "film": 0.05, "joint": 2e-3, "contact": 5e-3, "capacity": 50.0, "group": 5e-3, "air": 0.02,
           "zone": 0.02, "source": 0.5, "group_film": 0.05, "start": 0.05, "signal": 0.01}  # fmt: skip
 
@@ -43,7 +45,6 @@ KEYS = [
 ]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("key", KEYS, ids=".".join)
 def test_against_differences(key):
     """On the machine whose laws read no temperature, where responses leave out nothing."""

@@ -103,6 +103,7 @@ def test_the_example_finds_its_lamp(lamp):
     assert first.amplitude[0] == pytest.approx(30.0, abs=5.0)
 
 
+@pytest.mark.long
 def test_the_example_is_written_into_a_description(lamp):
     """As what its `edit` says: a heat source that a switch turns on for the hours that it was found in."""
     entry = family("lamp", with_own(lamp))

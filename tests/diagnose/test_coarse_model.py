@@ -13,6 +13,8 @@ from twin.build.project import orthonormalise, project
 from twin.diagnose.faults.coarse_model import Coarse, too_coarse
 from twin.rom.model import MachineModel
 
+pytestmark = pytest.mark.long
+
 NOISE = small_case.NOISE, small_case.TCP_NOISE
 
 
@@ -26,7 +28,6 @@ def with_states(model: MachineModel, n: int) -> MachineModel:
     return replace(model, bodies=bodies)
 
 
-@pytest.mark.long
 def test_an_artefact_of_too_few_states_is_told():
     found = too_coarse(with_states(lumped_case.artefact().model, 2), small_case.study(), *NOISE)
     assert found is not None

@@ -15,17 +15,8 @@ from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.accepted import Accepted
-from twin.diagnose.search.contest import (
-    _moved,
-    beginning,
-    exact,
-    judged,
-    lowest,
-    proof,
-    solved,
-    tried,
-    worth,
-)
+from twin.diagnose.search.contest import judged, proof, tried, worth
+from twin.diagnose.search.exact import _moved, beginning, exact, lowest, solved
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.strained import strained

@@ -20,7 +20,6 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.search.accepted import Accepted, exchanged, jacobian
-from twin.diagnose.search.contest import misfit
 from twin.diagnose.search.declared import (
     declared_candidates,
     declared_exactly,
@@ -28,6 +27,7 @@ from twin.diagnose.search.declared import (
     swapped_candidates,
     with_signal,
 )
+from twin.diagnose.search.exact import misfit
 from twin.diagnose.search.forward import _reads, search
 from twin.diagnose.search.verdict import verdict_of
 from twin.machine.load import load_machine
@@ -126,13 +126,22 @@ def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
     x = np.zeros(len(study.probed.parameters))
     slots = [slots_with(study, detector.elements, units_of(study, h), k) for k in study.fitted]
     anew = np.vstack([study.jacobian(k, x, s, [1.0])[:, : len(x)] for k, s in zip(study.fitted, slots, strict=True)])
-    made = jacobian(detector, x, [(h, 1.0)])
+
+    def beside(x: np.ndarray, size: float = 1.0) -> np.ndarray:
+        return jacobian(detector, x, [(h, np.array([size]), h.statistic)])
+
+    def known(x: np.ndarray) -> np.ndarray:
+        return detector.fitter.surrogate.at(x)[1]
+
+    made, near, far = beside(x), 0.9 * detector.policy.anew, 1.1 * detector.policy.anew
     np.testing.assert_allclose(made, anew, rtol=1e-9, atol=1e-15)
-    np.testing.assert_array_equal(jacobian(detector, x + 0.9 * detector.policy.anew, [(h, 1.0)]), made)
-    np.testing.assert_array_equal(jacobian(detector, x, [(h, 1.0 + 0.9 * detector.policy.anew)]), made)
-    assert np.abs(jacobian(detector, x, [(h, 1.0 + 1.1 * detector.policy.anew)]) - made).max() > 0.0
-    further = jacobian(detector, x + 1.1 * detector.policy.anew, [(h, 1.0)])
+    np.testing.assert_allclose(beside(x + near), made + known(x + near) - known(x), rtol=1e-9, atol=1e-15)
+    np.testing.assert_array_equal(beside(x, 1.0 + near), made)
+    assert len(detector.derivatives) == 1
+    assert np.abs(beside(x, 1.0 + far) - made).max() > 0.0
+    further = beside(x + far)
     assert np.abs(further - made).max() > 0.01 * np.abs(made).max()
+    assert len(detector.derivatives) == 3
     assert not np.allclose(anew, detector.fitter.surrogate.at(x)[1], rtol=0.2)
 
 

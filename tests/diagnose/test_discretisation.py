@@ -56,7 +56,7 @@ def heavy(machine: Machine) -> list[str]:
     return [n for n in machine.nodes if with_inside(machine, n) is not machine]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_bars_of_finer_elements_tell_the_error_of_the_described_ones(both):
     """A machine of eight times as many elements, which nothing was made with, is where the difference leads to."""
     machine = small_case.machine()
@@ -167,7 +167,7 @@ def simulated(machine: Machine, seed: int, folder: Path) -> Run:
     return simulate_run(machine, read_run(folder), tcp_every=600.0)[0]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_machine_of_parts_knows_its_mesh_and_its_rails_at_every_sensor(tmp_path):
     """Of a division that nothing was made with the known ones tell some."""
     machine = load_machine(Path(__file__).parents[1] / "machines" / "slide")

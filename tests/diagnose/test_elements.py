@@ -12,6 +12,8 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.context import Context
 from twin.diagnose.faults.readings import readings_of
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def read():

@@ -13,7 +13,7 @@ from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.readings import late
 from twin.diagnose.search.accepted import Accepted, curved_change, freed, motion, parameter_of
-from twin.diagnose.search.contest import exact
+from twin.diagnose.search.exact import exact
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import channels_of, gains
 from twin.diagnose.search.look import sized_candidates

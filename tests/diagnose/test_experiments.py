@@ -35,6 +35,7 @@ def moved(n: int = 600) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.long
 def test_the_signals_of_an_axis_are_one_actuator_and_follow_its_speed(ball_screw):
     (x,) = actuators_of(ball_screw, [moved()])
     assert (x.name, x.leader, set(x.followers)) == ("x", "x_speed", {"screw_speed", "x_current"})

@@ -89,6 +89,7 @@ def test_films_whose_law_reads_no_speed_have_no_reaction_to_it():
     assert not any(p.kind == "exponent" for p in of_nodes)
 
 
+@pytest.mark.long
 def test_laws_as_described_change_nothing():
     study = small_case.described()
     free = with_film_laws(study, Form())
@@ -106,6 +107,7 @@ def test_a_corrected_signal_leaves_the_laws_of_films():
     assert np.abs(study.all_outputs(x) - study.all_outputs(0.0 * x)).max() > 0.05
 
 
+@pytest.mark.long
 def test_the_delivered_calibration_has_the_laws_of_the_description():
     study = with_film_laws(small_case.described(), Form())
     sensors = (np.full(len(study.runs[k].measured.sensors), small_case.NOISE) for k in study.fitted)

@@ -96,6 +96,7 @@ def test_joints_that_stand_still_need_no_term_in_every_step():
     np.testing.assert_allclose(still, moving, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.long
 def test_derivatives_by_parameters_and_amplitudes():
     study = small_case.study()
     x = 0.2 * np.random.default_rng(2).standard_normal(len(study.probed.parameters))

@@ -135,6 +135,7 @@ def test_displacements_alone_from_their_first_row_on_are_enough(made: Path) -> N
     assert [s for s in found["whiteness"] if s[0] in ("motor", "head", "column", "bed")] == []
 
 
+@pytest.mark.long
 def test_too_few_measurements_are_refused(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = made / "few"
     twin("simulate", MACHINE, made / "monday", "-o", run, "--tcp-every", "1 h")

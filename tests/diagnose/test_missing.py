@@ -34,7 +34,7 @@ def built(tmp_path_factory):
     return folder / "small.h5"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_body_at_the_wall_is_named_and_written(runs, built, tmp_path):
     options = DiagnoseOptions(nulls=20, noise="0.05 K", tcp_noise="0.3 um")
     found = diagnose(read(built), runs[:2], [runs[2]], options=options)
@@ -52,7 +52,7 @@ def test_the_body_at_the_wall_is_named_and_written(runs, built, tmp_path):
     assert "missing members" in (report.folder / "index.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_model_that_misses_by_kelvins_names_nothing(runs, tmp_path):
     """The same loads, other bodies: three sensors at places that the description has at others."""
     text = planted.TEXT + "".join(

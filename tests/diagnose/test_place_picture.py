@@ -49,6 +49,7 @@ def test_one_channel_carries_a_sensor_at_fault_and_several_carry_heat():
     assert {name for name, _ in several.shares} == {"front", "housing", "screw_middle", "dx", "dy", "dz"}
 
 
+@pytest.mark.long
 def test_nothing_rests_on_nothing():
     assert support_of(search(small_case.made_detector(), measured(seed=1))) is None
     assert shared({"a": -1.0, "b": 0.0}) is None
@@ -128,6 +129,7 @@ def test_a_network_is_laid_out_by_its_links():
     assert np.isfinite(layout(3, [(0, 1)])).all()  # a piece apart
 
 
+@pytest.mark.long
 def test_a_picture_says_where_and_what_is_left_of_the_channels():
     for verdict, title in (("named", "Where: bed.y_min"), ("sensor", "Where: sensor x_nut")):
         d = diagnosis(verdict)

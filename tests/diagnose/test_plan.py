@@ -19,6 +19,8 @@ from twin.diagnose.result.plan import Foresight, Plan
 from twin.diagnose.search.verdict import limits_of
 from twin.errors import TwinError
 
+pytestmark = pytest.mark.long
+
 ASKED = ("heat_source bed", "heat_source slide", "joint contacts.screw_bearing", "coolant bed", "sensor sensors.front")
 
 
@@ -40,7 +42,6 @@ def of(family: str, place: str) -> Foresight:
     return next(f for f in plan().suspicions if (f.family, f.place) == (family, place))
 
 
-@pytest.mark.long
 def test_todays_limits_are_those_of_the_diagnosis():
     detector = made_detector()
     for limit in limits_of(detector):
@@ -52,7 +53,6 @@ def test_todays_limits_are_those_of_the_diagnosis():
         assert today[family, place, suspicion.unit] == pytest.approx(known_suspicions(detector)[suspicion])
 
 
-@pytest.mark.long
 def test_one_more_run_never_tells_less_and_the_best_comes_first():
     for f in plan().suspicions:
         gains = [p.gain for p in f.proposals]
@@ -62,7 +62,6 @@ def test_one_more_run_never_tells_less_and_the_best_comes_first():
         assert {"x to and fro", "long rest", "warm start", "again"} <= {p.experiment for p in f.proposals}
 
 
-@pytest.mark.long
 def test_a_sensor_where_heat_is_suspected_helps_most_and_one_far_away_as_much_as_none():
     bed = of("heat_source", "bed")
     sensors = [p for p in bed.proposals if p.experiment.startswith("sensor")]
@@ -71,6 +70,7 @@ def test_a_sensor_where_heat_is_suspected_helps_most_and_one_far_away_as_much_as
     assert sensors[-1].limit == pytest.approx(bed.again, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_switches_is_seen_in_the_hours_that_the_new_run_has_of_it():
     coolant = of("coolant", "bed")
     assert coolant.switches

@@ -15,6 +15,8 @@ from twin.diagnose.model.probed_model import ProbedModel
 from twin.diagnose.search.detector import instruments_of, make_detector, stored
 from twin.diagnose.search.policy import POLICY
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def keys(monkeypatch):

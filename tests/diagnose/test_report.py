@@ -38,6 +38,8 @@ from twin.diagnose.search.gain import channels_of
 from twin.diagnose.search.verdict import pulls_of, verdict_of
 from twin.errors import TwinError
 
+pytestmark = pytest.mark.long
+
 SECTIONS = {"channels", "evidence", "gain", "residuals", "decision", "pulls", "limits", "notes"}  # of every page
 VOID = {"meta", "br", "img", "hr", "link", "input"}
 
@@ -119,7 +121,6 @@ SAID = {  # what the reader of each verdict must find
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
-@pytest.mark.long
 def test_the_page_of_every_verdict_says_it_first_and_has_every_section(written, verdict):
     reader = read((written(verdict) / "index.html").read_text(encoding="utf-8"))
     sentence = verdict_sentence(diagnosis(verdict))
@@ -136,7 +137,6 @@ def test_the_page_of_every_verdict_says_it_first_and_has_every_section(written, 
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
-@pytest.mark.long
 def test_report_json_is_the_diagnosis(written, verdict):
     folder = written(verdict)
     with open(folder / "report.json", encoding="utf-8") as f:
@@ -188,7 +188,6 @@ def test_a_terminal_gets_at_most_ten_lines_with_the_verdict(verdict):
     assert any("corrects the declaration" in line for line in lines) == (verdict == "signal")
 
 
-@pytest.mark.long
 def test_equal_diagnoses_give_equal_pages(written):
     assert page(diagnosis("sensor")) == (written("sensor") / "index.html").read_text(encoding="utf-8")
 
@@ -237,7 +236,6 @@ def odd() -> Diagnosis:
     )
 
 
-@pytest.mark.long
 def test_odd_names_and_missing_values_neither_break_the_page_nor_leave_it(tmp_path):
     d = odd()
     write_report(d, tmp_path)
@@ -354,7 +352,6 @@ def search_of_a_strong_source():
     return detector, source, found
 
 
-@pytest.mark.long
 def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
     """As `twin diagnose` finds it: in the fit it stands at its declared value, and the size of the cause is told."""
     detector, source, found = search_of_a_strong_source()
@@ -432,7 +429,6 @@ def test_a_clock_that_is_off_changes_no_description():
     assert "The model of the machine is left as it is." in lines
 
 
-@pytest.mark.long
 def test_every_sealed_run_is_distinguished():
     d = replace(diagnosis("named"), ranked=(), whiteness=(), pulls=(), nulls={})
     assert "sealed run</th>" not in gain_table(d)
@@ -487,7 +483,6 @@ def test_what_comes_nearest_to_its_threshold_leads_the_families():
 
 
 @pytest.mark.parametrize("verdict", ["nothing", "named"])
-@pytest.mark.long
 def test_no_gain_is_told_with_its_reason(verdict):
     d = replace(diagnosis(verdict), gain=())
     open_only = tuple(s for s in d.series if not s.sealed)

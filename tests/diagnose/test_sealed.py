@@ -24,6 +24,8 @@ from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.sealed import judged, other_sizes
 from twin.diagnose.search.verdict import strained_of, verdict_of
 
+pytestmark = pytest.mark.long
+
 
 def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     detector = small_case.made_detector()

@@ -15,8 +15,8 @@ from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.readings import play
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import exchanged
-from twin.diagnose.search.contest import misfit, misfit_of_each
 from twin.diagnose.search.dispersion import raised, searched
+from twin.diagnose.search.exact import misfit, misfit_of_each
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.policy import POLICY
@@ -188,6 +188,7 @@ def test_slow_errors_of_channels_are_not_held_against_a_cause():
     assert verdict_of(found, FAMILIES)[0] == "named"
 
 
+@pytest.mark.slow
 def test_what_is_left_beyond_noise_must_be_explained_by_less_than_a_cause():
     detector = small_case.made_detector()
     found, own = searched(detector, measured(seed=4) + slow_discrepancy(0.09))

@@ -35,7 +35,7 @@ SHIPPED = {"five_axis": "experiment_a", "ram_borer": "test_5", "transfer_unit": 
            "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up", "lathe": "warm_up",
            "linear_gantry": "constant_room", "hexapod": "mixed_paths"}  # fmt: skip
 
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+pytestmark = [pytest.mark.long, pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")]
 
 
 def same(artefact, run):
@@ -46,7 +46,6 @@ def same(artefact, run):
     assert d.flags == 0
 
 
-@pytest.mark.long
 def test_a_meshed_machine_is_stepped_as_twin_run_does(slide_artefact):
     same(read_artefact(slide_artefact), SLIDE)
 
@@ -63,7 +62,6 @@ def test_a_screw_held_at_both_ends_is_one_in_c(tmp_path):
     same(read_artefact(tmp_path / "a.h5"), SPINDLE / "runs" / "warm_up")
 
 
-@pytest.mark.long
 def test_air_that_is_warmer_above_an_axis_that_moves_up_is_so_in_c(tmp_path):
     climbing(tmp_path)
     twin.build(tmp_path, options=twin.BuildOptions(held_out=1)).save(tmp_path / "a.h5")
@@ -75,7 +73,6 @@ def test_air_that_is_warmer_above_an_axis_that_moves_up_is_so_in_c(tmp_path):
     assert np.abs(warm[0] - warm[1]).max() > 0.01  # K, that it moves
 
 
-@pytest.mark.long
 def test_a_platform_on_struts_is_one_in_c(tmp_path):
     """Twenty minutes of paths in all six directions, by both; the poses are those of the lengths."""
     folder = ROOT / "models" / "hexapod"
@@ -139,7 +136,6 @@ def test_shipped_machines_over_their_scenarios(machine, tmp_path):
     same(read_artefact(tmp_path / "a.h5"), folder / "runs" / SHIPPED[machine])
 
 
-@pytest.mark.long
 def test_single_precision_has_the_error_that_it_says(slide_artefact, tmp_path):
     told = twin.export(slide_artefact, "c", tmp_path / "m.c", twin.ExportOptions(precision="single", run=SLIDE))
     d = difference(read_artefact(slide_artefact), SLIDE, single=True)
@@ -148,7 +144,6 @@ def test_single_precision_has_the_error_that_it_says(slide_artefact, tmp_path):
     assert told[1] in (tmp_path / "m.h").read_text(encoding="utf-8")
 
 
-@pytest.mark.long
 def test_the_files_compile_without_a_warning_and_take_no_heap(slide_artefact, tmp_path):
     twin.export(slide_artefact, "c", tmp_path / "m.c")
     for name in ("m.c", "m_example.c"):
@@ -158,7 +153,6 @@ def test_the_files_compile_without_a_warning_and_take_no_heap(slide_artefact, tm
     assert not wanted & {"malloc", "calloc", "realloc", "free", "fopen", "printf"}
 
 
-@pytest.mark.long
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="no valgrind")
 def test_valgrind_finds_nothing(slide_artefact, tmp_path):
     program = compiled_example(source_of(read_artefact(slide_artefact)), tmp_path)
@@ -168,7 +162,6 @@ def test_valgrind_finds_nothing(slide_artefact, tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
 
 
-@pytest.mark.long
 def test_rows_cut_in_two_give_the_same(slide_artefact, tmp_path):
     """A row that is repeated half-way, positions on their linear path, is no other log."""
     rows = (SLIDE / "loads.csv").read_text(encoding="utf-8").splitlines()
@@ -185,7 +178,6 @@ def test_rows_cut_in_two_give_the_same(slide_artefact, tmp_path):
     assert np.abs(once[:, 1:-1] - again[:, 1:-1]).max() < SAME
 
 
-@pytest.mark.long
 def test_a_signal_without_a_value_is_refused(slide_artefact, tmp_path):
     program = compiled_example(source_of(read_artefact(slide_artefact)), tmp_path)
     loads = tmp_path / "loads.csv"
@@ -197,7 +189,6 @@ def test_a_signal_without_a_value_is_refused(slide_artefact, tmp_path):
 CALLS = ("exp", "log", "sqrt", "tan", "atan", "cos", "sin", "pow", "fmax", "fmin", "fabs", "expm1", "log1p")
 
 
-@pytest.mark.long
 def test_every_law_has_the_value_in_c_that_it_has_in_python(tmp_path):
     uses = {}
     code = "#include <math.h>\ntypedef double real;\n#define R(x) x\n"

@@ -31,6 +31,8 @@ from twin.run.correction_file import read_pose_errors
 from twin.run.replay import replay
 from twin.run.results import write_results
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 FORMATS = {
     "siemens": write_siemens,

@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
 from full_disk import full_disk
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [0, 30_000])
 @pytest.mark.parametrize("name", sorted(FORMATS))
 def test_a_full_disk_is_one_error_and_leaves_nothing(slide_artefact, slide_result, tmp_path, capsys, name, size):

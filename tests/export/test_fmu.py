@@ -33,7 +33,7 @@ SHIPPED = {"five_axis": "experiment_a", "ram_borer": "test_5", "transfer_unit": 
            "ball_screw_axis": "mixed_load", "spindle_drift": "warm_up", "lathe": "warm_up",
            "linear_gantry": "constant_room", "hexapod": "mixed_paths"}  # fmt: skip
 
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+pytestmark = [pytest.mark.long, pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")]
 
 
 @pytest.fixture(scope="module", params=["fmu2", "fmu3"])
@@ -74,12 +74,10 @@ def agrees(result, expected):
     assert np.abs(w - expected.tcp_actual)[straight].max() < SAME_PLACE
 
 
-@pytest.mark.long
 def test_fmpy_finds_no_problem(fmu):
     assert validate_fmu(str(fmu)) == []
 
 
-@pytest.mark.long
 def test_the_toolbox_finds_no_problem(fmu):
     tool = Path(sys.executable).with_name("fmutool")
     if not tool.exists():
@@ -91,7 +89,6 @@ def test_the_toolbox_finds_no_problem(fmu):
     assert not re.search(r"\b(ERROR|WARNING)\b", told)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("step", [60.0, 20.0])
 def test_fmpy_over_a_run_gives_what_twin_run_gives(fmu, expected, step):
     initial = read_run(SLIDE).initial_temperature
@@ -103,7 +100,6 @@ def test_fmpy_over_a_run_gives_what_twin_run_gives(fmu, expected, step):
     assert ((at_steps["flags"][1:] > 0) == expected.flags.any(axis=1)).all()
 
 
-@pytest.mark.long
 def test_libcosim_over_a_run_gives_what_twin_run_gives(fmu, expected):
     pytest.importorskip("libcosimpy")
     if not is_second(fmu):
@@ -131,7 +127,6 @@ def slave_of(fmu, folder):
     return slave, {v.name: v.valueReference for v in description.modelVariables}
 
 
-@pytest.mark.long
 def test_a_state_is_saved_restored_and_stored_as_bytes(fmu, tmp_path):
     slave, reference = slave_of(fmu, tmp_path)
     columns = loads(SLIDE)
@@ -169,7 +164,6 @@ def test_a_state_is_saved_restored_and_stored_as_bytes(fmu, tmp_path):
     slave.freeInstance()
 
 
-@pytest.mark.long
 def test_gains_change_the_heat_and_reset_takes_it_back(fmu, expected):
     initial = read_run(SLIDE).initial_temperature
     description = fmpy.read_model_description(str(fmu))
@@ -186,7 +180,6 @@ def test_gains_change_the_heat_and_reset_takes_it_back(fmu, expected):
     assert T[-1, hottest] - expected.temperature[-1, hottest] == pytest.approx(rise[hottest], rel=0.1)
 
 
-@pytest.mark.long
 def test_names_suit_every_tool(fmu):
     variables = fmpy.read_model_description(str(fmu)).modelVariables
     names = [v.name for v in variables]
@@ -195,7 +188,6 @@ def test_names_suit_every_tool(fmu):
     assert ("independent" in {v.causality for v in variables}) == (not is_second(fmu))
 
 
-@pytest.mark.long
 def test_every_function_of_the_standard_is_exported(fmu, tmp_path):
     version = "2" if is_second(fmu) else "3"
     header = Path(fmpy.__file__).parent / "c-code" / f"fmi{version}Functions.h"
@@ -221,7 +213,6 @@ def test_every_function_of_the_standard_is_exported(fmu, tmp_path):
             assert not {w for w in wanted if w.encode() not in content}
 
 
-@pytest.mark.long
 def test_equal_input_gives_equal_bytes(slide_artefact, tmp_path):
     for name in ("a", "b"):
         twin.export(slide_artefact, "fmu3", tmp_path / f"{name}.fmu")

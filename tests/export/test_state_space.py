@@ -55,6 +55,7 @@ def mat(slide_artefact, point, tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_steps_as_the_full_model_with_films_and_position_held(npz, point):
     """Two hours of heat in every source, the air 2 K warmer: sensors and the TCP at a position off the grid."""
     full = full_model(load_machine(SLIDE))

@@ -76,6 +76,7 @@ def test_loads_lie_within_what_the_description_certifies(run: str):
         assert values.max() <= high + 1e-9, name
 
 
+@pytest.mark.long
 def test_the_script_writes_the_loads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.syspath_prepend(str(MODEL / "runs"))
     monkeypatch.delitem(sys.modules, "make_runs", raising=False)

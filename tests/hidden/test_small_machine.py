@@ -19,6 +19,8 @@ from twin.diagnose.search.verdict import verdict_of
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 
+pytestmark = pytest.mark.long
+
 SETTINGS = Settings(temperature_sigma=0.05, tcp_sigma=0.5e-6, form=12, nulls=24)
 IN_MACHINE = {
     "heat_source": ("bed.y_max", "15 W"),
@@ -89,7 +91,7 @@ def test_a_heat_source_is_named_at_its_place_with_its_size(folder, detector):
     assert high - low < 7.5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_joint_that_lost_its_preload_is_said_to_be_out_of_tolerance(folder, detector):
     """Its conductance is a declared parameter: a fiftieth of it is no missing effect, but a number that is wrong."""
     verdict, (cause,) = said(detector, in_machine(folder, "joint"))
@@ -97,7 +99,7 @@ def test_a_joint_that_lost_its_preload_is_said_to_be_out_of_tolerance(folder, de
     assert cause.ci95[0] <= 0.02 <= cause.ci95[1] < 0.5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_screw_that_expands_too_much_is_named_with_its_factor(folder, detector):
     verdict, (cause,) = said(detector, in_machine(folder, "expansion"))
     assert (verdict, cause.family, cause.place) == ("named", "expansion", "parts.screw")

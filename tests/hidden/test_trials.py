@@ -128,6 +128,7 @@ def test_the_heat_outside_the_catalogue_turns_its_sign_at_random(described: str)
         assert 4 < np.sum(np.diff((heating > 0.5).astype(int)) != 0) < 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", stored())
 def test_runs_can_be_read(name: str):
     runs, wanted = trial(name).runs, expected(name)

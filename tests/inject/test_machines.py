@@ -148,6 +148,7 @@ def test_loads_rest_and_move_within_their_ranges():
     assert min(lows) == 0.0  # somewhere it rests
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["boxes", "lumped"])
 def test_the_real_machine_has_another_mesh_and_other_laws(kind, tmp_path):
     for seed in range(3):
@@ -185,6 +186,7 @@ def test_a_split_node_keeps_its_capacity_and_what_it_moves():
             assert row == pytest.approx(a.tcp.expansion[n], rel=1.2 * OFF["expansion"], abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", MACHINES, ids=lambda p: p.parent.name)
 def test_other_machines_have_real_ones_too(path):
     text = path.read_text(encoding="utf-8")
@@ -264,6 +266,7 @@ def real_response(made: DrawnMachine, folder: Path) -> None:
     assert all(a.rise != b.rise for a, b in pairwise(found))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2, 3))])
 def test_a_real_network_gets_warm_and_moves(seed, tmp_path):
     real_response(drawn(seed, "lumped"), tmp_path)

@@ -21,6 +21,8 @@ from twin.live.cnc import NAMESPACE  # noqa: E402
 from twin.live.facts import Channel  # noqa: E402
 from twin.live.opcua import OpcUaSource  # noqa: E402
 
+pytestmark = pytest.mark.long
+
 WANTED = (
     Channel("x_position", "m", True, None, 0.0, 0.5, "x"),
     Channel("swivel_angle", "rad", True, None, -2.0, 2.0, "b"),

@@ -23,6 +23,8 @@ from twin.run.correction import fit_correction
 from twin.run.correction_file import read_pose_errors
 from twin.run.correction_struts import in_struts
 
+pytestmark = pytest.mark.long
+
 HEXAPOD = Path(__file__).parents[2] / "models" / "hexapod"
 RUN = Path(__file__).parents[1] / "machines" / "spindle" / "runs" / "warm_up"
 
@@ -32,7 +34,7 @@ def result(spindle):
     return twin.read(spindle).run(RUN).numbers
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_groups_of_fast_rows_do_not_matter(spindle, compiled):
     """Two and a half minutes at 50 Hz, evaluated in pieces while they come; no value where a piece would end."""
     channels = open_engine(spindle, "c", compiled).facts.channels
@@ -95,7 +97,6 @@ def test_a_replay_ends_where_twin_run_ends(engine, kelvin, metres, spindle, stat
     np.testing.assert_allclose(step["positions_m"], result.position[-1], rtol=0, atol=1e-9)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("engine", ["c", "jax"])
 def test_a_state_goes_on_bit_by_bit(engine, spindle, compiled):
     one, other = (open_engine(spindle, engine, compiled) for _ in range(2))
@@ -116,7 +117,6 @@ def test_a_state_goes_on_bit_by_bit(engine, spindle, compiled):
     assert one.displacements() == other.displacements()
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("engine", ["c", "jax"])
 def test_the_struts_of_a_platform_are_corrected(engine, hexapod, tmp_path):
     """Twenty minutes of paths in all six directions: offsets are those of `twin correction`."""

@@ -80,6 +80,7 @@ def without_packages(*arguments: str) -> subprocess.CompletedProcess[str]:
                           timeout=120)  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_compiled_machine_runs_without_jax_and_numpy_to_the_same_numbers(spindle, compiled, tmp_path):
     given = ["--source", f"replay:{RUN}", "--speed", "0", "--out", f"file:{tmp_path / 'now.json'}"]
     shutil.copytree(compiled, tmp_path / "a" / "engine")
@@ -94,6 +95,7 @@ def test_a_compiled_machine_runs_without_jax_and_numpy_to_the_same_numbers(spind
     assert json.loads(one)["step"] >= 5
 
 
+@pytest.mark.long
 def test_what_is_no_compiled_machine_is_refused(spindle, compiled, tmp_path, capsys):
     given = ["--source", f"csv:{tmp_path / 'x.csv'}", "--out", f"file:{tmp_path / 'now.json'}"]
     state = ["--state", str(tmp_path / "state")]

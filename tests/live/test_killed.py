@@ -27,6 +27,8 @@ from twin.live.ring import RingReader, RingWriter
 from twin.logs.block_file import read_blocks
 from twin.logs.read import read_run
 
+pytestmark = pytest.mark.long
+
 RUN = Path(__file__).parents[1] / "machines" / "spindle" / "runs" / "warm_up"
 GROUP = 3  # rows in a block
 
@@ -96,7 +98,6 @@ def through(spindle, state, folder, kills):
     return read_checkpoint(state / "checkpoint.bin")
 
 
-@pytest.mark.long
 def test_killed_five_times_it_ends_with_the_same_bits(spindle, compiled, tmp_path):
     found = []
     for name, kills in (("whole", 0), ("killed", 5)):

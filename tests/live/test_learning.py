@@ -207,6 +207,7 @@ def test_what_was_measured_with_offsets_active_is_freed_of_them(tmp_path):
     made.close()
 
 
+@pytest.mark.long
 def test_no_place_is_refused(tmp_path, capsys, spindle):
     with pytest.raises(TwinError, match="no file and no folder"):
         Learning(FACTS, Learner(FACTS, GainFilter(FACTS.all_poses)), tmp_path / "none", tmp_path)
@@ -227,7 +228,7 @@ def test_the_health_record_says_what_was_learnt(tmp_path):
     assert measured["learnt"][0]["name"] == "dx"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_state_of_one_filter_is_refused_by_the_other_and_the_filter_state_begins_first(spindle, tmp_path, capsys):
     given = ["live", str(spindle), "--source", f"replay:{MACHINE / 'runs' / 'warm_up'}", "--speed", "0", "--out",
              f"file:{tmp_path / 'o.json'}", "--engine", "jax", "--state"]  # fmt: skip

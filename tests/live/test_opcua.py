@@ -31,6 +31,8 @@ from twin.live.channels import Channels, read_channels  # noqa: E402
 from twin.live.opcua import OpcUaSink, OpcUaSource  # noqa: E402
 from twin.live.sinks import Sent  # noqa: E402
 
+pytestmark = pytest.mark.long
+
 CHANNELS = """
 [opcua]
 interval = "20 ms"
@@ -196,7 +198,6 @@ def test_a_client_certificate_that_has_expired_is_refused_at_once(control):
         OpcUaSource(control.url, replace(channels, opcua=own), FACTS)
 
 
-@pytest.mark.long
 def test_another_server_than_the_pinned_one_is_refused(control):
     channels = channels_of(control)
     certificate(control.folder, "other", 365)
@@ -210,7 +211,6 @@ def test_another_server_than_the_pinned_one_is_refused(control):
             source.close()
 
 
-@pytest.mark.long
 def test_a_server_whose_certificate_has_expired_is_refused(tmp_path):
     control = Control(tmp_path, days=-1)
     source = OpcUaSource(control.url, channels_of(control), FACTS)
@@ -235,7 +235,6 @@ def test_offsets_are_written_and_read_back(control):
         sink.close()
 
 
-@pytest.mark.long
 def test_a_server_that_goes_away_is_a_gap_and_no_jump(tmp_path):
     control = Control(tmp_path)
     source = OpcUaSource(control.url, channels_of(control), FACTS)

@@ -330,6 +330,7 @@ def assert_told_as_it_must(damage: Damage, problems: list[Problem], told: list[P
         assert all(p.remedy for p in told)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", DAMAGES, ids=lambda d: d.name)
 def test_every_damage_comes_out_as_it_must(tmp_path, damage):
     outcomes: Counter[str] = Counter()

@@ -59,6 +59,7 @@ def changes(draw):
     return name, {p.path: p.value(draw(st.floats(-2, 2).map(lambda c: c or 1.0))) for p in chosen}
 
 
+@pytest.mark.long
 @settings(max_examples=60, deadline=None)
 @given(changes())
 def test_values_come_back_and_all_else_is_equal(change):
@@ -71,6 +72,7 @@ def test_values_come_back_and_all_else_is_equal(change):
     assert pruned(after, values) == pruned(before, values)
 
 
+@pytest.mark.long
 @settings(max_examples=60, deadline=None)
 @given(changes())
 def test_lines_differ_in_their_numbers_only_and_new_ones_are_gains_and_offsets(change):

@@ -44,6 +44,7 @@ def film(machine: Machine, name: str, **settings: str) -> float:
     return float(explain(machine, f"films.{name}", load_of(machine, settings)).value[0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "one"),
     [

@@ -160,6 +160,7 @@ def test_heat_goes_to_the_segments_below_the_nuts(full):
         assert set(np.flatnonzero(along > 1e-9)) <= set(np.flatnonzero(shares)) | {np.flatnonzero(shares)[-1] + 1}
 
 
+@pytest.mark.long
 def test_a_morning_of_mixed_paths(full):
     """An hour and a half by the full model: balanced, screws and motors warm, the tool some ten um off."""
     load, log = full.thermal.load_model, read_run(FOLDER / "runs" / "mixed_paths")

@@ -53,6 +53,7 @@ def test_holds_at_its_point(name):
         assert bool(law.validity.holds(**POINTS[name]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_gradients_are_those_of_differences(name):
     point = POINTS[name]
@@ -131,6 +132,7 @@ def compiled() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return jax.jit(every)({name: POINTS[name] | samples_and_states(name) for name in LAWS})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_arrays_and_jit(name, compiled):
     """The same numbers as one by one."""

@@ -34,7 +34,7 @@ def test_report_draws_every_picture_and_a_page_that_shows_them(slide_artefact, f
         assert page.count(f'["{output} [') == 1  # its row of the certificate
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_equal_results_give_equal_pictures(slide_artefact, folder):
     first = {p: p.read_bytes() for p in report(slide_artefact, folder)}
     assert first == {p: p.read_bytes() for p in report(slide_artefact, folder)}

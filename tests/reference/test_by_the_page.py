@@ -60,6 +60,7 @@ def test_a_lumped_machine(tmp_path, apart):
     assert apart(tmp_path / "a.h5", folder / "runs" / "warm_up") < SAME
 
 
+@pytest.mark.long
 def test_a_machine_that_climbs_in_air_that_is_warmer_above(tmp_path, apart):
     climbing(tmp_path)
     twin.build(tmp_path, options=twin.BuildOptions(held_out=1)).save(tmp_path / "a.h5")
@@ -90,6 +91,6 @@ def in_a_quarter(run: Path, folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_shipped_machine_over_hours(shipped, apart):
     assert apart(*shipped) < SAME

@@ -23,6 +23,8 @@ from tests.reference.row import Case, judge
 from twin.build.pipeline import BuildOptions
 from twin.build.rich_basis import RichOptions
 
+pytestmark = pytest.mark.slow
+
 SOURCE = "Carslaw, Jaeger 1959, ch. 14 and 10.7; Rosenthal 1946"
 AT = (0.05, 0.2, 0.3, 0.45)  # m
 SEGMENTS = 60

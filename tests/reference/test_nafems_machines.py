@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.optimize import brentq
 
 from tests.reference import described as d
@@ -36,6 +37,7 @@ def bar(name: str, conductivity: float, density: float, heat_capacity: float, di
     )
 
 
+@pytest.mark.long
 def test_nafems_t2_radiation(tmp_path: Path):
     hot, cold = 1000.0 - ZERO_CELSIUS, 300.0 - ZERO_CELSIUS
     radiating = d.film("cold", 1e-6, "bar.x_max", "cold").replace("emissivity = 0.0", "emissivity = 0.98")
@@ -85,6 +87,7 @@ def test_nafems_t3_transient(tmp_path: Path):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_nafems_t4_convection(tmp_path: Path):
     text = (
         d.head("T4")

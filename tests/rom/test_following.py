@@ -29,6 +29,8 @@ from twin.run.replay import integrate
 from twin.run.stepping import inputs_of
 from twin.run.system import prepare
 
+pytestmark = pytest.mark.long
+
 PLATE = LawUse("free_vertical_plate", {"height": 0.4}, {})
 MIXED = LawUse("mixed_plate", {"length": 0.3, "height": 0.4}, {"speed": "speed"})
 WINDING = LawUse("motor_winding", {"resistance": 1.2, "coefficient": 0.00393}, {"current": "current"})
@@ -124,7 +126,6 @@ def test_the_mean_over_a_step_is_of_coefficients_and_not_of_speeds():
     assert abs(at_mean / exact - 1.0) > 0.05
 
 
-@pytest.mark.long
 def test_one_step_of_lag_is_of_first_order_and_small_beside_the_implicit_solution():
     """Cooling plate with free convection and radiation: lagged coefficients, fully implicit ones, the exact."""
     model = plate([Film("plate", PLATE, 0, 1.0, 50.0, emissivity=0.9)])
@@ -225,7 +226,6 @@ def loads(model, hours=2.0):
 
 @pytest.mark.parametrize("projection", ["galerkin", "oblique"])
 @pytest.mark.parametrize(("follow", "tolerance"), [(0.0, 1e-9), (0.2, 2e-3)])
-@pytest.mark.long
 def test_both_steppers_alike_with_every_law_following(follow, tolerance, projection):
     model = following_machine()
     model = oblique(model) if projection == "oblique" else model

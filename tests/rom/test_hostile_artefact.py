@@ -168,6 +168,7 @@ EDITS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("edit", EDITS)
 def test_an_edit_with_a_new_hash_is_one_clear_error(sound, loads, tmp_path, capsys, edit):
     path = tmp_path / "a.h5"

@@ -28,6 +28,7 @@ def files(folder):
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [2_000, 20_000, 80_000])
 @pytest.mark.parametrize("every", ["64", "1440"])
 def test_a_full_disk_is_one_message_and_leaves_whole_files(inputs, tmp_path, capsys, size, every):

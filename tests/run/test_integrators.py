@@ -127,6 +127,7 @@ def test_the_heat_balance_is_exact_with_a_factor_that_is_not(integrated, tableau
     assert 0.0 < apart < 1e-2 * np.ptp(exact)
 
 
+@pytest.mark.long
 def test_the_second_order_method_needs_fewer_solves_for_the_same_error():
     """Smooth loads: one step of two stages errs less than two Euler steps."""
     signals = {name: np.repeat(values[300:301], 2) for name, values in SIGNALS.items()}
@@ -161,6 +162,7 @@ def test_states_side_by_side_are_stepped_as_each_alone(tableau):
         np.testing.assert_allclose(together[:, k], after(x[:, k], f[:, k]), rtol=1e-5)
 
 
+@pytest.mark.long
 @TABLEAUS
 def test_the_derivative_of_a_step_is_that_of_its_matrix_and_loads(tableau):
     """Forward mode through steps whose factor is not differentiated, against differences."""
@@ -187,6 +189,7 @@ def test_the_derivative_of_a_step_is_that_of_its_matrix_and_loads(tableau):
     np.testing.assert_allclose(jax.jacfwd(after)(0.5), difference, atol=1e-7)  # of 0.4
 
 
+@pytest.mark.long
 def test_every_form_of_gamma_is_that_of_its_definition():
     """Dense, as a product, projected, and the sum over contacts that are scaled apart."""
     load = MODEL.load_model

@@ -24,6 +24,8 @@ from twin.machine.parameters import parameters
 from twin.rom.artefact import Artefact
 from twin.run.replay import replay
 
+pytestmark = pytest.mark.long
+
 HEATER = (
     "[signals.shop_air]",
     '[signals.heater]\nunit = "1"\nrange = [0.0, 1.0]\ndefault = 0.25\n\n[sources.heater]\nlaw = "switched_heat"\n'

@@ -22,6 +22,7 @@ def test_imports_stay_lean(modules, also):
     assert [name for name in (*HEAVY, *also) if name in loaded] == []
 
 
+@pytest.mark.long
 def test_double_precision_whatever_is_imported_first():
     for first in ("twin.physics.laws", "twin.run.stepping", "twin.rom.drive"):
         code = f"import {first}, jax.numpy as jnp; print(jnp.ones(1).dtype)"
@@ -29,6 +30,7 @@ def test_double_precision_whatever_is_imported_first():
         assert told.strip() == "float64"
 
 
+@pytest.mark.long
 def test_one_blas_thread_and_a_cache_that_cannot_be_written(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")

@@ -66,6 +66,7 @@ def test_system_matrix_equals_the_dense_one(model):
     np.testing.assert_allclose(prepared.to_artefact(S @ z), expected, rtol=1e-11, atol=1e-12 * np.abs(expected).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("substeps", [1, pytest.param(4, marks=pytest.mark.long)])
 def test_steps_equal_plain_numpy(model, substeps):
     prepared, dense = prepare(model), Dense(model, DRIVE)
@@ -112,6 +113,7 @@ def test_four_substeps_with_one_factor_are_three_to_four_times_closer():
     assert 3.0 < error(1) / error(4) < 4.1
 
 
+@pytest.mark.long
 def test_heat_in_is_heat_stored_at_every_position(model):
     prepared = prepare(model)
     steps = integrate(prepared, inputs_of(model.load_model, DRIVE, 4, follow=0.0), prepared.uniform(20.0))
@@ -126,6 +128,7 @@ def test_heat_in_is_heat_stored_at_every_position(model):
     assert steps.stored.sum() == pytest.approx(total, rel=1e-10)
 
 
+@pytest.mark.long
 def test_a_machine_at_the_temperature_of_its_surroundings_stays_there(model):
     air = (EnvironmentWiring("hall", "ambient", 20.0), EnvironmentWiring("pit", "", 26.0))
     load = replace(model.load_model, environments=air)

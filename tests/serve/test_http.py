@@ -135,6 +135,7 @@ def test_what_cannot_be_served_is_told(slide_artefact, slide_result, tmp_path, c
             assert words in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_state_of_another_artefact_is_refused(slide_artefact, state, tmp_path, capsys):
     folder = shutil.copytree(state, tmp_path / "state")
     told = json.loads((folder / "health.json").read_text()) | {"artefact": "0" * 64}
@@ -143,6 +144,7 @@ def test_a_state_of_another_artefact_is_refused(slide_artefact, state, tmp_path,
     assert "another artefact" in capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"format": "other"}', '{"format": "twin live step"}'])
 def test_damaged_files_of_the_state_are_waited_out(slide_artefact, state, tmp_path, text):
     from twin.rom.artefact import read_artefact

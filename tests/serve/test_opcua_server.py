@@ -127,6 +127,7 @@ def test_values_are_those_of_the_result_and_cannot_be_written(finished, slide_ar
     served(finished, keys / "server", work)
 
 
+@pytest.mark.long
 def test_nobody_else_is_let_in(finished, keys, good):
     """Wrong password or user, certificates that are not valid, no encryption; and others are served on."""
     refused = [
@@ -152,6 +153,7 @@ def test_nobody_else_is_let_in(finished, keys, good):
     served(finished, keys / "server", work)
 
 
+@pytest.mark.long
 def test_only_trusted_certificates_are_taken_where_some_are_named(finished, keys, tmp_path, good):
     shutil.copytree(keys / "server", tmp_path, dirs_exist_ok=True)
     (tmp_path / "trusted").mkdir()
@@ -168,6 +170,7 @@ def test_only_trusted_certificates_are_taken_where_some_are_named(finished, keys
     served(finished, tmp_path, work)
 
 
+@pytest.mark.long
 def test_a_running_machine_says_what_it_does_and_what_is_old(slide_artefact, state, keys, good):
     artefact = read_artefact(slide_artefact)
     live = LiveState(artefact, state)
@@ -192,6 +195,7 @@ def test_a_running_machine_says_what_it_does_and_what_is_old(slide_artefact, sta
     served(live, keys / "server", work)
 
 
+@pytest.mark.long
 def test_before_the_first_step_values_are_waited_for(slide_artefact, tmp_path, keys, good):
     live = LiveState(read_artefact(slide_artefact), tmp_path)
 

@@ -35,6 +35,7 @@ def slide() -> dict:
     return described_told(load_machine(SLIDE))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", MACHINES, ids=lambda p: p.parent.name)
 def test_everything_named_is_in_the_list(path):
     machine = load_machine(path)

@@ -44,7 +44,7 @@ def test_verify_passes_and_stores_the_certificate(built_artefact, tmp_path):
     assert stored["worst_relative"] < 0.01
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_verify_fails_with_status_1_when_the_model_is_too_small(tmp_path, capsys):
     path = tmp_path / "small.h5"
     assert run(["build", str(SLIDE / "machine.toml"), "-o", str(path), "--states", "8", "--training", "4"]) == 1
@@ -100,6 +100,7 @@ def test_simulate_never_replaces_the_run_it_reads(tmp_path, capsys):
     assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
 
 
+@pytest.mark.long
 def test_runtime_equals_the_offline_stepper_on_the_same_model(slide_artefact):
     artefact = read_artefact(slide_artefact)
     model = artefact.model
@@ -149,7 +150,7 @@ def test_noise_is_added_as_asked_and_repeats(tmp_path):
     assert not any(np.array_equal(a[k], c[k]) for k in a)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_equal_input_gives_an_equal_file(built_artefact, tmp_path, monkeypatch):
     monkeypatch.setenv("TWIN_CACHE", str(tmp_path / "cache"))  # nothing of the first build may help the second
     again = tmp_path / "again.h5"
@@ -185,6 +186,7 @@ def test_interrupted_build_leaves_nothing_and_can_be_repeated(tmp_path, stage):
     assert list(tmp_path.rglob("*.part")) == []
 
 
+@pytest.mark.long
 def test_stages_of_an_interrupted_build_are_not_made_again(tmp_path, monkeypatch):
     monkeypatch.setenv("TWIN_CACHE", str(tmp_path))
     machine = load_machine(SLIDE)

@@ -44,6 +44,7 @@ PACKAGES = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_module_of_the_edge_imports_without_the_workshop(package):
     done = python(

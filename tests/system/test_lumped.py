@@ -23,6 +23,8 @@ from twin.pictures.placed import described, poses_in_space
 from twin.rom.artefact import read_artefact
 from twin.rom.drive import evaluate
 
+pytestmark = pytest.mark.long
+
 WARM_UP = SPINDLE / "runs" / "warm_up"
 QUICK = BuildOptions(training=6, held_out=3, hours=1.0)
 POSES = np.array([[-0.1], [0.2]])
@@ -53,7 +55,6 @@ def test_check_tells_what_it_consists_of(capsys):
     assert run(["check", str(WARM_UP)]) == 0
 
 
-@pytest.mark.long
 def test_the_compact_model_is_the_full_one_and_the_certificate_says_so(artefact, tmp_path, capsys):
     path = tmp_path / "spindle.h5"
     shutil.copy(artefact, path)
@@ -69,7 +70,6 @@ def test_the_compact_model_is_the_full_one_and_the_certificate_says_so(artefact,
     assert "passed" in capsys.readouterr().out
 
 
-@pytest.mark.long
 def test_too_few_states_reduce_it_and_are_certified_as_such(tmp_path):
     path = tmp_path / "small.h5"
     assert not build_artefact(SPINDLE, path, replace(QUICK, states=8)).passed

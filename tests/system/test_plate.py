@@ -157,7 +157,7 @@ def test_measurements_hold_temperatures_alone_and_correct_the_film(artefact, mea
     assert run(["verify", str(path)]) == 0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_diagnosis_finds_a_second_heater(artefact, tmp_path):
     text = (PLATE / "machine.toml").read_text(encoding="utf-8")
     heater = '[sources.second]\nlaw = "constant_heat"\nsurface = "plate.x_max"\nparameters = { power = "800 W" }\n'

@@ -12,7 +12,7 @@ from twin.cli.main import run
 from twin.rom.artefact import read_artefact
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_verify_states_the_mesh_error_of_every_output_and_judges_without_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

@@ -17,6 +17,8 @@ from twin.logs.faults.find import faults_of
 from twin.logs.read import read_run
 from twin.logs.run import Run, Tcp
 
+pytestmark = pytest.mark.long
+
 AXIS = Path(__file__).parents[3] / "models" / "ball_screw_axis"
 HOUR = 3600.0
 

@@ -48,6 +48,10 @@ class Fitter:
         cross = own.T @ self.others
         return Projector.of(own, self.others, gram=np.block([[own.T @ own, cross], [cross.T, self.gram]]))
 
+    def without_parameters(self, more: np.ndarray | None = None) -> Projector:
+        """For the other nuisance columns alone, beside parameters that are known."""
+        return self.projector(np.zeros((len(self.others), 0)), more)
+
     @cached_property
     def _described(self) -> tuple[np.ndarray, np.ndarray, Projector]:
         f, J = self.surrogate.at(np.zeros(len(self.surrogate.scale)))

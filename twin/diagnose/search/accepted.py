@@ -53,37 +53,50 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
     return [] if j is None else [j]
 
 
-def jacobian(detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, float]]) -> np.ndarray:
-    """(m, n) of the outputs by the parameters at x (n,) beside causes of these amplitudes; the column of a number whose
-    place a cause takes is empty.
+def jacobian(detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, np.ndarray, float]]) -> np.ndarray:
+    """(m, n) of the outputs by the parameters at x (n,) beside causes of these amplitudes (q,) that explain so much;
+    the column of a number whose place a cause takes is empty.
 
     Causes that take a parameter's place are put there, for a film of nine times its size changes what every other
-    parameter does. Conductances beyond their bounds and corrected signals, of which no surrogate knows, get derivatives
-    made anew, unless this diagnosis has made some nearer than `anew`: a fit takes its outputs from the exact model, and
-    derivatives only tell it where to go on.
+    parameter does. Conductances beyond their bounds, corrected signals, and causes so strong that what parameters do to
+    their response counts, get derivatives made anew, for no surrogate knows of them; unless this diagnosis has made
+    some nearer than `anew`, from which the surrogate goes on.
     """
     study = detector.study
     low, high = bounds(study)
-    there, held = x.copy(), list[int]()
-    corrected = [(h, amplitude) for h, amplitude in causes if fault_of(h).corrects]
-    anew = bool(corrected)
-    for h, amplitude in causes:
+    there, held, anew = x.copy(), list[int](), False
+    for h, amplitude, _ in causes:
         for j in freed(study, h):
-            there[j] = fault_of(h).log_change(amplitude)[0] / study.scale[j]
+            there[j] = fault_of(h).log_change(float(amplitude[0]))[0] / study.scale[j]
             held.append(j)
             anew |= fault_of(h).conducts and not low[j] <= there[j] <= high[j]
-    J = _made_anew(detector, there, corrected).copy() if anew else detector.fitter.surrogate.at(there)[1]
+    beside = [(h, a) for h, a, explained in causes if fault_of(h).corrects or strong(detector, h, explained)]
+    J = detector.fitter.surrogate.at(there)[1]
+    if anew or beside:
+        J += _unknown_to_surrogate(detector, there, beside)
     J[:, held] = 0.0
     return J
 
 
-def _made_anew(detector: Detector, there: np.ndarray, corrected: Sequence[tuple[Hypothesis, float]]) -> np.ndarray:
-    """(m, n) of the exact model at parameters there (n,), or of the nearest that this diagnosis has made within `anew`
-    of them and of the amplitudes."""
-    study, causes = detector.study, tuple((h.family, h.name) for h, _ in corrected)
-    units, sizes = [u for h, _ in corrected for u in units_of(study, h)], [a for _, a in corrected]
-    at = np.append(there, sizes)
-    near = [(float(np.abs(at - d.there).max()), d.J) for d in detector.derivatives if d.causes == causes]
+def strong(detector: Detector, h: Hypothesis, explained: float) -> bool:
+    """Whether an error of a twentieth of the response to a cause that explains so much would pass for another cause.
+    Not where it has the place of a parameter, beside whose change the surrogate knows what others do."""
+    if detector.policy.misfit * explained <= min(detector.thresholds.values()):
+        return False
+    return bool(units_of(detector.study, h)) and not freed(detector.study, h)
+
+
+def _unknown_to_surrogate(
+    detector: Detector, there: np.ndarray, causes: Sequence[tuple[Hypothesis, np.ndarray]]
+) -> np.ndarray:
+    """(m, n) by which derivatives of the exact model at parameters there (n,) beside causes differ from those of the
+    surrogate: there, or at the nearest point within `anew` where this diagnosis has made them."""
+    study = detector.study
+    units = [u for h, _ in causes for u in units_of(study, h)]
+    sizes = [float(v) for _, a in causes for v in a]
+    at = np.concatenate([there, *(_coordinates(detector, h, a) for h, a in causes)])
+    names = tuple((h.family, h.name, h.when.signal, len(h.when.windows)) for h, _ in causes)
+    near = [(float(np.abs(at - d.there).max()), d.J) for d in detector.derivatives if d.causes == names]
     distance, J = min(near, key=lambda own: own[0], default=(np.inf, np.zeros(0)))
     if distance < detector.policy.anew:
         return J
@@ -91,9 +104,17 @@ def _made_anew(detector: Detector, there: np.ndarray, corrected: Sequence[tuple[
     def of_run(k: int) -> np.ndarray:
         return study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(there)]
 
-    J = np.vstack(over_runs(of_run, study.fitted))
-    detector.derivatives.append(Derivatives(causes, at, J))
+    J = np.vstack(over_runs(of_run, study.fitted)) - detector.fitter.surrogate.at(there)[1]
+    detector.derivatives.append(Derivatives(names, at, J))
     return J
+
+
+def _coordinates(detector: Detector, h: Hypothesis, amplitude: np.ndarray) -> np.ndarray:
+    """What tells where derivatives beside a cause were made, in units by which they change: the factor of a signal, the
+    logarithm of other sizes, edges of windows in units of their prior."""
+    sizes = amplitude if fault_of(h).corrects else np.sign(amplitude) * np.log(np.maximum(np.abs(amplitude), 1e-30))
+    edges = [edge for w in h.when.windows for edge in (w.start, w.end)]
+    return np.concatenate([sizes, np.array(edges) / detector.policy.edge_prior])
 
 
 def gains_of(study: Study, accepted: Sequence[Accepted]) -> list[tuple[int, int]]:

@@ -25,8 +25,8 @@ from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.study import Planned, Study
 from twin.diagnose.model.surrogate import jacobian_of
 from twin.diagnose.search.accepted import Accepted, exchanged, parameter_of
-from twin.diagnose.search.contest import misfit
 from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.exact import misfit
 from twin.rom.drive import Drive, evaluate
 
 

@@ -73,11 +73,11 @@ class _Made:
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Of the outputs by the parameters, at parameters or with signals that no surrogate knows."""
+    """Of the outputs by the parameters, what a surrogate does not know: beyond its bounds, or beside causes."""
 
-    causes: tuple[tuple[str, str], ...]  # family and place of those that correct a signal
-    there: np.ndarray  # (n + causes,) prior standard deviations, then amplitudes: 1 is all of a factor
-    J: np.ndarray  # (m, n)
+    causes: tuple[tuple[str, str, str, int], ...]  # family, place, signal and number of windows
+    there: np.ndarray  # prior standard deviations (n,), then what tells the causes' sizes and hours
+    J: np.ndarray  # (m, n) less that of the surrogate
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,9 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted
-from twin.diagnose.search.contest import beginning, misfit_of_each, worth
+from twin.diagnose.search.contest import worth
 from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.exact import beginning, misfit_of_each
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.policy import POLICY, SearchPolicy

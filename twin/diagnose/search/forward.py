@@ -20,8 +20,9 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, exchanged, settled
-from twin.diagnose.search.contest import beginning, judged, misfit_of_each, proof, tried, worth
+from twin.diagnose.search.contest import judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
+from twin.diagnose.search.exact import beginning, misfit_of_each
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Search, Step, cosines, distinct, look

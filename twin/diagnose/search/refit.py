@@ -29,9 +29,9 @@ from twin.diagnose.search.accepted import (
     shifted,
     spans,
 )
-from twin.diagnose.search.contest import lowest, solved
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import shape_errors
+from twin.diagnose.search.exact import lowest, solved
 from twin.diagnose.search.policy import SearchPolicy
 
 
@@ -70,7 +70,7 @@ def refit(
     J = np.zeros((len(y), len(x)))
     for _ in range(policy.refits):
         there = shifted(study, x, gains, amplitude)
-        sizes = [(a.hypothesis, float(amplitude[own.start])) for a, own in zip(accepted, of_each, strict=True)]
+        sizes = [(a.hypothesis, amplitude[own], a.statistic) for a, own in zip(accepted, of_each, strict=True)]
         J = jacobian(detector, x, sizes)
         bent, states = np.zeros(len(y)), motion(detector, there)
         for a, own in zip(accepted, of_each, strict=True):

@@ -16,7 +16,6 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.search.accepted import settled
-from twin.diagnose.search.contest import misfit
 from twin.diagnose.search.declared import (
     declared_candidates,
     declared_exactly,
@@ -24,6 +23,7 @@ from twin.diagnose.search.declared import (
     swapped_candidates,
 )
 from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.exact import misfit
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Step, distinct, look, scored
 from twin.diagnose.search.strained import Freed, loose_ones

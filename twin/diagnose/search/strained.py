@@ -21,8 +21,9 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.loss_law import is_source
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns, settled
-from twin.diagnose.search.contest import beginning, bent, exact, misfit, misfit_of_each
+from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.exact import beginning, exact, misfit, misfit_of_each
 from twin.diagnose.search.look import Search, Step, cosines, look
 from twin.diagnose.search.refit import refit
 
