@@ -36,6 +36,10 @@ def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
     return Hypothesis(batch, 0, when, 100.0, (1.0,) * q, 1.0)
 
 
+def as_it_is(detector, y, fitted, h):
+    return h
+
+
 def test_freedom_has_its_price():
     assert worth(hypothesis()) == 100.0
     assert worth(hypothesis(places=10)) == pytest.approx(100.0 - 2.0 * np.log(10.0))
@@ -204,6 +208,7 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
 def test_a_capacity_further_behind_is_refitted(monkeypatch):
     """Heat in many windows explains more; a capacity that scores three quarters of it may explain as much."""
     contest = sys.modules[worth.__module__]
+    monkeypatch.setattr(contest, "closer", as_it_is)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
 
     def kind(name: str, statistic: float) -> Hypothesis:
@@ -220,6 +225,7 @@ def test_a_capacity_further_behind_is_refitted(monkeypatch):
 def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
     """One gains 20 % by its edges, as the other would; a refit that finds several times more is not brought back."""
     contest = sys.modules[worth.__module__]
+    monkeypatch.setattr(contest, "closer", as_it_is)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
     lead, near, far = (replace(bent, statistic=s) for s in (1000.0, 950.0, 600.0))
     nothing = np.zeros(0)
@@ -233,6 +239,7 @@ def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
 
 def test_candidates_of_one_kind_do_not_keep_others_out(monkeypatch):
     contest = sys.modules[worth.__module__]
+    monkeypatch.setattr(contest, "closer", as_it_is)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
     many = [replace(bent, statistic=100.0 - 0.1 * k) for k in range(40)]
     film = replace(bent, batch=replace(bent.batch, kind="film"), statistic=93.0)
@@ -272,6 +279,23 @@ def test_one_that_leads_by_its_score_is_refitted_beside_one_that_was(monkeypatch
         far,
     ]  # nothing near it was refitted
     assert refitted == [straight]
+
+
+def test_those_near_the_leader_are_fitted_closer_before_one_leads(monkeypatch):
+    """Strong ones differ by less than what linear models say wrongly; one far behind costs nothing."""
+    contest = sys.modules[worth.__module__]
+    lead, near, far = (replace(hypothesis(), statistic=s) for s in (1000.0, 950.0, 700.0))
+    asked = []
+
+    def closer(detector, y, fitted, h):
+        asked.append(h)
+        return replace(h, statistic=1100.0) if h is near else h
+
+    monkeypatch.setattr(contest, "closer", closer)
+    order = contest._closely(SEARCHED, np.zeros(0), None, [lead, near, far])
+    assert [h.statistic for h in order] == [1100.0, 1000.0, 700.0]
+    assert asked == [lead, near]
+    assert contest._closely(SEARCHED, np.zeros(0), None, []) == []
 
 
 def test_what_a_leader_gained_by_being_refitted_the_best_of_other_kinds_may_gain_too(monkeypatch):

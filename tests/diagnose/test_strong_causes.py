@@ -12,7 +12,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.accepted import jacobian, strong
-from twin.diagnose.search.exact import exact, misfit
+from twin.diagnose.search.exact import closer, exact, misfit
 
 pytestmark = pytest.mark.long
 
@@ -69,7 +69,7 @@ def test_a_strong_cause_is_fitted_to_the_noise(seed):
     y = y + detector.whiten.colour(rng.standard_normal(len(y)))
     fitted = detector.fitter(y)
     guess = heat("housing", ("run_0", 1.0, 2.5), ("run_1", 1.0, 2.5), power=1.3 * POWER)
-    found = exact(detector, y, fitted, guess)
+    found = closer(detector, y, fitted, exact(detector, y, fitted, guess))
     assert misfit(detector, fitted) - found.statistic < 1.5 * len(y)  # of that of noise
     assert found.amplitude[0] == pytest.approx(POWER, rel=0.15)
     for w, own in zip(found.when.windows, true.when.windows, strict=True):

@@ -19,7 +19,7 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import edges_of
-from twin.diagnose.search.exact import exact
+from twin.diagnose.search.exact import closer, exact
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
@@ -71,7 +71,8 @@ def judged(
         done.append(now)
         scores[id(now)] = worthy(h)
     straight = [h for h in left if not bent(detector, h)]
-    return _fair(detector, y, fitted, [*done, *straight], scores), [h for h in left if bent(detector, h)]
+    order = _fair(detector, y, fitted, [*done, *straight], scores)
+    return _closely(detector, y, fitted, order), [h for h in left if bent(detector, h)]
 
 
 def _behind(h: Hypothesis, policy: SearchPolicy) -> float:
@@ -133,6 +134,15 @@ def _fair(
         exactly.add(id(order[0]))
         order.sort(key=worthy, reverse=True)
     return order
+
+
+def _closely(detector: Detector, y: np.ndarray, fitted: Fitted, order: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Candidates in order, once the strong ones among those near the leader are fitted closer: few, for derivatives
+    beside a cause take as long as a calibration."""
+    worthy = partial(worth, policy=detector.policy)
+    least = (1.0 - detector.policy.behind) * max((worthy(h) for h in order), default=0.0)
+    closer_ones = [closer(detector, y, fitted, h) if worthy(h) > least else h for h in order]
+    return sorted(closer_ones, key=worthy, reverse=True)
 
 
 def _follows(h: Hypothesis) -> bool:

@@ -60,24 +60,40 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
         h = moved(detector.study, detector.elements, h, ())  # hours found by `growth` get their windows
     x = beginning(fitted.x, policy).copy()
     x[freed(detector.study, h)] = 0.0
-    best, statistic = _descended(detector, y, fitted, _Point(a, x, h), passes)
-    return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
+    return _descended(detector, y, fitted, _Point(a, x, h), passes)
 
 
-def _descended(detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, passes: int) -> tuple[_Point, float]:
-    """Where Gauss-Newton steps with a line search from a point end, and the statistic there.
+def closer(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+    """A hypothesis that has been compared, where it is strong: from there on with derivatives of the exact model beside
+    it, and by what the parameters that are reached leave. Unchanged where that explains no more.
 
-    The search goes by what the most likely parameters of the linear model would leave; of a strong cause by what those
-    that are there leave: far from the minimum even a wrong linear model explains nearly all.
+    Every step otherwise counts what the most likely parameters of the linear model would leave: far from the minimum
+    even a wrong linear model explains nearly all, and one of several strong causes leads by that alone.
     """
+    if fault_of(h).curved or not strong(detector, h, _excess(detector, fitted)):
+        return h
+    x = beginning(fitted.x, detector.policy).copy()
+    found = _descended(detector, y, fitted, _Point(np.array(h.amplitude), x, h), detector.policy.window_passes, True)
+    return max(h, found, key=lambda own: own.statistic)
+
+
+def _excess(detector: Detector, fitted: Fitted) -> float:
+    """What a fit leaves beyond noise: no cause explains more."""
+    return misfit(detector, fitted) - float(np.isfinite(fitted.residual).sum())
+
+
+def _descended(
+    detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, passes: int, closely: bool = False
+) -> Hypothesis:
+    """Where Gauss-Newton steps with a line search from a point end."""
     study, policy, h = detector.study, detector.policy, now.h
     fault, q = fault_of(h), h.batch.q
     before, inner = misfit(detector, fitted), edges_of(study, h)
-    excess = before - float(np.isfinite(fitted.residual).sum())  # no cause explains more
+    explained = _excess(detector, fitted) if closely else 0.0
     read = readings_columns(detector, h) if fault.read else np.zeros((len(y), q))
     (low, high), (mean, inverse), floor = bounds(study), fault.prior(q), lowest(detector, h)
     a = np.maximum(now.a, floor)
-    if fault.wets:  # a strong film saturates: a score that takes it as linear says little
+    if fault.wets and not closely:  # a strong film saturates: a score that takes it as linear says little
         a[0] = mean[0]
     now = replace(now, a=a)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(now.x), ()), 1.0
@@ -86,12 +102,12 @@ def _descended(detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, p
         a = fault.limited(study, h.name, _moved(at.a, found[:q], fault.conducts, h.batch.sign, policy))
         return a, np.clip(found[q:], -policy.edge_step, policy.edge_step)
 
-    held, far = policy.held if fault.wets else 0, strong(detector, h, excess)
-    others = detector.fitter.without_parameters(fitted.more) if far else None
-    for i in range(passes or held + (policy.window_passes if inner or far else policy.passes)):
+    held = policy.held if fault.wets and not closely else 0
+    others = detector.fitter.without_parameters(fitted.more) if closely else None
+    for i in range(passes or held + (policy.passes if not inner else policy.window_passes)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(detector, now, edges)
-        J = jacobian(detector, now.x, [(now.h, now.a, excess)])
+        J = jacobian(detector, now.x, [(now.h, now.a, explained)])
         projector = detector.fitter.projector(J, fitted.more)
         there = detector.whiten(y - fitted.beside - outputs) - read @ now.a
         left = there + detector.whiten(J @ now.x)
@@ -100,11 +116,8 @@ def _descended(detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, p
         else:
             remains = float(there @ others(there)) + float(now.x @ now.x)
         removed = before - remains - float(inverse @ (now.a - mean) ** 2)
-        enough = max(policy.less, policy.less_share * (remains if far else removed))
+        enough = max(policy.less, policy.less_share * (remains if closely else removed))
         arrived = i > held and abs(removed - statistic) < enough
-        if removed <= statistic and far and i <= held:  # no better without the parameters: with them
-            now, statistic, held = best, -np.inf, i
-            continue
         if removed <= statistic:  # too far: back, then less; parameters may do without a step
             if arrived:
                 break
@@ -129,13 +142,12 @@ def _descended(detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, p
             after, later = limited(now, found)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, later]))[: len(now.x)]
             drift = np.clip(np.clip(nuisance, low, high) - now.x, -policy.near, policy.near)
-            drift *= i >= held
             if others is not None:  # the best for parameters that get no farther
                 PD = others(D)
                 F = D.T @ PD + np.diag([*stiff, *(e.prior(policy) ** -2.0 for e in edges)])
                 found = solved(F, PD.T @ (there - detector.whiten(J @ drift)) + pulled, below)
                 after, later = limited(now, found)
-            step = _Step(after - now.a, drift, tuple(zip(edges, later, strict=True)))
+            step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, later, strict=True)))
         shifts = [(e, share * by) for e, by in step.edges]
         shifted = moved(study, detector.elements, best.h, shifts) if shifts else best.h
         now = _Point(best.a + share * step.a, best.x + share * step.x, shifted)
@@ -144,7 +156,8 @@ def _descended(detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, p
     # what better parameters remove is not the cause's
     _, J = detector.fitter.surrogate.at(best.x)
     none = detector.whiten(y - fitted.beside - study.all_outputs(best.x) + J @ best.x)
-    return best, statistic + min(float(none @ detector.fitter.projector(J, fitted.more)(none)) - before, 0.0)
+    statistic += min(float(none @ detector.fitter.projector(J, fitted.more)(none)) - before, 0.0)
+    return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
 
 
 def _read_anew(detector: Detector, fitted: Fitted, h: Hypothesis) -> Hypothesis:

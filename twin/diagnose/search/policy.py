@@ -125,7 +125,7 @@ class SearchPolicy:
     still: float = _rule(0.1, SOLVER, "of amplitudes: a pass that changes less is the last", "standard deviations")
     refit_less: float = _rule(0.5, SOLVER, "a pass that changes less is the last", "likelihood-ratio units")
     anew: float = _rule(
-        0.5, SOLVER, "by which parameters move before derivatives beyond all bounds are made anew",
+        1.0, SOLVER, "by which parameters move before derivatives that no surrogate knows are made anew",
         "prior standard deviations",
     )  # fmt: skip
     rises: int = _rule(2, SOLVER, "passes in a row that make it worse, after which it runs away")
