@@ -139,10 +139,11 @@ def _fair(
 def _closely(detector: Detector, y: np.ndarray, fitted: Fitted, order: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Candidates in order, once the strong ones among those near the leader are fitted closer: few, for derivatives
     beside a cause take as long as a calibration."""
-    worthy = partial(worth, policy=detector.policy)
-    least = (1.0 - detector.policy.behind) * max((worthy(h) for h in order), default=0.0)
-    closer_ones = [closer(detector, y, fitted, h) if worthy(h) > least else h for h in order]
-    return sorted(closer_ones, key=worthy, reverse=True)
+    policy = detector.policy
+    worthy = partial(worth, policy=policy)
+    least = (1.0 - policy.behind) * max((worthy(h) for h in order), default=0.0)
+    near = [closer(detector, y, fitted, h) for h in order[: policy.closest] if worthy(h) > least]
+    return sorted([*near, *order[len(near) :]], key=worthy, reverse=True)
 
 
 def _follows(h: Hypothesis) -> bool:

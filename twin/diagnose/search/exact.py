@@ -121,7 +121,7 @@ def _descended(
         if removed <= statistic:  # too far: back, then less; parameters may do without a step
             if arrived:
                 break
-            if np.any(step.x):
+            if np.any(step.x) and not closely:
                 step = replace(step, x=np.zeros_like(step.x))
             else:
                 share *= 0.4

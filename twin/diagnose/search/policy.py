@@ -62,6 +62,7 @@ class SearchPolicy:
     behind: float = _rule(0.15, FIVE_AXIS, "of the leader: who scores less cannot overtake it by being refitted")
     saturates: float = _rule(0.4, FIVE_AXIS, "of the leader, for capacities and coolants: linearity is worse there")
     switched: float = _rule(0.6, LUMPED, "the same of windows: what is felt at once shows every error of the response")
+    closest: int = _rule(3, JUDGED, "strong causes near the leader that are fitted closer")
     edge: float = _rule(4.0, FIVE_AXIS, "that an edge gains where nothing is hidden", "likelihood-ratio units")
     amplitude: float = _rule(8.0, FIVE_AXIS, "that a second amplitude costs", "likelihood-ratio units")
     gone: float = _rule(-0.7, JUDGED, "of a conductance that is nearly gone, and always refitted", "relative change")
@@ -125,7 +126,7 @@ class SearchPolicy:
     still: float = _rule(0.1, SOLVER, "of amplitudes: a pass that changes less is the last", "standard deviations")
     refit_less: float = _rule(0.5, SOLVER, "a pass that changes less is the last", "likelihood-ratio units")
     anew: float = _rule(
-        1.0, SOLVER, "by which parameters move before derivatives that no surrogate knows are made anew",
+        0.5, SOLVER, "by which parameters move before derivatives that no surrogate knows are made anew",
         "prior standard deviations",
     )  # fmt: skip
     rises: int = _rule(2, SOLVER, "passes in a row that make it worse, after which it runs away")
