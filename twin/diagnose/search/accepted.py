@@ -73,7 +73,7 @@ def jacobian(detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesi
     beside = [(h, a) for h, a, explained in causes if fault_of(h).corrects or strong(detector, h, explained)]
     J = detector.fitter.surrogate.at(there)[1]
     if anew or beside:
-        J += _unknown_to_surrogate(detector, there, beside)
+        J += _unknown_to_surrogate(detector, there, J, beside)
     J[:, held] = 0.0
     return J
 
@@ -87,10 +87,10 @@ def strong(detector: Detector, h: Hypothesis, explained: float) -> bool:
 
 
 def _unknown_to_surrogate(
-    detector: Detector, there: np.ndarray, causes: Sequence[tuple[Hypothesis, np.ndarray]]
+    detector: Detector, there: np.ndarray, known: np.ndarray, causes: Sequence[tuple[Hypothesis, np.ndarray]]
 ) -> np.ndarray:
-    """(m, n) by which derivatives of the exact model at parameters there (n,) beside causes differ from those of the
-    surrogate: there, or at the nearest point within `anew` where this diagnosis has made them."""
+    """(m, n) by which derivatives of the exact model at parameters there (n,) beside causes differ from those known
+    (m, n) of the surrogate: there, or at the nearest point within `anew` where this diagnosis has made them."""
     study = detector.study
     units = [u for h, _ in causes for u in units_of(study, h)]
     sizes = [float(v) for _, a in causes for v in a]
@@ -104,7 +104,7 @@ def _unknown_to_surrogate(
     def of_run(k: int) -> np.ndarray:
         return study.jacobian(k, there, slots_with(study, detector.elements, units, k), sizes)[:, : len(there)]
 
-    J = np.vstack(over_runs(of_run, study.fitted)) - detector.fitter.surrogate.at(there)[1]
+    J = np.vstack(over_runs(of_run, study.fitted)) - known
     detector.derivatives.append(Derivatives(names, at, J))
     return J
 

@@ -135,17 +135,16 @@ def _descended(
             D = detector.whiten(derivatives) + np.pad(read, ((0, 0), (0, len(edges))))
             PD = projector(D)
             stiff = 1e9 * inverse if i < held else inverse
-            F = D.T @ PD + np.diag([*stiff, *(e.prior(policy) ** -2.0 for e in edges)])
+            prior = np.diag([*stiff, *(e.prior(policy) ** -2.0 for e in edges)])
             pulled = np.concatenate([stiff * (mean - now.a), np.zeros(len(edges))])
             below = np.concatenate([floor - now.a, np.full(len(edges), -np.inf)])
-            found = solved(F, PD.T @ left + pulled, below)
+            found = solved(D.T @ PD + prior, PD.T @ left + pulled, below)
             after, later = limited(now, found)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, later]))[: len(now.x)]
             drift = np.clip(np.clip(nuisance, low, high) - now.x, -policy.near, policy.near)
             if others is not None:  # the best for parameters that get no farther
                 PD = others(D)
-                F = D.T @ PD + np.diag([*stiff, *(e.prior(policy) ** -2.0 for e in edges)])
-                found = solved(F, PD.T @ (there - detector.whiten(J @ drift)) + pulled, below)
+                found = solved(D.T @ PD + prior, PD.T @ (there - detector.whiten(J @ drift)) + pulled, below)
                 after, later = limited(now, found)
             step = _Step(after - now.a, 0.0 * drift if i < held else drift, tuple(zip(edges, later, strict=True)))
         shifts = [(e, share * by) for e, by in step.edges]
