@@ -26,8 +26,9 @@ from twin.diagnose.search.accepted import settled
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.limits import limits_at, limits_of
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.verdict import limits_at, limits_of, unknown_of, verdict_of, with_faults
+from twin.diagnose.search.verdict import unknown_of, verdict_of, with_faults
 from twin.diagnose.search.witness import other_measurements
 from twin.inject.draw.trial import draw
 from twin.inject.hidden import Hidden, Trial

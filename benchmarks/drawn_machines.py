@@ -30,8 +30,8 @@ from twin.diagnose.report.recalibration import large
 from twin.diagnose.report.text import alike
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.dispersion import searched
-from twin.diagnose.search.sealed import judged as on_sealed
-from twin.diagnose.search.verdict import pulls_of, verdict_of, with_faults
+from twin.diagnose.search.standing import standing
+from twin.diagnose.search.verdict import pulls_of
 from twin.diagnose.search.witness import other_measurements
 from twin.inject.machines.drawn import HOURS, NOISE, RUNS, SAMPLINGS, DrawnMachine, draw_machine
 from twin.inject.machines.draws import between, one_of
@@ -295,13 +295,12 @@ def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
     began = time.perf_counter()
     own, plans, y, faults = other_measurements(detector, runs)
     found, left = searched(own, y)
-    verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
-    opened = on_sealed(found, y, verdict, causes, FAMILIES, plans[2:], 1)
+    found, opened = standing(found, y, FAMILIES, faults, plans[2:], 1)
     verdict, causes = opened.verdict, opened.causes
     return {
         "hidden": hidden,
         "verdict": verdict,
-        "note": opened.note or opened.size,
+        "note": opened.note or opened.less or opened.size,
         "causes": [(c.family, c.place, round(c.amplitude, 4), c.history, c.ci95) for c in causes],
         "gains": [(g.channel, g.unit, g.recalibrated, g.extended, g.ci95) for g in opened.gains if g.affected],
         "rivals": [(r.family, r.place) for c in causes for r in c.rivals],

@@ -44,7 +44,8 @@ from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.detector import Detector, emptied
 from twin.diagnose.search.dispersion import raised, searched
-from twin.diagnose.search.verdict import cause_of, limits_in, verdict_of, with_faults
+from twin.diagnose.search.limits import limits_in
+from twin.diagnose.search.verdict import cause_of, verdict_of, with_faults
 from twin.logs.read import read_run
 from twin.logs.run import Run
 from twin.machine.effects.edits import extended_description, loads_with

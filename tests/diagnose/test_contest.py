@@ -24,7 +24,7 @@ from twin.diagnose.search.verdict import cause_of
 
 pytestmark = pytest.mark.long
 
-SEARCHED = SimpleNamespace(policy=POLICY)  # all that comparing names needs of a detector
+SEARCHED = SimpleNamespace(policy=POLICY, study=None)  # all that comparing names needs of a detector
 
 
 def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
@@ -34,10 +34,6 @@ def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
     names = tuple(f"p{i}" for i in range(places))
     batch = Batch("heat_source", "heat", "W", names, np.zeros((places, 4), dtype=int), (when,))
     return Hypothesis(batch, 0, when, 100.0, (1.0,) * q, 1.0)
-
-
-def as_it_is(detector, y, fitted, h):
-    return h
 
 
 def test_freedom_has_its_price():
@@ -98,6 +94,15 @@ def test_amplitudes_that_would_be_too_low_are_held_and_the_others_make_the_best_
         free = a > floor
         np.testing.assert_allclose((F @ a - known)[free], 0.0, atol=1e-9)  # no slope where nothing holds
     np.testing.assert_allclose(solved(F, known, np.full(4, -np.inf)), np.linalg.solve(F, known))
+
+
+def test_seconds_of_an_edge_are_found_beside_the_share_of_a_conductance():
+    """One is known to 30 s, the other to a thousandth: information of 1e-3 and of 1e6."""
+    F = np.array([[1e6, 10.0], [10.0, 1e-3]])
+    a = np.array([-0.3, 900.0])
+    np.testing.assert_allclose(solved(F, F @ a, np.array([-0.97, -np.inf])), a, rtol=1e-9)
+    held = solved(F, F @ a, np.array([-0.2, -np.inf]))
+    np.testing.assert_allclose(held, [-0.2, (F[1] @ a - F[1, 0] * -0.2) / F[1, 1]], rtol=1e-9)
 
 
 def test_what_a_cause_may_be():
@@ -208,7 +213,7 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
 def test_a_capacity_further_behind_is_refitted(monkeypatch):
     """Heat in many windows explains more; a capacity that scores three quarters of it may explain as much."""
     contest = sys.modules[worth.__module__]
-    monkeypatch.setattr(contest, "closer", as_it_is)
+    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order: order)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
 
     def kind(name: str, statistic: float) -> Hypothesis:
@@ -225,7 +230,7 @@ def test_a_capacity_further_behind_is_refitted(monkeypatch):
 def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
     """One gains 20 % by its edges, as the other would; a refit that finds several times more is not brought back."""
     contest = sys.modules[worth.__module__]
-    monkeypatch.setattr(contest, "closer", as_it_is)
+    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order: order)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
     lead, near, far = (replace(bent, statistic=s) for s in (1000.0, 950.0, 600.0))
     nothing = np.zeros(0)
@@ -239,7 +244,7 @@ def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
 
 def test_candidates_of_one_kind_do_not_keep_others_out(monkeypatch):
     contest = sys.modules[worth.__module__]
-    monkeypatch.setattr(contest, "closer", as_it_is)
+    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order: order)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
     many = [replace(bent, statistic=100.0 - 0.1 * k) for k in range(40)]
     film = replace(bent, batch=replace(bent.batch, kind="film"), statistic=93.0)
@@ -292,10 +297,31 @@ def test_those_near_the_leader_are_fitted_closer_before_one_leads(monkeypatch):
         return replace(h, statistic=1100.0) if h is near else h
 
     monkeypatch.setattr(contest, "closer", closer)
-    order = contest._closely(SEARCHED, np.zeros(0), None, [lead, near, far])
+    monkeypatch.setattr(contest, "misfit", lambda detector, fitted: 1500.0)
+    fitted = SimpleNamespace(residual=np.zeros(300))
+    order = contest._closely(SEARCHED, np.zeros(0), fitted, [lead, near, far])
     assert [h.statistic for h in order] == [1100.0, 1000.0, 700.0]
     assert asked == [lead, near]
-    assert contest._closely(SEARCHED, np.zeros(0), None, []) == []
+    assert contest._closely(SEARCHED, np.zeros(0), fitted, []) == []
+    enough = SimpleNamespace(residual=np.zeros(450))  # of so many numbers chance leaves as much as the leader
+    assert contest._closely(SEARCHED, np.zeros(0), enough, [lead, near]) == [lead, near]
+    assert asked == [lead, near]
+
+
+@pytest.mark.parametrize(("reached", "goes_on"), [(800.0, False), (900.0, True)])
+def test_a_window_that_falls_behind_after_few_passes_goes_no_further(monkeypatch, reached, goes_on):
+    contest = sys.modules[worth.__module__]
+    window, passes = hypothesis(windows=1), []
+
+    def exact(detector, y, fitted, h, most=0):
+        passes.append(most)
+        return replace(h, statistic=reached + len(passes))
+
+    monkeypatch.setattr(contest, "exact", exact)
+    monkeypatch.setattr(contest, "edges_of", lambda study, h: [0])
+    found = contest._refitted(SEARCHED, np.zeros(0), None, [window], 1000.0)
+    assert found.statistic == reached + len(passes)
+    assert passes == [POLICY.trial, 0][: 1 + goes_on]
 
 
 def test_what_a_leader_gained_by_being_refitted_the_best_of_other_kinds_may_gain_too(monkeypatch):

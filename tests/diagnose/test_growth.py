@@ -102,6 +102,17 @@ def test_a_coolant_begins_in_all_hours_that_cold_asks_for():
     assert found.amplitude == pytest.approx((10.0, -9.0))
 
 
+@pytest.mark.parametrize(("cold", "begins"), [(-8.0, True), (-5.0, False)])
+def test_cold_may_be_as_good_as_heat_in_all_other_hours(cold, begins):
+    """Parameters take what the two differ by: a coolant of the first hour is as good as heat of the others."""
+    batch, block = coolant()
+    g = np.concatenate([np.full(4, 10.0), [cold, 5.2, 5.2, 5.2]])
+    found = chilled(Hypothesis(batch, 0, batch.histories[2], 1.0, (10.0, 2.0), 1.0), g, block)
+    assert (found is not None) == begins
+    if found is not None:
+        assert found.when.windows == batch.histories[0].windows
+
+
 def test_no_cold_and_no_coolant_begin_nowhere_else():
     batch, block = coolant()
     warm = np.concatenate([np.zeros(4), [9.0, 1.0, 1.0, 1.0]])

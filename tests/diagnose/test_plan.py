@@ -16,7 +16,7 @@ from twin.diagnose.plan.plan import Basis, make_plan
 from twin.diagnose.plan.suspicion import known_family, known_suspicions, named, worst_of_machine
 from twin.diagnose.report.plan import plan_lines, plan_section
 from twin.diagnose.result.plan import Foresight, Plan
-from twin.diagnose.search.verdict import limits_of
+from twin.diagnose.search.limits import limits_of
 from twin.errors import TwinError
 
 pytestmark = pytest.mark.long

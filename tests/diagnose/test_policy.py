@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.search.limits import limits_at
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY, Origin, rules
-from twin.diagnose.search.verdict import limits_at
 
 SEARCH = Path(__file__).parents[2] / "twin" / "diagnose" / "search"
 # what a detector is made by, and how finely edges in time are differentiated: no search decides by these

@@ -19,10 +19,11 @@ from twin.diagnose.search.dispersion import raised, searched
 from twin.diagnose.search.exact import misfit, misfit_of_each
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.limits import limits_at, limits_of
 from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.start import begun
 from twin.diagnose.search.strained import strained
-from twin.diagnose.search.verdict import limits_at, limits_of, pulls_of, verdict_of
+from twin.diagnose.search.verdict import pulls_of, verdict_of
 
 
 def measured(kind="", place="", size=0.0, seed=0, levels=(1.0,)):
@@ -131,6 +132,16 @@ def test_limits_are_sizes_that_would_pass():
     assert all(limit.size >= by[limit.family, limit.unit] for limit in limits_of(wide))
 
 
+def test_what_no_machine_can_have_is_seen_at_no_size():
+    """Of a model as bad as this an offset would have to be a million kelvins."""
+    detector = small_case.made_detector()
+    blind = replace(detector, thresholds=dict.fromkeys(detector.thresholds, 1e14))
+    limits = {(limit.family, limit.unit): limit for limit in limits_of(blind)}
+    assert np.isinf(limits["sensor", "K"].smallest)
+    assert np.isinf(limits["measurement", "m/s"].size)
+    assert np.isfinite([limit.size for limit in limits_of(detector) if limit.family == "sensor"]).all()
+
+
 # --- thresholds grow with what a model that is wrong in its form leaves, but not with what a cause explains
 
 
@@ -171,7 +182,7 @@ def test_nothing_is_named_in_a_model_that_is_wrong_in_its_form():
     assert all(threshold >= grown.least for threshold in grown.thresholds.values())
     before, after = limits_at(detector), limits_at(grown)
     assert all(after[place] >= size for place, size in before.items())
-    assert np.median([after[p] / before[p] for p in before]) > 2.5
+    assert np.median([after[p] / before[p] for p in before if np.isfinite(before[p])]) > 2.5
 
 
 @pytest.mark.long

@@ -17,20 +17,11 @@ from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, parameter_of
 from twin.diagnose.search.forward import search
+from twin.diagnose.search.limits import limits_at, limits_of, over_histories
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.strained import Freed, loose_ones, strained
-from twin.diagnose.search.verdict import (
-    CALIBRATED,
-    _more_alike,
-    cause_of,
-    limits_at,
-    limits_of,
-    over_histories,
-    rival_of,
-    strained_of,
-    verdict_of,
-)
+from twin.diagnose.search.verdict import CALIBRATED, _more_alike, cause_of, rival_of, strained_of, verdict_of
 
 
 @pytest.mark.parametrize(

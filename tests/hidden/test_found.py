@@ -17,7 +17,7 @@ from tests.hidden.trials import DRAWN, EXPERIMENT, STATES, TRIALS, expected
 from twin.build.workers import each
 from twin.diagnose.pipeline import Settings
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.verdict import limits_at, limits_in, limits_of
+from twin.diagnose.search.limits import limits_at, limits_in, limits_of
 from twin.inject.hidden import Hidden
 from twin.inject.judge.match import effect, known_of, place_of, same_place
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -33,17 +33,17 @@ from twin.diagnose.report.scene import scene_of
 from twin.diagnose.report.text import cause_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Pull, Series, Unknown, Verdict
 from twin.diagnose.result.place import Scene
-from twin.diagnose.search.accepted import settled
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.dispersion import raised, searched, wrong_temperatures
 from twin.diagnose.search.gain import predicted
+from twin.diagnose.search.limits import limits_of
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.poor import poor_note
-from twin.diagnose.search.sealed import judged
+from twin.diagnose.search.standing import beside_sensors, standing
 from twin.diagnose.search.support import support_of
-from twin.diagnose.search.verdict import CALIBRATED, limits_of, pulls_of, rival_of, unknown_of, verdict_of, with_faults
+from twin.diagnose.search.verdict import CALIBRATED, pulls_of, rival_of, unknown_of, verdict_of
 from twin.diagnose.search.witness import upheld
 from twin.errors import ArtefactError, LogError
 from twin.logs.run import Run
@@ -179,25 +179,21 @@ def diagnose(
     found, dispersion = searched(detector, y)
     detector = raised(detector, dispersion)  # what was searched with in the end
     poor = dispersion.share > settings.policy.dispersed
-    verdict, causes = verdict_of(found, settings.families)
-    shown = found
+    found, opened = standing(found, y, settings.families, faults, plans[len(runs) :], settings.seed)
+    verdict, beside = verdict_of(found, settings.families)  # of what was seen before any search nothing is counted
+    shown = beside_sensors(found, y, settings.families) if verdict == "unknown" else found
     groups = {f.name: f.group for f in settings.families}
-    if verdict == "unknown":  # told and judged is the calibration beside faulty channels then, not what was tried
-        shown = _beside_sensors(found, groups)
     notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
-    beside = causes  # what was seen before any search has no statistic that channels could share
-    verdict, causes = with_faults(verdict, causes, faults)
-    opened = judged(shown, y, verdict, causes, settings.families, plans[len(runs) :], settings.seed)
     verdict, causes, extension = opened.verdict, opened.causes, opened.extension
     notes += [
         f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED and not c.rivals
     ]
-    notes += [opened.size] if opened.size else []
+    notes += [text for text in (opened.less, opened.size) if text]
     if opened.note:  # what is shown is then the calibration beside faulty channels, as of any unknown
         notes.insert(0, opened.note)
-        shown, beside = _beside_sensors(found, groups), ()
+        shown, beside = beside_sensors(found, y, settings.families), ()
         verdict = "too_poor" if poor else verdict
     if dispersion.least(settings.policy):
         notes.insert(0, poor_note(shown, plans, usable, settings.temperature_sigma, dispersion))
@@ -259,13 +255,6 @@ def diagnose(
         channels=tuple(channel_rows(traces, judgement, names[: len(runs)])),
     )
     return Result(diagnosis, found, extension, settings.families, described)
-
-
-def _beside_sensors(found: Search, groups: Mapping[str, str]) -> Search:
-    """The search with the causes that are faulty temperature sensors alone, and the calibration beside these."""
-    kept = tuple(a for a in found.accepted if groups.get(a.hypothesis.family) == "sensor")
-    x, covariance = settled(found.detector, measured_of(found.detector.study), kept)
-    return replace(found, accepted=kept, x=x, covariance=covariance)
 
 
 def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unknown: Unknown | None) -> Scene | None:

@@ -67,6 +67,11 @@ class Fitter:
         f, J = self.surrogate.at(x)
         return f, J, self.projector(J)
 
+    def at_description(self, y: np.ndarray) -> Fitted:
+        """Measurements y (m,) beside the parameters as described, before any fit."""
+        f, J, projector = self._described
+        return Fitted(np.zeros(len(self.surrogate.scale)), J, y - f, projector)
+
     def __call__(self, y: np.ndarray) -> Fitted:
         """Most likely parameters of measurements y (m,), NaN where missing."""
         low, high = bounds(self.study)

@@ -29,7 +29,10 @@ FAULTS = (
     # K: a converter at its rail
     Fault("sensor", "offset", "K", "sensors.", 0, 0.15, 100.0, read=True, called="offset"),
     Fault("sensor", "drift", "K/day", "sensors.", 0, 0.1, 20.0, read=True, called="drift"),
-    Lag("sensor", "lag", "s", "sensors.", 1, 120.0, 7200.0, read=True, sizes=(600.0, 1800.0, 5400.0), called="lag"),
+    Lag(
+        "sensor", "lag", "s", "sensors.", 1, 120.0, 7200.0, read=True, sizes=(200.0, 600.0, 1800.0, 5400.0),
+        called="lag",
+    ),
     # all of the reading is the air's; half as much again for the error of a fit
     Fault("sensor", "detached", "1", "sensors.", 1, 0.05, 1.5, read=True, called="detached"),
     Fault("sensor", "swapped", "1", "sensors.", 1, 0.0, fixed=True, read=True, exchanges=True, called="swapped"),

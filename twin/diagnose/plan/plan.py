@@ -1,7 +1,7 @@
 """The next experiment: of one more run, or one more sensor, what lowers the detection limit of a suspicion most.
 
 A detection limit is (sqrt(threshold) + z) / sqrt(I) with I the information about a size after everything calibratable
-is projected out (`verdict.limits_at`). An experiment adds to I. The detector's I of today is what counts; what an
+is projected out (`limits.limits_at`). An experiment adds to I. The detector's I of today is what counts; what an
 experiment adds is computed without the learned modes of model discrepancy (`foreseen`), and reduced by the share of I
 that they leave today: the same discrepancy, as large in the new run.
 """
@@ -21,11 +21,11 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.plan.actuators import actuators_of
 from twin.diagnose.plan.experiments import AGAIN, experiments_of, longest_of
 from twin.diagnose.plan.foreseen import AT, Foreseen, foreseen
-from twin.diagnose.plan.suspicion import Suspicion
+from twin.diagnose.plan.suspicion import Suspicion, known_suspicions
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.verdict import over_histories
+from twin.diagnose.search.limits import over_histories
 from twin.logs.run import Run
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
@@ -96,7 +96,8 @@ def make_plan(
     f, _, projector = detector.fitter.linear(np.zeros(len(study.probed.parameters)))
     now = sight(detector.columns, projector, np.zeros(len(f)))
     basis = Basis(tuple(columns), tuple(_hour(detector, key) for key in keys))
-    lone = tuple(_foresight(detector, now, s, basis, made) for s in suspicions)
+    stated = known_suspicions(detector)
+    lone = tuple(_foresight(detector, now, s, stated[s], basis, made) for s in suspicions)
     return Plan(lone, tuple(_apart(a, b, basis, made, detector.policy.apart) for a, b in pairs), ASSUMPTIONS)
 
 
@@ -121,7 +122,11 @@ def _listed(ordered: Sequence[_P]) -> list[_P]:
     return [p for p in ordered if not p.experiment.startswith(AT) or p in best]
 
 
-def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made: Sequence[Foreseen]) -> Foresight:
+def _foresight(
+    detector: Detector, now: Sight, s: Suspicion, stated: float, basis: Basis, made: Sequence[Foreseen]
+) -> Foresight:
+    """stated: its limit today. What is read and not in proportion to its size has another one than by its derivative,
+    which counts for what experiments bring."""
     threshold = detector.thresholds[s.family]
     told = fault_of(s.batches(detector)[0][1]).curve.told
     today = np.inf
@@ -137,6 +142,8 @@ def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made:
             share = np.clip(information / np.maximum(without, 1e-30), LEAST, 1.0)
             more = information + share * np.maximum(then - without, 0.0)
             best[e] = min(best[e], _limit(more, threshold, batch, chosen, detector.policy.power))
+    if np.isfinite(stated):
+        today, best = stated, best * stated / today
     proposals = [
         Proposal(f.name, f.words, told(float(size)), float(today / size)) for f, size in zip(made, best, strict=True)
     ]
@@ -150,7 +157,7 @@ def _foresight(detector: Detector, now: Sight, s: Suspicion, basis: Basis, made:
 
 
 def _limit(information: np.ndarray, threshold: float, batch: Batch, chosen: Sequence[int], power: float) -> float:
-    """Of the information (h,) of chosen histories, as `verdict.limits_at` takes it."""
+    """Of the information (h,) of chosen histories, as `limits.limits_at` takes it."""
     sizes = (np.sqrt(threshold) + power) / np.sqrt(np.maximum(information, 1e-30))
     return float(over_histories([batch.histories[h] for h in chosen], np.maximum(sizes, batch.smallest)))
 

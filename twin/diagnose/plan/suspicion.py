@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from twin.diagnose.evidence.batch import Batch, Hypothesis
 from twin.diagnose.faults.catalogue import Family, family
 from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.limits import limits_at
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.verdict import limits_at
 from twin.errors import TwinError
 from twin.nearest import did_you_mean
 

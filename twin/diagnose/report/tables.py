@@ -69,7 +69,10 @@ def rivals_table(rivals: Sequence[Rival], d: Diagnosis) -> str:
 def limits_table(d: Diagnosis) -> str:
     rows = []
     for x in d.detection_limits:
-        sizes = [sized(x.family, v, x.unit) for v in (x.size, x.smallest, x.largest)]
+        sizes = [
+            sized(x.family, v, x.unit) if math.isfinite(v) else "at no size that a machine can have"
+            for v in (x.size, x.smallest, x.largest)
+        ]
         rows.append([what(x.family), *sizes, place_words(x.place)])
     head = ["what", "seen from (median of places)", "at the best place", "at the worst place", "place of the median"]
     return table(head, rows, (1, 2, 3))

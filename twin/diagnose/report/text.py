@@ -137,7 +137,7 @@ def verdict_sentence(d: Diagnosis) -> str:
     """The verdict in one sentence: what, where, how much, how sure."""
     causes = joined([cause_words(c) for c in d.causes])
     if d.verdict == "nothing":
-        limits = d.detection_limits
+        limits = _seen(d)
         seen = f"; {limit_words(limits[0])}, would have been seen at half of all places" if limits else ""
         told = [text for text in (moved_words(d), left_words(d)) if text]
         fits = "" if told else ": within their noise the description explains them"
@@ -325,8 +325,13 @@ def pull_lines(d: Diagnosis) -> list[str]:
     return [f"Worth a look: {joined([pull_words(p) for p in far[:2]])}."] if far else []
 
 
+def _seen(d: Diagnosis) -> list[Limit]:
+    """The limits of what can be seen at half of all places."""
+    return [x for x in d.detection_limits if math.isfinite(x.size)]
+
+
 def limit_lines(d: Diagnosis) -> list[str]:
-    shown = joined([limit_words(x) for x in d.detection_limits[:5]])
+    shown = joined([limit_words(x) for x in _seen(d)[:5]])
     return [f"At half of all places these data would have shown, in 95 of 100 cases: {shown}."] if shown else []
 
 

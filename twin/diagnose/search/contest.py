@@ -19,7 +19,7 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import edges_of
-from twin.diagnose.search.exact import closer, exact
+from twin.diagnose.search.exact import by_chance, closer, exact, misfit
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
@@ -64,7 +64,7 @@ def judged(
             left.append(h)
             continue
         count[h.batch.kind] += bends
-        now = max((exact(detector, y, fitted, s) for s in starts[id(h)]), key=worthy) if bends else h
+        now = _refitted(detector, y, fitted, starts[id(h)], lead) if bends else h
         if worthy(now) > lead:
             lead = worthy(now)
             leads_by = min(lead, max(worthy(h), (1.0 - detector.policy.saturates) * lead))
@@ -73,6 +73,21 @@ def judged(
     straight = [h for h in left if not bent(detector, h)]
     order = _fair(detector, y, fitted, [*done, *straight], scores)
     return _closely(detector, y, fitted, order), [h for h in left if bent(detector, h)]
+
+
+def _refitted(
+    detector: Detector, y: np.ndarray, fitted: Fitted, starts: Sequence[Hypothesis], lead: float
+) -> Hypothesis:
+    """The worthiest that the starts of a candidate end at. Where edges are fitted they get few passes, and go on from
+    there if that is near what leads: losers take as long to arrive as the winner."""
+    worthy, policy = partial(worth, policy=detector.policy), detector.policy
+    if not edges_of(detector.study, starts[0]):
+        return max((exact(detector, y, fitted, s) for s in starts), key=worthy)
+    best = max((exact(detector, y, fitted, s, policy.trial) for s in starts), key=worthy)
+    near = 1.0 - (policy.saturates if fault_of(best).wets else policy.behind)
+    if worthy(best) < near * lead:
+        return best
+    return max(best, exact(detector, y, fitted, best), key=worthy)
 
 
 def _behind(h: Hypothesis, policy: SearchPolicy) -> float:
@@ -137,9 +152,11 @@ def _fair(
 
 
 def _closely(detector: Detector, y: np.ndarray, fitted: Fitted, order: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Candidates in order, once the strong ones among those near the leader are fitted closer: few, for derivatives
-    beside a cause take as long as a calibration."""
+    """Candidates in order, once the strong ones among those near the leader are fitted closer: few, and where the
+    leader leaves more than chance, for derivatives beside a cause take as long as a calibration."""
     policy = detector.policy
+    if order and misfit(detector, fitted) - order[0].statistic <= by_chance(fitted.residual, policy):
+        return list(order)
     worthy = partial(worth, policy=policy)
     least = (1.0 - policy.behind) * max((worthy(h) for h in order), default=0.0)
     near = [closer(detector, y, fitted, h) for h in order[: policy.closest] if worthy(h) > least]

@@ -51,7 +51,7 @@ def edges_of(study: Study, h: Hypothesis) -> list[Edge]:
 
     What was there before a run and stays, or lasts beyond its end, has no edge there.
     """
-    if fault_of(h).read:
+    if fault_of(h).read or not (h.when.windows or h.when.bell):
         return []
     if h.when.bell is not None:
         return [*(Edge("centre", i) for i in range(len(h.when.bell.centres))), Edge("length")]

@@ -31,6 +31,12 @@ def misfit_of_each(detector: Detector, fitted: Fitted) -> np.ndarray:
     return np.asarray(white * fitted.projector(white))
 
 
+def by_chance(y: np.ndarray, policy: SearchPolicy) -> float:
+    """The misfit that noise in measurements y (m,), NaN where missing, leaves in all but a thousandth of cases."""
+    count = int(np.isfinite(y).sum())
+    return count + policy.chance * float(np.sqrt(2.0 * count))
+
+
 @dataclass(frozen=True)
 class _Point:
     a: np.ndarray  # (q,)
@@ -51,7 +57,7 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     y (m,): NaN where nothing was measured. passes: at most, 0 for as many as its kind needs.
     """
     if fault_of(h).curved:
-        return _read_anew(detector, fitted, h)
+        return _read_anew(detector, y, fitted, h)
     policy = detector.policy
     a = np.array(h.amplitude)
     if fault_of(h).conducts:  # as if temperatures were linear in t
@@ -141,7 +147,9 @@ def _descended(
             found = solved(D.T @ PD + prior, PD.T @ left + pulled, below)
             after, later = limited(now, found)
             nuisance = projector.most_likely(left - D @ np.concatenate([after - now.a, later]))[: len(now.x)]
-            drift = np.clip(np.clip(nuisance, low, high) - now.x, -policy.near, policy.near)
+            wanted = np.clip(nuisance, low, high) - now.x
+            # all by the same share: parameters that make up for each other are far from it when each is cut alone
+            drift = wanted * min(1.0, policy.near / max(float(np.abs(wanted).max()), policy.near))
             if others is not None:  # the best for parameters that get no farther
                 PD = others(D)
                 found = solved(D.T @ PD + prior, PD.T @ (there - detector.whiten(J @ drift)) + pulled, below)
@@ -159,16 +167,18 @@ def _descended(
     return replace(best.h, statistic=max(statistic, 0.0), amplitude=tuple(map(float, best.a)))
 
 
-def _read_anew(detector: Detector, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+def _read_anew(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
     """A hypothesis about readings that are not in proportion to its size, at the size that removes most misfit."""
-    left = fitted.projector(detector.whiten(fitted.residual))
+    there = unbent(detector, y, fitted)
+    less = max(misfit(detector, there) - misfit(detector, fitted), 0.0)
+    left = there.projector(detector.whiten(there.residual))
     size, tried = h.amplitude[0], list[tuple[float, float]]()
-    states = motion(detector, beginning(fitted.x, detector.policy))
+    states = motion(detector, beginning(there.x, detector.policy))
     for _ in range(detector.policy.read_passes):
         change, D = (detector.whiten(f(detector, h, size, states)) for f in (curved_change, curved_slope))
-        kept = left - fitted.projector(change)
-        tried.append((float(change @ (left + kept)), size))
-        step = float(D @ kept) / max(float(D @ fitted.projector(D)), 1e-30)
+        kept = left - there.projector(change)
+        tried.append((float(change @ (left + kept)) - less, size))
+        step = float(D @ kept) / max(float(D @ there.projector(D)), 1e-30)
         size += float(np.clip(step, -0.5 * abs(size), abs(size)))
         if abs(step) < detector.policy.enough * abs(size):
             break
@@ -181,9 +191,18 @@ def beginning(x: np.ndarray, policy: SearchPolicy = POLICY) -> np.ndarray:
     return x if np.abs(x).max(initial=0.0) < policy.bends else np.zeros_like(x)
 
 
+def unbent(detector: Detector, y: np.ndarray, fitted: Fitted) -> Fitted:
+    """A fit of measurements y (m,); where it has bent parameters and no cause is named yet, the description instead."""
+    bent = np.abs(fitted.x).max(initial=0.0) >= detector.policy.bends
+    return detector.fitter.at_description(y) if bent and fitted.more is None else fitted
+
+
 def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:
     """(n,) the minimum of a^T F a / 2 - known . a; what would be below its `lowest` (n,) is held there."""
     held = np.zeros(len(known), dtype=bool)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(F), 1e-30))  # seconds stand beside shares of a conductance
+    F, known = F * np.outer(scale, scale), known * scale
+    lowest = lowest / scale
     while True:
         free = ~held
         found = np.where(held, lowest, 0.0)
@@ -191,7 +210,7 @@ def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:
         found[free] = np.linalg.pinv(F[np.ix_(free, free)], rcond=1e-9, hermitian=True) @ rest
         beyond = found < lowest
         if not beyond.any():
-            return np.asarray(found)
+            return np.asarray(scale * found)
         held |= beyond
 
 

@@ -92,7 +92,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
             break
         accepted.append(_chosen(detector, fitted, standing[0], [*standing, *others, *ranked]))
         fitted, accepted = refit(detector, y, beginning(fitted.x, policy), accepted)
-        while weak := [a for a in accepted if not _stands(detector, a)]:
+        while weak := [a for a in accepted if not stands(detector, a)]:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
             fitted, accepted = _without(detector, y, fitted, accepted, weak)
         if in_turn := _in_turn(detector.study, accepted):
@@ -234,7 +234,7 @@ def _parts(study: Study, name: str) -> set[str]:
     return {spot.part}
 
 
-def _stands(detector: Detector, a: Accepted) -> bool:
+def stands(detector: Detector, a: Accepted) -> bool:
     """Whether a cause still explains something beside the others, with a size that physics allows."""
     batch = a.hypothesis.batch
     if batch.fixed:

@@ -128,14 +128,15 @@ def _shifted(parts: Sequence[tuple[Window, np.ndarray]], windows: Sequence[Windo
 
 
 def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis | None:
-    """A coolant in the windows that plain cold likes best; None where it has those, or heat explains more than cold.
+    """A coolant in the windows that plain cold likes best; None where it has those, or heat explains far more.
 
     In a score cold and a linear film cancel over hours that have neither, and a window that is far too long can lead.
+    Heat in all other hours is as good as cold in its own: parameters take the rest.
     """
     if not fault_of(h).wets or len(h.when.windows) == 0:
         return None
     cold, hot = (_plain(h, g, block, sign, policy) for sign in (-1, 1))
-    if cold is None or (hot is not None and hot.statistic > cold.statistic):
+    if cold is None or (hot is not None and (1.0 - policy.saturates) * hot.statistic > cold.statistic):
         return None
     windows = _joined(cold.when.windows)
     if windows == h.when.windows:

@@ -98,6 +98,7 @@ class SearchPolicy:
     )
     close: float = _rule(6.0, JUDGED, "within which a rival makes a verdict ambiguous", "likelihood-ratio units")
     power: float = _rule(1.645, DERIVED, "one-sided 95 %, of a detection limit", "standard deviations")
+    limit_sizes: int = _rule(16, SOLVER, "in equal ratios, at which a limit of what is curved is sought")
     remainder: float = _rule(0.35, JUDGED, "of the evidence for heat before all names, that may be left beside them")
     block: float = _rule(7200.0, JUDGED, "of the bootstrap", "s")
     draws: int = _rule(400, SOLVER, "of the bootstrap")

@@ -28,10 +28,11 @@ from twin.diagnose.search.accepted import (
     readings_columns,
     shifted,
     spans,
+    strong,
 )
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import shape_errors
-from twin.diagnose.search.exact import lowest, solved
+from twin.diagnose.search.exact import by_chance, lowest, solved
 from twin.diagnose.search.policy import SearchPolicy
 
 
@@ -67,10 +68,17 @@ def refit(
 
     misfit, rises, least = np.inf, 0, np.inf
     best: Any = None  # the pass with the least misfit, at the parameters and amplitudes that it began with
-    J = np.zeros((len(y), len(x)))
-    for _ in range(policy.refits):
+    # the surrogate's derivatives, until strong causes leave more than chance: others take as long as a calibration
+    closely, begun = False, (x, amplitude)
+    closer = any(strong(detector, a.hypothesis, a.statistic) for a in accepted)
+    J, passes = np.zeros((len(y), len(x))), policy.refits
+    while passes:
+        passes -= 1
         there = shifted(study, x, gains, amplitude)
-        sizes = [(a.hypothesis, amplitude[own], a.statistic) for a, own in zip(accepted, of_each, strict=True)]
+        sizes = [
+            (a.hypothesis, amplitude[own], a.statistic if closely else 0.0)
+            for a, own in zip(accepted, of_each, strict=True)
+        ]
         J = jacobian(detector, x, sizes)
         bent, states = np.zeros(len(y)), motion(detector, there)
         for a, own in zip(accepted, of_each, strict=True):
@@ -112,6 +120,10 @@ def refit(
         step = float((np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))).max(initial=0.0))
         left = white - D @ amplitude
         before, misfit = misfit, float(left @ projector(left))
+        if closer and not closely and misfit > by_chance(y, policy):
+            closely, passes, (x, amplitude) = True, policy.refits, begun
+            misfit, rises, least, best = np.inf, 0, np.inf, None
+            continue
         if misfit < least:
             least, best = misfit, (x, amplitude, J, D.copy(), F, errors, residual, f, there, white)
         x, amplitude = nuisance, np.where(swapped, 1.0, _limited(found, amplitude, accepted, policy))
@@ -128,7 +140,7 @@ def refit(
         replace(a, amplitude=amplitude[own], covariance=inverse[own, own], by_run=by_run)
         for a, by_run, own in zip(accepted, alone, of_each, strict=True)
     ]
-    more = np.hstack([policy.wide * D * np.sqrt(np.diag(inverse)), errors])
+    more = np.hstack([policy.wide * D * np.sqrt(np.maximum(np.diag(inverse), 0.0)), errors])
     bare = study.all_outputs(there) if units else f
     return Fitted(x, J, residual, fitter.projector(J, more), f - bare, more), result
 

@@ -42,6 +42,12 @@ class Judged:
     gains: tuple[Gain, ...]
     note: str = ""  # why a name was withdrawn
     size: str = ""  # why its size was
+    less: str = ""  # which of several was withdrawn, beside which the others would have been
+
+    @property
+    def refuted(self) -> bool:
+        """Whether all that was named in the machine is withdrawn."""
+        return self.verdict == "unknown" and bool(self.note)
 
 
 def judged(

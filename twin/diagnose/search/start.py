@@ -23,7 +23,7 @@ from twin.diagnose.search.declared import (
     swapped_candidates,
 )
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.exact import misfit
+from twin.diagnose.search.exact import misfit, unbent
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Step, distinct, look, scored
 from twin.diagnose.search.strained import Freed, loose_ones
@@ -60,8 +60,8 @@ def begun(described: Detector, y: np.ndarray) -> Start:
     declared = [*declared_candidates(detector, y, fitted), *swapped_candidates(detector, y, fitted)]
     known, freed = scored(detector, fitted), Freed()
     first = look(detector, fitted, declared, known)
-    unbent = _from_description(detector, y, fitted)
-    glance = _with(unbent, declared) if unbent else first
+    straight = _from_description(detector, y, fitted)
+    glance = _with(straight, declared) if straight else first
     loose = loose_ones(detector, y, fitted, x0, freed)
     if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
         closer = [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
@@ -70,19 +70,17 @@ def begun(described: Detector, y: np.ndarray) -> Start:
         told = {h.name: h for h in declared if h.statistic < 0.5 * detector.thresholds[h.family]}
         exact |= {name: told[name] for name, h in exact.items() if name in told and h.statistic <= 0.0}
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
-        glance = _with(unbent, declared) if unbent else look(detector, fitted, declared, known)
+        glance = _with(straight, declared) if straight else look(detector, fitted, declared, known)
     return Start(detector, fitted, x0, covariance, first, declared, glance, loose, freed)
 
 
 def _from_description(detector: Detector, y: np.ndarray, fitted: Fitted) -> Glance | None:
     """What is seen at the description, where the fit without a cause has bent parameters and something passes there.
     Statistics count against what that fit leaves, where it is less."""
-    if np.abs(fitted.x).max(initial=0.0) < detector.policy.bends:
+    if (there := unbent(detector, y, fitted)) is fitted:
         return None
-    f, J, projector = detector.fitter.linear(np.zeros(len(fitted.x)))
-    unbent = Fitted(np.zeros(len(fitted.x)), J, y - f, projector)
-    less = max(misfit(detector, unbent) - misfit(detector, fitted), 0.0)
-    seen, ranked, step = look(detector, unbent)
+    less = max(misfit(detector, there) - misfit(detector, fitted), 0.0)
+    seen, ranked, step = look(detector, there)
     own = [replace(h, statistic=h.statistic - less) for h in ranked if h.statistic > less]
     if not any(h.statistic > detector.thresholds[h.family] for h in own):
         return None

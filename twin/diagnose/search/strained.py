@@ -23,7 +23,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.exact import beginning, exact, misfit, misfit_of_each
+from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, misfit_of_each, unbent
 from twin.diagnose.search.look import Search, Step, cosines, look
 from twin.diagnose.search.refit import refit
 
@@ -58,8 +58,10 @@ def closed(
         most = detector.policy.others
         return removes_more(i) and (i < most or sum(map(removes_more, range(i))) < most)
 
-    # beside which it would no longer be as far out of its tolerance: to first order, so that few are refitted
-    instead = [i for i, h in enumerate(more if passing else ()) if not _stays(detector, before, one, h)]
+    # beside which it would no longer be as far out of its tolerance: to first order, so that few are refitted, and from
+    # where a cause is refitted
+    there = unbent(detector, y, before)
+    instead = [i for i, h in enumerate(more if passing else ()) if not _stays(detector, there, one, h)]
     if any(map(leads, instead)) and any(map(removes_more, sorted(passing, key=lambda i: bent(detector, more[i])))):
         return None
     # both begin at the declared number: what either explains is the same but for what is left
@@ -92,13 +94,12 @@ def closed(
 def _explained(detector: Detector, y: np.ndarray, before: Fitted, fitted: Fitted, ranked: Sequence[Hypothesis]) -> bool:
     """Whether another cause alone leaves no more than chance does, where the freed number leaves more: a faulty sensor
     moves parameters by many of their standard deviations, of which a tenth may be as much as the fault."""
-    policy, count = detector.policy, int(np.isfinite(y).sum())
-    by_chance = count + policy.chance * float(np.sqrt(2.0 * count))
-    if misfit(detector, fitted) <= by_chance:
+    policy, least = detector.policy, by_chance(y, detector.policy)
+    if misfit(detector, fitted) <= least:
         return False
-    needed = misfit(detector, before) - by_chance
-    least = (1.0 - policy.saturates) * needed
-    likely = [h for h in ranked if h.statistic > max(least, detector.thresholds[h.family])][: policy.closely]
+    needed = misfit(detector, before) - least
+    near = (1.0 - policy.saturates) * needed
+    likely = [h for h in ranked if h.statistic > max(near, detector.thresholds[h.family])][: policy.closely]
     return any((h if h.batch.fixed else exact(detector, y, before, h)).statistic > needed for h in likely)
 
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import bounds
-from twin.diagnose.evidence.sight import sight
 from twin.diagnose.evidence.unknown import history
 from twin.diagnose.faults.fault import Described, Family
 from twin.diagnose.faults.table import family_of_parameter, fault_of
 from twin.diagnose.model.study import Study
-from twin.diagnose.result.diagnosis import Cause, Limit, Pull, Rival, Unknown, Verdict
+from twin.diagnose.result.diagnosis import Cause, Pull, Rival, Unknown, Verdict
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of
 from twin.diagnose.search.detector import Detector
@@ -252,55 +251,3 @@ def with_faults(
 ) -> tuple[Verdict, tuple[Cause, ...]]:
     """The verdict with what was found without a search: sensors that stand still, leap or break."""
     return "sensor" if faults and verdict in ("nothing", "too_poor") else verdict, (*faults, *causes)
-
-
-def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
-    """Of every batch whose size is free (p, h): the amplitude that would have been named in 95 of 100 cases, at each
-    place with each history."""
-    f, _, projector = detector.fitter.linear(np.zeros(len(detector.study.probed.parameters)))
-    for own in sight(detector.columns, projector, np.zeros(len(f))).ready:
-        if not own.batch.fixed:
-            sigmas = np.sqrt(detector.thresholds[own.batch.family]) + detector.policy.power
-            sizes = sigmas / np.sqrt(np.maximum(own.information, 1e-30))
-            yield own.batch, np.maximum(sizes, own.batch.smallest)
-
-
-def over_histories(histories: Sequence[History], sizes: np.ndarray) -> np.ndarray:
-    """(...,) what stands for the limits (..., h) of so many histories, all of which switch or none does.
-
-    The median. Where every one follows a signal the largest, as which of them it will be is not known: their median may
-    be a third of what the one that acts needs.
-    """
-    follow = all(h.signal for h in histories)
-    return np.asarray(sizes.max(axis=-1) if follow else np.median(sizes, axis=-1))
-
-
-def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
-    """(family, unit, place, whether it switches) -> `limits_in`, `over_histories`, the least of batches."""
-    result: dict[tuple[str, str, str, bool], float] = {}
-    for batch, sizes in limits_in(detector):
-        for windowed in (False, True):
-            chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
-            if chosen:
-                told = over_histories([batch.histories[i] for i in chosen], sizes[:, chosen])
-                for name, size in zip(batch.places, told.tolist(), strict=True):
-                    key = (batch.family, batch.unit, name, windowed)
-                    result[key] = min(size, result.get(key, np.inf))
-    return result
-
-
-def limits_of(detector: Detector) -> tuple[Limit, ...]:
-    """Per family and unit `limits_at` its places, for what always acts where there is such; factors as factors."""
-    curves = {(batch.family, batch.unit): fault_of(batch).curve for batch in detector.columns.batches}
-    at = limits_at(detector)
-    found: dict[tuple[str, str], list[tuple[float, str]]] = {}
-    for (family, unit, place, windowed), size in at.items():
-        if not windowed or (family, unit, place, False) not in at:
-            found.setdefault((family, unit), []).append((size, place))
-    limits = []
-    for (family, unit), sizes in found.items():
-        ordered = sorted(sizes)
-        median, place = ordered[len(ordered) // 2]
-        size, smallest, largest = (curves[family, unit].told(s) for s in (median, ordered[0][0], ordered[-1][0]))
-        limits.append(Limit(family, place, size, smallest, largest, unit))
-    return tuple(limits)

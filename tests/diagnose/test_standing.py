@@ -1,0 +1,71 @@
+"""Of several causes that the sealed run refutes together, those stay that it does not refute without the weakest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.diagnose import small_case
+from tests.diagnose.test_strong_causes import outputs
+from twin.calibrate.fit.measured import Measured
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.look import Search
+from twin.diagnose.search.standing import standing
+
+pytestmark = pytest.mark.long
+
+
+def always(place: str, power: float, statistic: float) -> Accepted:
+    """Heat [W] in every run, the sealed one too."""
+    detector = small_case.made_detector()
+    batch = next(b for b in detector.columns.batches if b.family == "heat_source")
+    when = next(w for w in batch.histories if not w.windows and not w.signal and w.bell is None)
+    h = Hypothesis(batch, batch.places.index(place), when, statistic, (power,), 1.0)
+    return Accepted(h, units_of(detector.study, h), np.array([power]), np.eye(1), statistic, 36.0, ())
+
+
+def found_beside(*others: Accepted) -> tuple[Search, np.ndarray, list[Measured]]:
+    """The search that finds 400 W at the housing, and has named something else besides; the sealed run."""
+    detector, rng = small_case.made_detector(), np.random.default_rng(5)
+    study, true = detector.study, always("housing", 400.0, 1.0)
+    x = np.zeros(len(study.probed.parameters))
+    slots = slots_with(study, small_case.elements(), true.units, 2)
+    T, w = study.runs[2].split(study.outputs(2, x, slots, true.amplitude))
+    y = outputs(true.hypothesis, x)
+    y = y + detector.whiten.colour(rng.standard_normal(len(y)))
+    found = search(detector, y)
+    assert [a.hypothesis.name for a in found.accepted] == ["housing"]
+    opened = [replace(study.runs[2].measured, temperature=T, tcp=w)]
+    return replace(found, accepted=(*found.accepted, *others)), y, opened
+
+
+def test_the_weakest_is_withdrawn_alone():
+    """5 kW at the slide that are not there: without them the other cause predicts the sealed run."""
+    found, y, opened = found_beside(always("slide", 5000.0, 40.0))
+    now, told = standing(found, y, FAMILIES, (), opened, 1)
+    assert (told.verdict, [c.place for c in told.causes], told.note) == ("named", ["housing"], "")
+    assert told.less.startswith("withdrawn: heat source at slide")
+    assert [a.hypothesis.name for a in now.accepted] == ["housing"]
+    assert now.accepted[0].amplitude[0] == pytest.approx(400.0, rel=0.1)
+
+
+def test_the_last_one_is_withdrawn_as_a_whole():
+    found, y, opened = found_beside(always("slide", 5000.0, 40.0))
+    alone = replace(found, accepted=found.accepted[1:])
+    now, told = standing(alone, y, FAMILIES, (), opened, 1)
+    assert (told.verdict, told.causes, told.less) == ("unknown", (), "")
+    assert told.note.startswith("withdrawn: heat source at slide")
+    assert now is alone
+
+
+def test_what_is_not_refuted_stays_as_it_was_found():
+    found, y, opened = found_beside()
+    now, told = standing(found, y, FAMILIES, (), opened, 1)
+    assert now is found
+    assert (told.verdict, told.less, told.note) == ("named", "", "")

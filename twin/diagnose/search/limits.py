@@ -1,0 +1,92 @@
+"""Detection limits: the smallest sizes that would have been named in 95 of 100 cases in these data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.sight import sight
+from twin.diagnose.evidence.whiten import Projector
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.result.diagnosis import Limit
+from twin.diagnose.search.accepted import curved_change, motion
+from twin.diagnose.search.detector import Detector
+
+
+def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
+    """Of every batch whose size is free (p, h): the amplitude that would have been named in 95 of 100 cases, at each
+    place with each history; infinite where no machine can have one so large."""
+    f, _, projector = detector.fitter.linear(np.zeros(len(detector.study.probed.parameters)))
+    for own in sight(detector.columns, projector, np.zeros(len(f))).ready:
+        batch = own.batch
+        if batch.fixed:
+            continue
+        needed = float(np.sqrt(detector.thresholds[batch.family])) + detector.policy.power
+        if fault_of(batch).curved:
+            sizes = _curved(detector, batch, needed, projector)
+        else:
+            sizes = needed / np.sqrt(np.maximum(own.information, 1e-30))
+        most = np.array(batch.largest or (np.inf,))[:, None]
+        yield batch, np.where(sizes > most, np.inf, np.maximum(sizes, batch.smallest))
+
+
+def _curved(detector: Detector, batch: Batch, needed: float, projector: Projector) -> np.ndarray:
+    """(p, 1) from which on what is not in proportion to its size is `needed` standard deviations, at every size that is
+    tried: a sensor that lags by a quarter of an hour may look more like a declared number than one that lags by two
+    minutes, whose derivative says that both are seen."""
+    tried = fault_of(batch).sizes
+    sizes = np.geomspace(batch.smallest, max(map(abs, tried)), detector.policy.limit_sizes)
+    signs = sorted({float(np.sign(s)) for s in tried})
+    states, result = motion(detector, None), np.full((len(batch.places), 1), np.inf)
+    for i in range(len(batch.places)):
+        of = Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0)
+        changes = [curved_change(detector, of, sign * size, states) for size in sizes for sign in signs]
+        D = detector.whiten(np.column_stack(changes))
+        seen = (D * projector(D)).sum(axis=0).reshape(len(sizes), -1).min(axis=1) >= needed**2
+        first = len(sizes) - int(np.argmin([*seen[::-1], False]))
+        if first < len(sizes):
+            result[i] = sizes[first]
+    return result
+
+
+def over_histories(histories: Sequence[History], sizes: np.ndarray) -> np.ndarray:
+    """(...,) what stands for the limits (..., h) of so many histories, all of which switch or none does.
+
+    The median. Where every one follows a signal the largest, as which of them it will be is not known: their median may
+    be a third of what the one that acts needs.
+    """
+    follow = all(h.signal for h in histories)
+    return np.asarray(sizes.max(axis=-1) if follow else np.median(sizes, axis=-1))
+
+
+def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
+    """(family, unit, place, whether it switches) -> `limits_in`, `over_histories`, the least of batches."""
+    result: dict[tuple[str, str, str, bool], float] = {}
+    for batch, sizes in limits_in(detector):
+        for windowed in (False, True):
+            chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
+            if chosen:
+                told = over_histories([batch.histories[i] for i in chosen], sizes[:, chosen])
+                for name, size in zip(batch.places, told.tolist(), strict=True):
+                    key = (batch.family, batch.unit, name, windowed)
+                    result[key] = min(size, result.get(key, np.inf))
+    return result
+
+
+def limits_of(detector: Detector) -> tuple[Limit, ...]:
+    """Per family and unit `limits_at` its places, for what always acts where there is such; factors as factors."""
+    curves = {(batch.family, batch.unit): fault_of(batch).curve for batch in detector.columns.batches}
+    at = limits_at(detector)
+    found: dict[tuple[str, str], list[tuple[float, str]]] = {}
+    for (family, unit, place, windowed), size in at.items():
+        if not windowed or (family, unit, place, False) not in at:
+            found.setdefault((family, unit), []).append((size, place))
+    limits = []
+    for (family, unit), sizes in found.items():
+        ordered = sorted(sizes)
+        median, place = ordered[len(ordered) // 2]
+        size, smallest, largest = (curves[family, unit].told(s) for s in (median, ordered[0][0], ordered[-1][0]))
+        limits.append(Limit(family, place, size, smallest, largest, unit))
+    return tuple(limits)

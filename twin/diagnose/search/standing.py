@@ -1,0 +1,82 @@
+"""What stands of several causes once the sealed runs are open: the weaker one may be what they refute, and no more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.calibrate.fit.measured import Measured
+from twin.diagnose.faults.fault import Family
+from twin.diagnose.result.diagnosis import Cause
+from twin.diagnose.search.accepted import Accepted, settled
+from twin.diagnose.search.exact import beginning, misfit_of_each
+from twin.diagnose.search.forward import stands
+from twin.diagnose.search.look import Search, look
+from twin.diagnose.search.refit import refit
+from twin.diagnose.search.sealed import Judged, judged
+from twin.diagnose.search.verdict import verdict_of, with_faults
+
+
+def standing(
+    found: Search, y: np.ndarray, families: Sequence[Family], faults: Sequence[Cause], opened: Sequence[Measured],
+    seed: int,
+) -> tuple[Search, Judged]:  # fmt: skip
+    """A search in y (m,) and its headline, held against the measurements of the sealed runs.
+
+    Where these refute several causes in the machine together, the weakest goes and the others are fitted and judged
+    again. If they are refuted down to the last one, so is all that was found.
+    """
+    whole = _held_against(found, y, families, faults, opened, seed)
+    now, told, gone = found, whole, list[Accepted]()
+    while told.refuted and (weakest := _weakest(now, families)):
+        gone.append(weakest)
+        now = without(now, y, weakest)
+        if not all(stands(now.detector, a) for a in now.accepted):
+            return found, whole
+        told = _held_against(now, y, families, faults, opened, seed)
+    if told.refuted or not gone or told.verdict == "unknown":
+        return found, whole
+    names = " and ".join(f"{a.hypothesis.family.replace('_', ' ')} at {a.hypothesis.name}" for a in gone)
+    less = f"withdrawn: {names}, with which the other causes predict the sealed run worse beyond chance"
+    return now, replace(told, less=less)
+
+
+def _held_against(
+    found: Search, y: np.ndarray, families: Sequence[Family], faults: Sequence[Cause], opened: Sequence[Measured],
+    seed: int,
+) -> Judged:  # fmt: skip
+    verdict, causes = verdict_of(found, families)
+    if verdict == "unknown":  # judged is the calibration beside faulty channels then, not what was tried
+        found = beside_sensors(found, y, families)
+    return judged(found, y, *with_faults(verdict, causes, faults), families, opened, seed)
+
+
+def _weakest(found: Search, families: Sequence[Family]) -> Accepted | None:
+    """Of several causes that are no faulty sensors."""
+    own = [a for a in found.accepted if not _of_sensor(a, families)]
+    return min(own, key=lambda a: a.statistic) if len(own) > 1 else None
+
+
+def without(found: Search, y: np.ndarray, one: Accepted) -> Search:
+    """A search in y (m,) as if a cause had not been named."""
+    detector, left = found.detector, [a for a in found.accepted if a is not one]
+    fitted, accepted = refit(detector, y, beginning(found.x, detector.policy), left)
+    seen, _, step = look(detector, fitted)
+    x, covariance = settled(detector, y, accepted)
+    return replace(
+        found, x=x, accepted=tuple(accepted), steps=(*found.steps, step), residual=fitted.residual, g=seen.g,
+        heat=seen.heat, covariance=covariance, left=misfit_of_each(detector, fitted),
+    )  # fmt: skip
+
+
+def beside_sensors(found: Search, y: np.ndarray, families: Sequence[Family]) -> Search:
+    """A search in y (m,) with the causes that are faulty temperature sensors alone, and a calibration beside these."""
+    kept = tuple(a for a in found.accepted if _of_sensor(a, families))
+    x, covariance = settled(found.detector, y, kept)
+    return replace(found, accepted=kept, x=x, covariance=covariance)
+
+
+def _of_sensor(a: Accepted, families: Sequence[Family]) -> bool:
+    return any(f.name == a.hypothesis.family and f.group == "sensor" for f in families)
