@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.readings import play
 from twin.diagnose.faults.table import OF_KIND
-from twin.diagnose.search.accepted import exchanged
+from twin.diagnose.search.accepted import curved_change, exchanged, motion
 from twin.diagnose.search.dispersion import raised, searched
 from twin.diagnose.search.exact import misfit, misfit_of_each
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.gain import predicted
-from twin.diagnose.search.limits import limits_at, limits_of
+from twin.diagnose.search.limits import limits_at, limits_in, limits_of
 from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.start import begun
 from twin.diagnose.search.strained import strained
@@ -140,6 +141,22 @@ def test_what_no_machine_can_have_is_seen_at_no_size():
     assert np.isinf(limits["sensor", "K"].smallest)
     assert np.isinf(limits["measurement", "m/s"].size)
     assert np.isfinite([limit.size for limit in limits_of(detector) if limit.family == "sensor"]).all()
+
+
+def test_limits_of_lags_hold_at_larger_sizes():
+    """What is not in proportion to its size may look more like a parameter the larger it is."""
+    detector, tried = small_case.made_detector(), 0
+    states = motion(detector, None)
+    _, _, projector = detector.fitter.linear(np.zeros(len(detector.study.probed.parameters)))
+    for batch, sizes in limits_in(detector):
+        needed = np.sqrt(detector.thresholds[batch.family]) + detector.policy.power
+        for i, size in enumerate(sizes[:, 0] if (batch.family, batch.unit) == ("sensor", "s") else ()):
+            h = Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0)
+            for lag in size * np.array([1.0, 1.5, 3.0]) if np.isfinite(size) else ():
+                change = detector.whiten(curved_change(detector, h, lag, states))
+                assert change @ projector(change) > (0.95 * needed) ** 2, (batch.places[i], lag)
+                tried += 1
+    assert tried
 
 
 # --- thresholds grow with what a model that is wrong in its form leaves, but not with what a cause explains
