@@ -180,6 +180,27 @@ def test_noise_alone_leaves_a_dispersion_of_hardly_one():
     assert own.share == pytest.approx(0.8, abs=0.2)
 
 
+def test_what_leaps_from_reading_to_reading_hides_no_cause():
+    """A sensor with more noise than it is said to have; errors that last as much raise what a cause must explain."""
+    detector, y = small_case.made_detector(), measured("heat", "housing", 400.0, seed=3)
+    leaps, first, rng = np.zeros(len(y)), 0, np.random.default_rng(9)
+    for k in detector.study.fitted:
+        (b, s), _ = detector.study.runs[k].shapes
+        leaps[first : first + b * s].reshape(b, s)[:, 0] = rng.standard_normal(b)
+        first += detector.study.runs[k].size
+    sigma = detector.whiten.channels[0][0].sigma[0]
+    found, own = searched(detector, y + 2.0 * sigma * leaps)
+    excess = own.left - own.measured
+    assert excess > 3.0 * np.sqrt(2.0 * own.measured)
+    assert own.lasting < 0.2 * excess
+    assert own.least(POLICY) == 36.0 * own.share < 0.5 * excess
+    assert [a.hypothesis.name for a in found.accepted] == ["housing"]
+    _, slow = searched(detector, measured(seed=4) + slow_discrepancy(0.1))
+    assert 1.0 < slow.share < POLICY.dispersed
+    assert slow.lasting > 0.5 * (slow.left - slow.measured)
+    assert slow.least(POLICY) == 0.5 * slow.lasting > 36.0 * slow.share
+
+
 def test_what_a_cause_explains_does_not_raise_thresholds():
     detector = small_case.made_detector()
     found, own = searched(detector, measured("heat", "housing", 200.0, seed=3))

@@ -6,11 +6,12 @@ Of m measured numbers with white residual r, after the named causes and the stro
 
 is 1 with a standard deviation of (2 / m)^(1/2) where noise and model discrepancy are all that is left, as Pi is the
 inverse covariance of r (dispersion: McCullagh, Nelder, Generalized Linear Models, 1989, section 4.5; c-hat: Burnham,
-Anderson, Model Selection and Multimodel Inference, 2002, section 2.5). More is an error of the model's form, of which a
-cause must explain more than half. Above 3 it becomes model discrepancy of its own (slow errors, below), and a
-cause must explain more than half of what is left beside that; heat of any history is not told then.
+Anderson, Model Selection and Multimodel Inference, 2002, section 2.5). More is an error of the model's form, and
+thresholds are c times as high. Above 3 it becomes model discrepancy of its own (slow errors, below), and a cause must
+explain more than half of what is left beside that; heat of any history is not told then.
 
-To divide every statistic by c is not enough: what a form leaves lasts for hours, and one place may explain half of it.
+That is enough for what leaps from one reading to the next: no cause that lasts for hours looks like it. What a form
+leaves in a channel for hours one place may explain half of, and a cause must explain more.
 
 Slow errors last for hours and are far larger in some channels than in others. Of the white numbers w of a channel in a
 run, less what calibration explains, mean square and product of neighbours say
@@ -26,6 +27,7 @@ hides itself: so they are learned twice, the second time beside what explains mo
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,8 +37,8 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.contest import worth
-from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.exact import beginning, misfit_of_each
+from twin.diagnose.search.detector import FLOOR, Detector
+from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -53,6 +55,7 @@ class Dispersion:
     heat: bool  # unknown heat is in that explanation
     errors: np.ndarray | None = None  # (m, q) white: slow errors of single channels, where the model is poor
     beside: float = 0.0  # r^T Pi r with slow errors in Pi
+    lasting: float = np.inf  # of r^T Pi r beyond m, in channels where neighbours are alike beyond chance
 
     @property
     def share(self) -> float:
@@ -64,7 +67,9 @@ class Dispersion:
         if self.errors is not None:
             return policy.excess * self.beside
         excess = self.left - self.measured
-        return policy.excess * excess if excess > policy.chance * math.sqrt(2.0 * self.measured) else 0.0
+        if excess <= policy.chance * math.sqrt(2.0 * self.measured):
+            return 0.0
+        return max(policy.excess * min(self.lasting, excess), FLOOR * self.share)
 
 
 def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
@@ -88,7 +93,26 @@ def dispersion_of(found: Search) -> Dispersion:
     heat = max(found.steps[-1].parts.values(), default=0.0)
     passes = heat > found.detector.thresholds["unknown"]
     left = float(found.left.sum()) - (heat if passes else 0.0)
-    return Dispersion(left, int(np.isfinite(found.residual).sum()), passes)
+    measured = int(np.isfinite(found.residual).sum())
+    return Dispersion(left, measured, passes, lasting=_lasting(found))
+
+
+def _lasting(found: Search) -> float:
+    """Sum of w^2 - 1 of the channels whose white numbers w are like their neighbours beyond chance: of n independent
+    ones the sum of products of neighbours has a standard deviation of n^(1/2)."""
+    total, policy = 0.0, found.detector.policy
+    for channel in _channels(found.detector, found.residual):
+        w = found.unexplained[channel]
+        if w[1:] @ w[:-1] > policy.chance * math.sqrt(len(w)):
+            total += max(float(w @ w) - len(w), 0.0)
+    return total
+
+
+def _channels(detector: Detector, residual: np.ndarray) -> Iterator[np.ndarray]:
+    """The measured numbers (n,) of every channel in every run; residual (m,)."""
+    measured = np.isfinite(residual)
+    for _, *numbers in detector.study.split(np.arange(len(residual))):
+        yield from (channel[measured[channel]] for own in numbers for channel in own.T)
 
 
 def _with_errors(own: Dispersion, detector: Detector, y: np.ndarray) -> Dispersion:
@@ -121,14 +145,13 @@ def raised(detector: Detector, own: Dispersion) -> Detector:
 
 def slow_errors(detector: Detector, fitted: Fitted) -> np.ndarray:
     """(m, q) white, each of unit prior variance: what a fit has left, as slow errors of single channels."""
-    left = fitted.projector(detector.whiten(fitted.residual))
-    measured, blocks = np.isfinite(fitted.residual), [np.zeros((len(left), 0))]
-    for _, *numbers in detector.study.split(np.arange(len(left))):
-        for at in (channel[measured[channel]] for own in numbers for channel in own.T):
-            modes = modes_of(left[at], detector.policy)
-            block = np.zeros((len(left), modes.shape[1]))
-            block[at] = modes
-            blocks.append(block)
+    left = unexplained(detector, fitted)
+    blocks = [np.zeros((len(left), 0))]
+    for at in _channels(detector, fitted.residual):
+        modes = modes_of(left[at], detector.policy)
+        block = np.zeros((len(left), modes.shape[1]))
+        block[at] = modes
+        blocks.append(block)
     return np.hstack(blocks)
 
 

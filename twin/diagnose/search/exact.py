@@ -27,8 +27,12 @@ def misfit(detector: Detector, fitted: Fitted) -> float:
 
 def misfit_of_each(detector: Detector, fitted: Fitted) -> np.ndarray:
     """(m,) what each number has in that sum."""
-    white = detector.whiten(fitted.residual)
-    return np.asarray(white * fitted.projector(white))
+    return detector.whiten(fitted.residual) * unexplained(detector, fitted)
+
+
+def unexplained(detector: Detector, fitted: Fitted) -> np.ndarray:
+    """(m,) the white residual less what calibration, model discrepancy and causes explain."""
+    return np.asarray(fitted.projector(detector.whiten(fitted.residual)))
 
 
 def by_chance(y: np.ndarray, policy: SearchPolicy) -> float:

@@ -22,7 +22,7 @@ from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, exchanged, settled
 from twin.diagnose.search.contest import judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
-from twin.diagnose.search.exact import beginning, misfit_of_each
+from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Search, Step, cosines, distinct, look
@@ -107,7 +107,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     return Search(
         detector, start.x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance,
-        misfit_of_each(detector, fitted), loose,
+        misfit_of_each(detector, fitted), unexplained(detector, fitted), loose,
     )  # fmt: skip
 
 

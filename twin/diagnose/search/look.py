@@ -44,6 +44,7 @@ class Search:
     heat: Heat  # likewise
     covariance: np.ndarray  # (n, n) of x
     left: np.ndarray  # (m,) of the last fit: what each number has in the sum of squares, in units of all discrepancy
+    unexplained: np.ndarray  # (m,) of it: the white residual less what everything explains
     loose: tuple[Loose, ...] = ()  # declared numbers out of their tolerance, the farthest first
 
     @property

@@ -23,7 +23,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, misfit_of_each, unbent
+from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, misfit_of_each, unbent, unexplained
 from twin.diagnose.search.look import Search, Step, cosines, look
 from twin.diagnose.search.refit import refit
 
@@ -87,7 +87,7 @@ def closed(
     x, covariance = settled(detector, y, (one,))
     return Search(
         detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
-        misfit_of_each(detector, fitted), loose,
+        misfit_of_each(detector, fitted), unexplained(detector, fitted), loose,
     )  # fmt: skip
 
 
