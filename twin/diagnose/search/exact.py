@@ -174,7 +174,7 @@ def _descended(
 def _read_anew(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
     """A hypothesis about readings that are not in proportion to its size, at the size that removes most misfit."""
     there = unbent(detector, y, fitted)
-    less = max(misfit(detector, there) - misfit(detector, fitted), 0.0)
+    less = left_less(detector, there, fitted)
     left = there.projector(detector.whiten(there.residual))
     size, tried = h.amplitude[0], list[tuple[float, float]]()
     states = motion(detector, beginning(there.x, detector.policy))
@@ -192,13 +192,22 @@ def _read_anew(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis)
 
 def beginning(x: np.ndarray, policy: SearchPolicy = POLICY) -> np.ndarray:
     """(n,) parameters from which a cause is refitted: those without it, or the description where it has bent them."""
-    return x if np.abs(x).max(initial=0.0) < policy.bends else np.zeros_like(x)
+    return np.zeros_like(x) if _bends(x, policy) else x
+
+
+def _bends(x: np.ndarray, policy: SearchPolicy) -> bool:
+    return bool(np.abs(x).max(initial=0.0) >= policy.bends)
 
 
 def unbent(detector: Detector, y: np.ndarray, fitted: Fitted) -> Fitted:
     """A fit of measurements y (m,); where it has bent parameters and no cause is named yet, the description instead."""
-    bent = np.abs(fitted.x).max(initial=0.0) >= detector.policy.bends
-    return detector.fitter.at_description(y) if bent and fitted.more is None else fitted
+    bent = _bends(fitted.x, detector.policy) and fitted.more is None
+    return detector.fitter.at_description(y) if bent else fitted
+
+
+def left_less(detector: Detector, there: Fitted, fitted: Fitted) -> float:
+    """By how much less misfit a fit leaves than what begins there: that is no cause's."""
+    return max(misfit(detector, there) - misfit(detector, fitted), 0.0)
 
 
 def solved(F: np.ndarray, known: np.ndarray, lowest: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ from twin.diagnose.search.declared import (
     swapped_candidates,
 )
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.exact import misfit, unbent
+from twin.diagnose.search.exact import left_less, unbent
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Step, distinct, look, scored
 from twin.diagnose.search.strained import Freed, loose_ones
@@ -79,7 +79,7 @@ def _from_description(detector: Detector, y: np.ndarray, fitted: Fitted) -> Glan
     Statistics count against what that fit leaves, where it is less."""
     if (there := unbent(detector, y, fitted)) is fitted:
         return None
-    less = max(misfit(detector, there) - misfit(detector, fitted), 0.0)
+    less = left_less(detector, there, fitted)
     seen, ranked, step = look(detector, there)
     own = [replace(h, statistic=h.statistic - less) for h in ranked if h.statistic > less]
     if not any(h.statistic > detector.thresholds[h.family] for h in own):
