@@ -138,9 +138,9 @@ class Operators:
         """At factors f and amplitudes a. still: (n_joints,) W/K of joints over their nominal ones in all steps."""
         n, T, system = layout.n_films, machine.ports.T, machine.system
         A, of_slots = jnp.asarray(system.A[0]), packed(within(T, slots.A))
-        terms = within(T, jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)]))
+        terms = jnp.asarray(within(T, jnp.concatenate([jnp.asarray(effects.E), jnp.asarray(slots.E)])))
         factors = jnp.concatenate([f.capacity - 1.0, a])
-        E = machine.E + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
+        E = jnp.asarray(machine.E) + jnp.tensordot(lax.stop_gradient(factors) if many else factors, terms, 1)
         moving = jnp.concatenate([A if still is None else A[:n], of_slots])
         rest = jnp.asarray(system.A0[0])
         if still is not None:
@@ -149,7 +149,7 @@ class Operators:
         every = jnp.concatenate([unpacked(jnp.concatenate([A, of_slots]), r), terms]) if many else jnp.zeros((0, r, r))
         B = jnp.asarray(system.B) + jnp.tensordot(a, T.T @ jnp.asarray(slots.B), 1)
         reads = jnp.asarray(system.source_rows) + jnp.tensordot(a, jnp.asarray(slots.reads) @ T, 1)
-        return cls(moving, rest, E, packed(E), every, factors, B, reads, jnp.asarray(slots.M) @ T)
+        return cls(moving, rest, E, jnp.asarray(packed(E)), every, factors, B, reads, jnp.asarray(slots.M) @ T)
 
 
 def _step(

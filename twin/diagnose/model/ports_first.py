@@ -35,47 +35,52 @@ TOGETHER = 1e-6  # of the largest singular value of P: ports that differ by less
 class Basis:
     """Of r states and their ports; p = min(r, n_ports)."""
 
-    T: jax.Array  # (r, r)
-    R: jax.Array  # (p, n_ports)
-    plain: jax.Array  # bool: R = 1
+    T: Array  # (r, r)
+    R: Array  # (p, n_ports)
+    plain: Array  # bool: R = 1
 
-    def joined(self, c: jax.Array, gamma: jax.Array) -> jax.Array:
+    def joined(self, c: Array, gamma: Array) -> jax.Array:
         """c + P Gamma P^T (r, r)."""
         p, ports = self.R.shape
-        across = self.R @ gamma @ self.R.T if p != ports else lax.cond(self.plain, lambda g: g, self._across, gamma)
-        return c.at[:p, :p].add(across)
+        across = self._across(gamma) if p != ports else lax.cond(self.plain, lambda g: g, self._across, gamma)
+        return jnp.asarray(c).at[:p, :p].add(across)
 
-    def _across(self, gamma: jax.Array) -> jax.Array:
-        return self.R @ gamma @ self.R.T
+    def _across(self, gamma: Array) -> jax.Array:
+        return jnp.asarray(self.R @ gamma @ self.R.T)
 
 
-def basis(P: Array) -> Basis:
-    """For P (r, n_ports)."""
+def basis(P: np.ndarray) -> Basis:
+    """For P (r, n_ports).
+
+    In numpy, as all that is made once per machine: compiled for every new number of states, it took a fifth of the time
+    of a detector of a small machine, whose other discretisations each have their own number.
+    """
     r, ports = P.shape
     if not ports:
-        return Basis(jnp.eye(r), jnp.zeros((0, 0)), jnp.array(True))
-    Q, R = jnp.linalg.qr(jnp.asarray(P), mode="complete")
+        return Basis(np.eye(r), np.zeros((0, 0)), np.array(True))
+    Q, R = np.linalg.qr(P, mode="complete")
     if ports > r:
-        return Basis(Q, R, jnp.array(False))
-    U, s, Vt = jnp.linalg.svd(R[:ports])
+        return Basis(Q, R, np.array(False))
+    U, s, Vt = np.linalg.svd(R[:ports])
     apart = s > TOGETHER * s[0]
-    own = (U / jnp.where(apart, s, jnp.where(s[0] > 0.0, s[0], 1.0))) @ Vt
-    return Basis(jnp.hstack([Q[:, :ports] @ own, Q[:, ports:]]), own.T @ R[:ports], apart.all())
+    own = (U / np.where(apart, s, s[0] if s[0] > 0.0 else 1.0)) @ Vt
+    return Basis(np.hstack([Q[:, :ports] @ own, Q[:, ports:]]), own.T @ R[:ports], np.array(apart.all()))
 
 
-def within(T: jax.Array, many: Array) -> jax.Array:
+def within(T: Array, many: Array) -> Array:
     """T^T X T of matrices X (k, r, r)."""
-    return jnp.asarray(T.T @ (jnp.asarray(many) @ T))
+    return T.T @ (many @ T)
 
 
-def turned(system: System, T: jax.Array) -> System:
+def turned(system: System, T: np.ndarray) -> System:
     """A machine of one body in coordinates y, z = T y, as far as `model.integration` reads it; its E is T^T T."""
     r, ports = system.P[0].shape
-    P = (T.T @ jnp.asarray(system.P[0])).at[min(r, ports) :].set(0.0)
+    P = T.T @ np.asarray(system.P[0])
+    P[min(r, ports) :] = 0.0
     return replace(
-        system, A0=(within(T, system.A0[0]),), A=(within(T, system.A[0]),), P=(P,),
-        M=T.T @ system.M, H=T.T @ system.H, B=T.T @ system.B,
-        source_rows=system.source_rows @ T, film_rows=system.film_rows @ T,
+        system, A0=(within(T, np.asarray(system.A0[0])),), A=(within(T, np.asarray(system.A[0])),), P=(P,),
+        M=T.T @ np.asarray(system.M), H=T.T @ np.asarray(system.H), B=T.T @ np.asarray(system.B),
+        source_rows=np.asarray(system.source_rows) @ T, film_rows=np.asarray(system.film_rows) @ T,
     )  # fmt: skip
 
 
@@ -86,23 +91,23 @@ class PortsFirst:
 
     ports: Basis
     system: System  # turned, its A0 and A packed
-    E: jax.Array  # (r, r) T^T T
+    E: Array  # (r, r) T^T T
 
     @classmethod
     def of(cls, system: System) -> PortsFirst:
-        ports = basis(system.P[0])
-        own = turned(system, ports.T)
-        packed_own = replace(own, A0=(packed(jnp.asarray(own.A0[0])),), A=(packed(jnp.asarray(own.A[0])),))
-        return cls(ports, packed_own, ports.T.T @ ports.T)
+        ports = basis(np.asarray(system.P[0]))
+        T = np.asarray(ports.T)
+        own = turned(system, T)
+        return cls(ports, replace(own, A0=(packed(own.A0[0]),), A=(packed(own.A[0]),)), T.T @ T)
 
 
-def packed(X: jax.Array) -> jax.Array:
+def packed(X: Array) -> Array:
     """(..., t) of symmetric X (..., r, r): their lower triangles, row by row."""
     rows, columns = np.tril_indices(X.shape[-1])
     return X[..., rows, columns]
 
 
-def unpacked(v: jax.Array, r: int) -> jax.Array:
+def unpacked(v: Array, r: int) -> Array:
     """(..., r, r), both triangles, of v (..., t)."""
     return v[..., _places(r)]
 
