@@ -31,6 +31,7 @@ from benchmarks.drawn_machines import (
     simulated,
 )
 from twin.cli.main import run as command
+from twin.diagnose.faults.sun import SOLAR
 from twin.inject.machines.drawn import DrawnMachine
 from twin.logs.read import read_run
 from twin.machine.description import Machine
@@ -64,10 +65,14 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Hidden]
     heat = max(SHARE * power, 5.0)
     during = ("--from", f"{0.25 * hours:.1f} h", "--to", f"{0.6 * hours:.1f} h")
     day = ("--from", "0.5 h", "--to", f"{min(hours - 0.3, 5.0):.1f} h")
+
+    def sun(node: str) -> Hidden:  # no brighter than the sun is
+        return Hidden("sun", node, f"{min(4.0 * heat, SOLAR * (machine.nodes[node].area or 0.0)):.3g} W", day)
+
     found = [
         Hidden("zone", f"films.{one(list(machine.films))}", "4 K"),
         Hidden("heat_source", one(nodes), f"{2.0 * heat:.3g} W", during),
-        Hidden("sun", one(nodes), f"{4.0 * heat:.3g} W", day),
+        sun(one(nodes)),
         Hidden("coolant", one(nodes), "60 W/(m^2*K)", ("--setting", "temperature=14 degC", *during)),
         Hidden("joint", f"contacts.{one(list(machine.contacts))}", "0.2", ("--from", f"{0.4 * hours:.1f} h")),
         Hidden("sensor", one(sensors), "900 s", ("--history", "lag"), True),
