@@ -20,13 +20,15 @@ from twin.rom.drive import measured_air
 DRIFT, SURE, UNSURE = 2.0, 0.3, 1.0  # K, and half of the intervals of what is corrected and of what is set aside
 
 
-def as_measured(drift: float, study: Study | None = None) -> tuple[list[Run], str]:
-    """The two fitted runs as the model has them, with noise; the first sensor drifts [K] through the first one."""
+def as_measured(drift: float, study: Study | None = None, more: np.ndarray | None = None) -> tuple[list[Run], str]:
+    """The two fitted runs as the model has them, with noise; the first sensor drifts [K] through the first one.
+    more (m,): what else acts on what is measured."""
     study, rng, made = study or small_case.study(), np.random.default_rng(5), []
     name = study.runs[0].measured.sensors[0]
     for k, run in enumerate(small_case.runs()[:2]):
         planned, table = study.runs[k], run.temperatures
-        T, w = planned.split(study.outputs(k, np.zeros(len(study.probed.parameters))))
+        y = study.outputs(k, np.zeros(len(study.probed.parameters)))
+        T, w = planned.split(y if more is None else y + more[study.rows[k]])
         tcp = replace(run.tcp, displacement=w + small_case.TCP_NOISE * rng.standard_normal(w.shape))
         time = table.time
         columns = {
@@ -64,9 +66,27 @@ def test_a_drift_that_the_model_explains_as_it_is_is_none(drift: float, half: fl
     assert kept.findings == (judgement.findings if drift else (noise,))
 
 
-@pytest.mark.parametrize(("log", "sensor", "stands"), [(0.0, 0.0, False), (0.0, DRIFT, True), (DRIFT, DRIFT, True)])
-def test_air_is_as_measured_where_the_machine_felt_it(log: float, sensor: float, stands: bool):
-    """log, sensor: K by which what drives the model, and the sensor in that air, drift in the first run."""
+def heat(place: str, watts: float) -> np.ndarray:
+    """(m,) what heat at a place in the first half of the first run does to what is measured."""
+    blocks = [b for b, (run, *_) in enumerate(small_case.elements().histories.blocks) if run == 0]
+    columns = small_case.elements().heat_blocks[place][blocks[: len(blocks) // 2]]
+    return watts * small_case.responses()[:, columns].astype(float).sum(axis=1)
+
+
+@pytest.mark.parametrize(
+    ("log", "sensor", "watts", "stands"),
+    [
+        (0.0, 0.0, 0.0, False),
+        (0.0, DRIFT, 0.0, True),
+        (DRIFT, DRIFT, 0.0, True),
+        # a cold housing looks like colder air; air that drifts is seen beside heat
+        (0.0, 0.0, -300.0, False),
+        (0.0, DRIFT, 50.0, True),
+    ],
+)
+def test_air_is_as_measured_where_the_machine_felt_it(log: float, sensor: float, watts: float, stands: bool):
+    """log, sensor: K by which what drives the model, and the sensor in that air, drift in the first run; watts: of heat
+    at the housing that nothing else tells of."""
     study = small_case.study()
     base = study.probed.base
     ((name, e),) = base.ambient_sensors
@@ -75,7 +95,7 @@ def test_air_is_as_measured_where_the_machine_felt_it(log: float, sensor: float,
     air = np.array(real[0].run.loads.environment)
     air[:, e] -= ramp
     real[0] = replace(real[0], run=replace(real[0].run, loads=replace(real[0].run.loads, environment=air)))
-    clean, _ = as_measured(0.0, replace(study, runs=tuple(real)))
+    clean, _ = as_measured(0.0, replace(study, runs=tuple(real)), heat("housing", watts))
     for k, run in enumerate(clean):
         table, drive = run.temperatures, study.runs[k].run.drive
         own = np.interp(table.time, drive.time[:-1], measured_air(base.load_model, drive)[:, e])

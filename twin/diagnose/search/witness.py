@@ -18,12 +18,14 @@ import numpy as np
 from twin.calibrate.channels.finding import Finding
 from twin.calibrate.channels.judge import Judgement, judge, set_aside, share
 from twin.calibrate.fit.measured import Measured, measured
-from twin.diagnose.evidence.fitter import Fitter
+from twin.diagnose.evidence.fitter import Fitted, Fitter
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.channels_check import FAMILY, channels_at_fault, warmer_air
 from twin.diagnose.model.study import Study, with_measured
 from twin.diagnose.result.diagnosis import Cause
+from twin.diagnose.search.accepted import readings_columns
 from twin.diagnose.search.detector import Detector, emptied
+from twin.diagnose.search.look import look
 from twin.logs.run import Run
 from twin.rom.drive import measured_air
 
@@ -124,11 +126,32 @@ def _air_stands(
     if not warmer.any():
         return True
     fitted = detector.fitter(measured_of(with_measured(study, plans)))
-    seen = fitted.projector(warmer)
+    colder, information, threshold = _told(detector, fitted, columns, warmer, threshold)
     difference, column = np.concatenate(off), np.concatenate(of_fault)
     taken_off = float(column @ difference) / float(column @ column)  # of the fault, before the model was driven by it
-    total = taken_off - float(seen @ detector.whiten(fitted.residual)) / float(seen @ warmer)
-    return abs(total - 1.0) < abs(total) and total**2 * float(seen @ warmer) > threshold
+    total = taken_off + colder
+    return abs(total - 1.0) < abs(total) and total**2 * information > threshold
+
+
+def _told(
+    detector: Detector, fitted: Fitted, columns: np.ndarray, warmer: np.ndarray, threshold: float
+) -> tuple[float, float, float]:
+    """By how many times the white column warmer (m,) the air was colder, the information on it, and the statistic that
+    it needs: beside the cause that explains the most, where that is more than other air does, as what such a cause
+    leaves looks like other air, too. columns: of that air."""
+    white, policy = detector.whiten(fitted.residual), detector.policy
+    seen = fitted.projector(warmer)
+    g, information = float(seen @ white), float(seen @ warmer)
+    causes = (h for h in look(detector, fitted)[1] if not np.isin(h.combination()[0], columns).any())
+    leader, explained = next(causes, None), g**2 / information
+    if leader is not None and leader.statistic > explained + max(policy.rival, policy.misfit * explained):
+        D = readings_columns(detector, leader)
+        PD = fitted.projector(D)
+        beside = warmer - D @ np.linalg.lstsq(D.T @ PD, PD.T @ warmer, rcond=None)[0]
+        seen = fitted.projector(beside)
+        g, information = float(seen @ white), float(seen @ beside)
+        threshold = max(threshold, policy.misfit * leader.statistic)
+    return -g / max(information, 1e-30), information, threshold
 
 
 def _of_run(time: np.ndarray, f: Finding, number: int) -> np.ndarray:
