@@ -10,13 +10,14 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.leading import channel_of
 from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.readings import play
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import curved_change, exchanged, motion
-from twin.diagnose.search.dispersion import raised, searched
+from twin.diagnose.search.dispersion import raised, searched, told_by
 from twin.diagnose.search.exact import misfit, misfit_of_each
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.gain import predicted
@@ -199,6 +200,18 @@ def test_what_leaps_from_reading_to_reading_hides_no_cause():
     assert 1.0 < slow.share < POLICY.dispersed
     assert slow.lasting > 0.5 * (slow.left - slow.measured)
     assert slow.least(POLICY) == 0.5 * slow.lasting > 36.0 * slow.share
+
+
+def test_channels_that_leave_much_tell_less():
+    """A sensor tells its own offset: what it leaves counts, and what another one leaves does not."""
+    detector = small_case.made_detector()
+    channel, sensors = channel_of(detector.study), detector.study.probed.base.sensors
+    found = search(detector, measured(seed=3) + 1.5 * (channel == sensors.index("housing")))
+    (cause,) = found.accepted
+    assert cause.hypothesis.name == "sensors.housing"
+    leaves = {name: np.where(channel == sensors.index(name), 3.0, 0.7) for name in ("housing", "screw_middle")}
+    assert told_by(replace(found, unexplained=leaves["housing"]), cause) == pytest.approx(9.0, rel=0.05)
+    assert told_by(replace(found, unexplained=leaves["screw_middle"]), cause) == pytest.approx(1.0, rel=0.05)
 
 
 def test_what_a_cause_explains_does_not_raise_thresholds():

@@ -100,9 +100,11 @@ class _Work(Generic[T, R]):
 
     def call_helpers(self, left: int) -> None:
         """As many as there are cores and pieces of work besides this process and its next piece."""
+        if (more := min(workers(), left) - 1) < 1:
+            return
         # pickled before the threads start: what the pieces of this thread cache in `shared` would change it meanwhile
         opening = pickle.dumps((self._function.__module__, self._function.__qualname__, self._shared), protocol=5)
-        self.helpers.extend(_Helper() for _ in range(min(workers(), left) - 1))
+        self.helpers.extend(_Helper() for _ in range(more))
         self._threads.extend(threading.Thread(target=self._serve, args=(h, opening), daemon=True) for h in self.helpers)
         for thread in self._threads:
             thread.start()

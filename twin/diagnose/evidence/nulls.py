@@ -59,9 +59,8 @@ class Form:
 
 
 def form_of(machine: Machine) -> Form:
-    """That of a machine: in a lumped one a film of a node is no face's, and as uncertain as it is stated. With its
-    exponent as another nuisance the lumped machine of the tests lost faults that it had found."""
-    return Form(steep=0.0, law=0.0) if machine.lumped else Form()
+    """That of a machine: in a lumped one a film is no face's, and in the mean as uncertain as it is stated."""
+    return Form(law=0.0) if machine.lumped else Form()
 
 
 @dataclass(frozen=True)

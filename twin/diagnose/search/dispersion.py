@@ -10,8 +10,9 @@ Anderson, Model Selection and Multimodel Inference, 2002, section 2.5). More is 
 thresholds are c times as high. Above 3 it becomes model discrepancy of its own (slow errors, below), and a cause must
 explain more than half of what is left beside that; heat of any history is not told then.
 
-That is enough for what leaps from one reading to the next: no cause that lasts for hours looks like it. What a form
-leaves in a channel for hours one place may explain half of, and a cause must explain more.
+That is enough for what leaps from one reading to the next: no cause that lasts for hours looks like it. Where channels
+that tell a cause have a larger c of their own, it counts. What a form leaves in a channel for hours one place may
+explain half of, and a cause must explain more.
 
 Slow errors last for hours and are far larger in some channels than in others. Of the white numbers w of a channel in a
 run, less what calibration explains, mean square and product of neighbours say
@@ -35,7 +36,7 @@ import numpy as np
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.accepted import Accepted, readings_columns
 from twin.diagnose.search.contest import worth
 from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
@@ -56,6 +57,7 @@ class Dispersion:
     errors: np.ndarray | None = None  # (m, q) white: slow errors of single channels, where the model is poor
     beside: float = 0.0  # r^T Pi r with slow errors in Pi
     lasting: float = np.inf  # of r^T Pi r beyond m, in channels where neighbours are alike beyond chance
+    doubted: float = 0.0  # what a cause would have needed that channels tell of which themselves leave much
 
     @property
     def share(self) -> float:
@@ -69,7 +71,7 @@ class Dispersion:
         excess = self.left - self.measured
         if excess <= policy.chance * math.sqrt(2.0 * self.measured):
             return 0.0
-        return max(policy.excess * min(self.lasting, excess), FLOOR * self.share)
+        return max(policy.excess * min(self.lasting, excess), FLOOR * self.share, self.doubted)
 
 
 def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
@@ -84,8 +86,12 @@ def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
         wide = raised(detector, own)
         found = search(wide, y, begun(wide, y))
         return (found if found.accepted else search_again(detector, y, start, first, math.inf)), own
-    least = own.least(detector.policy)
-    return (search_again(detector, y, start, first, least) if least else first), own
+    if own.least(detector.policy):
+        uncertain = [FLOOR * told_by(first, a) for a in first.accepted]
+        doubted = (needed for needed, a in zip(uncertain, first.accepted, strict=True) if a.statistic < needed)
+        own = replace(own, doubted=max(doubted, default=0.0))
+        return search_again(detector, y, start, first, own.least(detector.policy)), own
+    return first, own
 
 
 def dispersion_of(found: Search) -> Dispersion:
@@ -95,6 +101,18 @@ def dispersion_of(found: Search) -> Dispersion:
     left = float(found.left.sum()) - (heat if passes else 0.0)
     measured = int(np.isfinite(found.residual).sum())
     return Dispersion(left, measured, passes, lasting=_lasting(found))
+
+
+def told_by(found: Search, a: Accepted) -> float:
+    """c of the channels that tell a cause, each with what its own numbers explain of it; no less than 1."""
+    response = readings_columns(found.detector, a.hypothesis) @ a.amplitude
+    evidence = response * found.detector.fitter.linear(found.x0)[2](response)
+    told = scaled = 0.0
+    for channel in _channels(found.detector, found.residual):
+        own = max(float(evidence[channel].sum()), 0.0)
+        told += own
+        scaled += own / max(float(np.mean(found.unexplained[channel] ** 2)) if len(channel) else 1.0, 1.0)
+    return told / scaled if scaled > 0.0 else 1.0
 
 
 def _lasting(found: Search) -> float:
