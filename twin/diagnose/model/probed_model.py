@@ -109,7 +109,7 @@ def make_probed_model(
 
     nominal_alone: it knows these runs at nominal values, and nothing of other values and of heat at places.
     """
-    rich = rich_probed_model(machine, progress, mesh, nominal_alone)
+    rich = rich_probed_model(machine, progress, mesh)
     rich = replace(rich, rich=at_positions(rich.rich, tcp_positions(rich.rich, runs)))
     base = pruned(rich.rich)
     load = base.load_model

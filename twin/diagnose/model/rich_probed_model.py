@@ -41,12 +41,9 @@ class RichProbedModel:
 
 
 def rich_probed_model(
-    machine: Machine, progress: Progress = silent, mesh: Mesh = Mesh.DESCRIBED, bare: bool = False
+    machine: Machine, progress: Progress = silent, mesh: Mesh = Mesh.DESCRIBED
 ) -> RichProbedModel:  # fmt: skip
-    """The rich model with places, cached by description and meshes; mesh: lumped machines have that described alone.
-
-    bare: without places and displaced sensors, in half the time.
-    """
+    """The rich model with places, cached by description and meshes; mesh: lumped machines have that described alone."""
     linear = mesh is Mesh.LINEAR
 
     def make() -> RichProbedModel:
@@ -56,9 +53,8 @@ def rich_probed_model(
             meshes = load_body_meshes(machine)
             if mesh is Mesh.FINER:
                 meshes = tuple(body_mesh(body.name, tuple(map(refined, body.parts))) for body in meshes)
-            watched = machine if bare else with_displaced_sensors(machine, meshes)
-            full = assemble_unrestricted(watched, meshes, progress, linear)
-        places = () if bare else places_of(machine, full)
+            full = assemble_unrestricted(with_displaced_sensors(machine, meshes), meshes, progress, linear)
+        places = places_of(machine, full)
         model = with_places(full, places)
         height = _heights(machine, full, model)
         if linear:
@@ -80,7 +76,7 @@ def rich_probed_model(
             heights.append(V.T @ h[:, :n_films])
         return RichProbedModel(replace(model, bodies=tuple(bodies)), places, tuple(heights))
 
-    return cached("probed", __name__, (machine_hash(machine), mesh.name, bare), make)
+    return cached("probed", __name__, (machine_hash(machine), mesh.name), make)
 
 
 def _heights(machine: Machine, full: FullModel, model: MachineModel) -> list[np.ndarray]:

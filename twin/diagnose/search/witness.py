@@ -143,7 +143,7 @@ def _told(
     seen = fitted.projector(warmer)
     g, information = float(seen @ white), float(seen @ warmer)
     causes = (h for h in look(detector, fitted)[1] if not np.isin(h.combination()[0], columns).any())
-    leader, explained = next(causes, None), g**2 / information
+    leader, explained = next(causes, None), g**2 / max(information, 1e-30)
     if leader is not None and leader.statistic > explained + max(policy.rival, policy.misfit * explained):
         D = readings_columns(detector, leader)
         PD = fitted.projector(D)
