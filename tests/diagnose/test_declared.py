@@ -13,7 +13,6 @@ from tests.diagnose import small_case
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.film_laws import with_film_laws
-from twin.diagnose.evidence.nulls import form_of
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.table import fault_of
@@ -48,7 +47,7 @@ def logged(signal: str, factor: float) -> Study:
     machine = small_case.machine()
     probed = make_probed_model(machine, parameters(machine), runs)
     plans = [measured(probed.base, run, b.drive, b.name) for run, b in zip(runs, probed.runs, strict=True)]
-    return with_film_laws(make_study(probed, plans, range(2)), form_of(machine))
+    return with_film_laws(make_study(probed, plans, range(2)), small_case.form())
 
 
 def outputs(study: Study, x: np.ndarray) -> np.ndarray:
@@ -152,7 +151,7 @@ def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description
     machine = load_machine(lumped_case.FOLDER / "machine.toml", elsewhere)
     study, detector = small_case.study(), small_case.made_detector()
     own = make_probed_model(machine, parameters(machine), small_case.runs())
-    other = with_film_laws(replace(small_case.described(), probed=own), form_of(machine))
+    other = with_film_laws(replace(small_case.described(), probed=own), small_case.form())
     x = 0.5 * np.random.default_rng(4).standard_normal(len(study.probed.parameters))
     y = with_noise(study, outputs(other, x), np.random.default_rng(5))
     fitted = detector.fitter(y)
