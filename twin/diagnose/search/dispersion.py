@@ -57,7 +57,6 @@ class Dispersion:
     errors: np.ndarray | None = None  # (m, q) white: slow errors of single channels, where the model is poor
     beside: float = 0.0  # r^T Pi r with slow errors in Pi
     lasting: float = np.inf  # of r^T Pi r beyond m, in channels where neighbours are alike beyond chance
-    doubted: float = 0.0  # what a cause would have needed that channels tell of which themselves leave much
 
     @property
     def share(self) -> float:
@@ -71,7 +70,7 @@ class Dispersion:
         excess = self.left - self.measured
         if excess <= policy.chance * math.sqrt(2.0 * self.measured):
             return 0.0
-        return max(policy.excess * min(self.lasting, excess), FLOOR * self.share, self.doubted)
+        return max(policy.excess * min(self.lasting, excess), FLOOR * self.share)
 
 
 def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
@@ -86,12 +85,13 @@ def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
         wide = raised(detector, own)
         found = search(wide, y, begun(wide, y))
         return (found if found.accepted else search_again(detector, y, start, first, math.inf)), own
-    if own.least(detector.policy):
-        uncertain = [FLOOR * told_by(first, a) for a in first.accepted]
-        doubted = (needed for needed, a in zip(uncertain, first.accepted, strict=True) if a.statistic < needed)
-        own = replace(own, doubted=max(doubted, default=0.0))
-        return search_again(detector, y, start, first, own.least(detector.policy)), own
-    return first, own
+    if not (least := own.least(detector.policy)):
+        return first, own
+    found = search_again(detector, y, start, first, least)
+    while doubted := _doubted(found) - start.refused:
+        start = replace(start, refused=start.refused | doubted)
+        found = search_again(detector, y, start, found, least)
+    return found, own
 
 
 def dispersion_of(found: Search) -> Dispersion:
@@ -101,6 +101,13 @@ def dispersion_of(found: Search) -> Dispersion:
     left = float(found.left.sum()) - (heat if passes else 0.0)
     measured = int(np.isfinite(found.residual).sum())
     return Dispersion(left, measured, passes, lasting=_lasting(found))
+
+
+def _doubted(found: Search) -> frozenset[tuple[str, str]]:
+    """Family and name of the causes that explain less than they need by the channels that tell them."""
+    return frozenset(
+        (a.hypothesis.family, a.hypothesis.name) for a in found.accepted if a.statistic < FLOOR * told_by(found, a)
+    )
 
 
 def told_by(found: Search, a: Accepted) -> float:

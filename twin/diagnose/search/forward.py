@@ -40,14 +40,15 @@ def search(described: Detector, y: np.ndarray, start: Start | None = None) -> Se
 
 def search_again(described: Detector, y: np.ndarray, start: Start, first: Search, least: float) -> Search:
     """What a first search has found where causes must explain more than `least`, from fits that are known. Anew it is
-    searched only where one of them no longer does: what remains might not have been named without it."""
+    searched only where one of them no longer does or is refused: what remains might not have been named without it."""
     fewer = start.detector.at_least(least)
     start = replace(start, detector=fewer, loose=loose_ones(fewer, y, start.fitted, start.x0, start.freed))
     if ended := _one_number(start, y):
         return ended
     named = sorted(first.accepted, key=lambda a: -a.statistic)
     beside = _limits(fewer, named[:1])
-    if all(a.statistic > (beside[a.hypothesis.family] if i else least) for i, a in enumerate(named)):
+    stand = all(a.statistic > (beside[a.hypothesis.family] if i else least) for i, a in enumerate(named))
+    if stand and not start.refused & {(a.hypothesis.family, a.hypothesis.name) for a in named}:
         accepted = tuple(replace(a, threshold=max(a.threshold, least)) for a in first.accepted)
         return replace(first, detector=fewer, loose=start.loose, accepted=accepted)
     return _forward(described.at_least(least), y, start)
@@ -67,7 +68,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
     detector, policy, fitted, x = start.detector, start.detector.policy, start.fitted, start.x0
     covariance, loose = start.covariance, start.loose
     accepted, steps = list[Accepted](), list[Step]()
-    refused, fruitless, imitated = set[tuple[str, str]](), 0, False
+    refused, fruitless, imitated = set(start.refused), 0, False
     while True:
         seen, ranked, step = look(detector, fitted) if accepted or refused else start.glance
         if restless := _restless(detector, accepted, step.parts):
