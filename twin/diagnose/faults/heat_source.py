@@ -17,7 +17,7 @@ class Heat(Fault):
         slot.force(slot.study.probed.B[slot.place], slot.shape)
 
 
-# own: it leaves by the film of its own face, which is known to `nulls.Form.local_film` of its group's
+# own: it leaves by the film of its own face, which differs from its group's by `nulls.Form.local_film`
 HEAT = Heat("heat_source", "heat", "W", "", 1, 1.0, own=0.12)
 FAULTS = (HEAT,)
 

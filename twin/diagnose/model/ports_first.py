@@ -53,7 +53,7 @@ def basis(P: np.ndarray) -> Basis:
     """For P (r, n_ports).
 
     In numpy, as all that is made once per machine: compiled for every new number of states, it took a fifth of the time
-    of a detector of a small machine, whose other discretisations each have their own number.
+    of a small machine's detector, whose other discretisations each have their own number (by a script).
     """
     r, ports = P.shape
     if not ports:

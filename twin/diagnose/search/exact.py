@@ -175,7 +175,7 @@ def _read_anew(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis)
     """A hypothesis about readings that are not in proportion to its size, at the size that removes most misfit."""
     there = unbent(detector, y, fitted)
     less = left_less(detector, there, fitted)
-    left = there.projector(detector.whiten(there.residual))
+    left = unexplained(detector, there)
     size, tried = h.amplitude[0], list[tuple[float, float]]()
     states = motion(detector, beginning(there.x, detector.policy))
     for _ in range(detector.policy.read_passes):
