@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,7 +25,7 @@ from twin.diagnose.search.verdict import cause_of
 
 pytestmark = pytest.mark.long
 
-SEARCHED = SimpleNamespace(policy=POLICY, study=None)  # all that comparing names needs of a detector
+SEARCHED = SimpleNamespace(policy=POLICY, study=None, elements=None)  # all that comparing names needs of a detector
 
 
 def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
@@ -195,6 +196,7 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
         return replace(h, statistic=1100.0 if h is cold else 950.0)
 
     monkeypatch.setattr(contest, "exact", exact)
+    monkeypatch.setattr(contest, "longer", lambda study, elements, h: h)
     nothing = np.zeros(0)
     far = replace(wetted, statistic=0.2 * behind.statistic)
     order = tried(SEARCHED, nothing, None, [(heat,), (behind,), (wetted, cold), (far,)])
@@ -210,10 +212,28 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
     assert tried(SEARCHED, nothing, None, []) == []
 
 
+def test_a_coolant_is_tried_in_longer_windows_while_they_explain_more(monkeypatch):
+    """Twice and four times as long; eight times explains less, and is the last that is tried."""
+    contest = sys.modules[worth.__module__]
+    length, tries = {1.0: 100.0, 2.0: 300.0, 4.0: 400.0, 8.0: 350.0}, []
+
+    def exact(detector, y, fitted, h, most):
+        tries.append(h.amplitude[0])
+        return replace(h, statistic=length[h.amplitude[0]])
+
+    monkeypatch.setattr(contest, "exact", exact)
+    monkeypatch.setattr(
+        contest, "longer", lambda study, elements, h: replace(h, amplitude=(2.0 * h.amplitude[0], -1.0))
+    )
+    found = contest._longest(small_case.made_detector(), np.zeros(0), None, a_coolant(1, 1.0, -1.0))
+    assert found.statistic == 400.0
+    assert tries == [2.0, 4.0, 8.0]
+
+
 def test_a_capacity_further_behind_is_refitted(monkeypatch):
     """Heat in many windows explains more; a capacity that scores three quarters of it may explain as much."""
     contest = sys.modules[worth.__module__]
-    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order: order)
+    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order, named: order)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
 
     def kind(name: str, statistic: float) -> Hypothesis:
@@ -230,7 +250,7 @@ def test_a_capacity_further_behind_is_refitted(monkeypatch):
 def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
     """One gains 20 % by its edges, as the other would; a refit that finds several times more is not brought back."""
     contest = sys.modules[worth.__module__]
-    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order: order)
+    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order, named: order)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
     lead, near, far = (replace(bent, statistic=s) for s in (1000.0, 950.0, 600.0))
     nothing = np.zeros(0)
@@ -244,7 +264,7 @@ def test_windows_are_compared_before_their_edges_are_fitted(monkeypatch):
 
 def test_candidates_of_one_kind_do_not_keep_others_out(monkeypatch):
     contest = sys.modules[worth.__module__]
-    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order: order)
+    monkeypatch.setattr(contest, "_closely", lambda detector, y, fitted, order, named: order)
     bent = replace(hypothesis(), batch=replace(hypothesis().batch, kind="moved"))
     many = [replace(bent, statistic=100.0 - 0.1 * k) for k in range(40)]
     film = replace(bent, batch=replace(bent.batch, kind="film"), statistic=93.0)
@@ -299,12 +319,33 @@ def test_those_near_the_leader_are_fitted_closer_before_one_leads(monkeypatch):
     monkeypatch.setattr(contest, "closer", closer)
     monkeypatch.setattr(contest, "misfit", lambda detector, fitted: 1500.0)
     fitted = SimpleNamespace(residual=np.zeros(300))
-    order = contest._closely(SEARCHED, np.zeros(0), fitted, [lead, near, far])
+    stays = partial(contest._closely, SEARCHED, np.zeros(0), named=lambda h: h)
+    order = stays(fitted, [lead, near, far])
     assert [h.statistic for h in order] == [1100.0, 1000.0, 700.0]
     assert asked == [lead, near]
-    assert contest._closely(SEARCHED, np.zeros(0), fitted, []) == []
+    assert stays(fitted, []) == []
     enough = SimpleNamespace(residual=np.zeros(450))  # of so many numbers chance leaves as much as the leader
-    assert contest._closely(SEARCHED, np.zeros(0), enough, [lead, near]) == [lead, near]
+    assert stays(enough, [lead, near]) == [lead, near]
+    assert asked == [lead, near]
+
+
+def test_of_several_strong_ones_each_is_named_before_one_leads(monkeypatch):
+    """One leads by what channels show of the other one's response otherwise than the model; alone it costs nothing."""
+    contest = sys.modules[worth.__module__]
+    lead, near, far = (replace(hypothesis(), statistic=s) for s in (1000.0, 950.0, 700.0))
+    asked = []
+
+    def named(h):
+        asked.append(h)
+        return replace(h, statistic=1200.0 if h is near else 1100.0)
+
+    monkeypatch.setattr(contest, "closer", lambda detector, y, fitted, h: h)
+    monkeypatch.setattr(contest, "misfit", lambda detector, fitted: 1500.0)
+    fitted = SimpleNamespace(residual=np.zeros(300))
+    order = contest._closely(SEARCHED, np.zeros(0), fitted, [lead, near, far], named)
+    assert [h.statistic for h in order] == [1200.0, 1100.0, 700.0]
+    assert asked == [lead, near]
+    assert contest._closely(SEARCHED, np.zeros(0), fitted, [lead, far], named) == [lead, far]
     assert asked == [lead, near]
 
 

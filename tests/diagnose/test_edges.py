@@ -12,7 +12,7 @@ from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.evidence.bells import Bell, by_blocks, name
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.edges import Edge, edges_of, moved, with_pulses
+from twin.diagnose.search.edges import Edge, edges_of, longer, moved, with_pulses
 
 HOUR = 3600.0
 
@@ -111,3 +111,14 @@ def test_moved_windows_stay_in_their_run_and_are_named_anew():
     assert (
         moved(study, small_case.elements(), last, [(Edge("begin", 0), 360.0)]).when.name == f"from 1.1 h of {first} on"
     )
+
+
+def test_longer_windows_end_where_the_next_one_begins_or_the_run_ends():
+    study, elements = small_case.study(), small_case.elements()
+    first, second = names()[:2]
+    end = float(study.runs[0].run.drive.time[-1])
+    h = heat(Window(first, HOUR, 1.5 * HOUR), Window(first, 1.75 * HOUR, end - 600.0), Window(second, HOUR, 2 * HOUR))
+    ends = [w.end for w in longer(study, elements, h).when.windows]
+    assert ends == [1.75 * HOUR - 600.0, end, 3 * HOUR]
+    whole = heat(Window(first, HOUR, end))
+    assert longer(study, elements, whole) is whole

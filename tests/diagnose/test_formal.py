@@ -107,6 +107,15 @@ def test_a_corrected_signal_leaves_the_laws_of_films():
     assert np.abs(study.all_outputs(x) - study.all_outputs(0.0 * x)).max() > 0.05
 
 
+def test_what_a_law_makes_of_the_mean_coefficient_is_drawn_or_fitted():
+    """Drawn beside the tolerance, or by an exponent about the rise at which a coefficient is stated."""
+    study = small_case.described()
+    fitted = [with_film_laws(study, Form(law=0.0)).probed.runs[k].loads.usual for k in study.fitted]
+    drawn = [with_film_laws(study, Form(law=0.48)).probed.runs[k].loads.usual for k in study.fitted]
+    assert all(np.all(usual == RISE) for usual in fitted)
+    assert all(0.2 < usual.min() < usual.max() < 20.0 and np.all(usual != RISE) for usual in map(np.asarray, drawn))
+
+
 @pytest.mark.long
 def test_the_delivered_calibration_has_the_laws_of_the_description():
     study = with_film_laws(small_case.described(), Form())

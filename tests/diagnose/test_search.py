@@ -11,13 +11,15 @@ import pytest
 from tests.diagnose import small_case
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.leading import channel_of
+from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.readings import play
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import curved_change, exchanged, motion
-from twin.diagnose.search.dispersion import raised, searched, told_by
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.dispersion import dispersion_of, raised, searched
 from twin.diagnose.search.exact import misfit, misfit_of_each
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.gain import predicted
@@ -181,37 +183,33 @@ def test_noise_alone_leaves_a_dispersion_of_hardly_one():
     assert own.share == pytest.approx(0.8, abs=0.2)
 
 
-def test_what_leaps_from_reading_to_reading_hides_no_cause():
-    """A sensor with more noise than it is said to have; errors that last as much raise what a cause must explain."""
-    detector, y = small_case.made_detector(), measured("heat", "housing", 400.0, seed=3)
-    leaps, first, rng = np.zeros(len(y)), 0, np.random.default_rng(9)
-    for k in detector.study.fitted:
-        (b, s), _ = detector.study.runs[k].shapes
-        leaps[first : first + b * s].reshape(b, s)[:, 0] = rng.standard_normal(b)
-        first += detector.study.runs[k].size
-    sigma = detector.whiten.channels[0][0].sigma[0]
-    found, own = searched(detector, y + 2.0 * sigma * leaps)
-    excess = own.left - own.measured
-    assert excess > 3.0 * np.sqrt(2.0 * own.measured)
-    assert own.lasting < 0.2 * excess
-    assert own.least(POLICY) == 36.0 * own.share < 0.5 * excess
-    assert [a.hypothesis.name for a in found.accepted] == ["housing"]
+def leaps(detector: Detector, size: float) -> np.ndarray:
+    """(m,) noise of the first sensor of every run beyond that which it is said to have, in its standard deviations."""
+    of_first, rng = np.zeros(len(measured_of(detector.study))), np.random.default_rng(9)
+    for own, (sensors, _) in zip(detector.study.rows, detector.whiten.channels, strict=True):
+        bins, s = detector.study.runs[0].shapes[0]
+        of_first[own][: bins * s : s] = size * sensors.sigma[0] * rng.standard_normal(bins)
+    return of_first
+
+
+def test_what_leaps_from_reading_to_reading_is_noise_of_that_channel():
+    """It is weighed by it, and hides nothing elsewhere; errors that last raise what a cause must explain."""
+    detector = small_case.made_detector()
+    channel, sensors = channel_of(detector.study), detector.study.probed.base.sensors
+    y = measured(seed=3) + leaps(detector, 5.0) + 1.5 * (channel == sensors.index("screw_middle"))
+    alone = search(detector, y)
+    assert dispersion_of(alone).share > 2.0
+    found, own = searched(detector, y)
+    assert [a.hypothesis.name for a in found.accepted] == ["sensors.screw_middle"]
+    assert own.share < 1.2
+    assert own.least(POLICY) == 0.0
+    weight = found.detector.whiten.weight
+    assert weight[channel == 0] == pytest.approx(1.0 / np.hypot(1.0, 5.0), rel=0.3)  # the rest is fitted
+    assert weight[channel != 0].min() > 0.7  # a fit that leaps have drawn aside leaves more
     _, slow = searched(detector, measured(seed=4) + slow_discrepancy(0.1))
     assert 1.0 < slow.share < POLICY.dispersed
     assert slow.lasting > 0.5 * (slow.left - slow.measured)
     assert slow.least(POLICY) == 0.5 * slow.lasting > 36.0 * slow.share
-
-
-def test_channels_that_leave_much_tell_less():
-    """A sensor tells its own offset: what it leaves counts, and what another one leaves does not."""
-    detector = small_case.made_detector()
-    channel, sensors = channel_of(detector.study), detector.study.probed.base.sensors
-    found = search(detector, measured(seed=3) + 1.5 * (channel == sensors.index("housing")))
-    (cause,) = found.accepted
-    assert cause.hypothesis.name == "sensors.housing"
-    leaves = {name: np.where(channel == sensors.index(name), 3.0, 0.7) for name in ("housing", "screw_middle")}
-    assert told_by(replace(found, unexplained=leaves["housing"]), cause) == pytest.approx(9.0, rel=0.05)
-    assert told_by(replace(found, unexplained=leaves["screw_middle"]), cause) == pytest.approx(1.0, rel=0.05)
 
 
 def test_what_a_cause_explains_does_not_raise_thresholds():

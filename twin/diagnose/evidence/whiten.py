@@ -27,6 +27,7 @@ class Whitener:
 
     study: Study
     channels: tuple[tuple[Channels, Channels], ...]
+    weight: np.ndarray | None = None  # (m,) of every number; None: all alike
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """values (m, ...) of all fitted runs, one after the other -> the same, of unit variance.
@@ -41,7 +42,8 @@ class Whitener:
             weight = planned.measured.row_weight(float(np.median(tcp.sigma))).reshape(-1, 1, *([1] * len(rest)))
             white = sensors.whiten(T), tcp.whiten(w * weight)
             parts += [v.reshape(v.shape[0] * v.shape[1], *rest) for v in white]  # no sensors: nothing for -1 to count
-        return np.concatenate(parts)
+        result = np.concatenate(parts)
+        return result if self.weight is None else result * self.weight.reshape(-1, *([1] * len(rest)))
 
     def colour(self, white: np.ndarray) -> np.ndarray:
         """White values (m,) back in their units, of channels without memory; NaN where nothing was measured."""

@@ -9,7 +9,7 @@ nearly linear.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -18,7 +18,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.edges import edges_of
+from twin.diagnose.search.edges import edges_of, longer
 from twin.diagnose.search.exact import by_chance, closer, exact, misfit
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
@@ -42,9 +42,11 @@ def proof(detector: Detector, h: Hypothesis) -> float:
 
 
 def judged(
-    detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
-) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """Candidates, most worthy first: those whose statistics are exact, and the others.
+    detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]],
+    named: Callable[[Hypothesis], Hypothesis] = lambda h: h,
+) -> tuple[list[Hypothesis], list[Hypothesis]]:  # fmt: skip
+    """Candidates, most worthy first: those whose statistics are exact, and the others. named: a strong one by what is
+    left once it is named.
 
     Those that are bent or have edges are refitted, until one leads all others by a share of `behind`, by what both
     score before they are refitted: fitted edges are worth as much to others. What is curved is refitted all the same:
@@ -72,7 +74,7 @@ def judged(
         scores[id(now)] = worthy(h)
     straight = [h for h in left if not bent(detector, h)]
     order = _fair(detector, y, fitted, [*done, *straight], scores)
-    return _closely(detector, y, fitted, order), [h for h in left if bent(detector, h)]
+    return _closely(detector, y, fitted, order, named), [h for h in left if bent(detector, h)]
 
 
 def _refitted(
@@ -101,18 +103,28 @@ def tried(
     detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
 ) -> list[Sequence[Hypothesis]]:
     """Candidates of `judged`, most worthy first. Where a coolant leads, it and others within `saturates` have been
-    refitted for some passes, from the last of their starts: a film saturates most at the wetted face, which linearity
-    would leave aside."""
+    refitted for some passes, from the last of their starts and in ever longer windows: a film saturates most at the
+    wetted face, which linearity would leave aside, and within the hour, where linearity ends its window."""
     order = sorted(candidates, key=lambda starts: -worth(starts[0], detector.policy))
     if not order or not fault_of(order[0][0]).wets:
         return order
     least = (1.0 - detector.policy.saturates) * worth(order[0][0], detector.policy)
     passed = [
-        (exact(detector, y, fitted, starts[-1], detector.policy.trial),)
+        (_longest(detector, y, fitted, exact(detector, y, fitted, starts[-1], detector.policy.trial)),)
         if fault_of(starts[0]).wets and worth(starts[0], detector.policy) > least else starts
         for starts in order
     ]  # fmt: skip
     return sorted(passed, key=lambda starts: -worth(starts[0], detector.policy))
+
+
+def _longest(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+    """A refitted coolant in windows twice as long, and so on, while that explains more."""
+    while (start := longer(detector.study, detector.elements, h)) is not h:
+        found = exact(detector, y, fitted, start, detector.policy.trial)
+        if found.statistic <= h.statistic:
+            break
+        h = found
+    return h
 
 
 def _fair(
@@ -151,16 +163,21 @@ def _fair(
     return order
 
 
-def _closely(detector: Detector, y: np.ndarray, fitted: Fitted, order: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _closely(
+    detector: Detector, y: np.ndarray, fitted: Fitted, order: Sequence[Hypothesis],
+    named: Callable[[Hypothesis], Hypothesis],
+) -> list[Hypothesis]:  # fmt: skip
     """Candidates in order, once the strong ones among those near the leader are fitted closer: few, and where the
-    leader leaves more than chance, for derivatives beside a cause take as long as a calibration."""
+    leader leaves more than chance, for derivatives beside a cause take as long as a calibration. Of several, each then
+    is named: one may lead by the errors of another one's response, which channels show otherwise than the model."""
     policy = detector.policy
     if order and misfit(detector, fitted) - order[0].statistic <= by_chance(fitted.residual, policy):
         return list(order)
     worthy = partial(worth, policy=policy)
     least = (1.0 - policy.behind) * max((worthy(h) for h in order), default=0.0)
     near = [closer(detector, y, fitted, h) for h in order[: policy.closest] if worthy(h) > least]
-    return sorted([*near, *order[len(near) :]], key=worthy, reverse=True)
+    compared = [named(h) for h in near] if len(near) > 1 else near
+    return sorted([*compared, *order[len(near) :]], key=worthy, reverse=True)
 
 
 def _follows(h: Hypothesis) -> bool:

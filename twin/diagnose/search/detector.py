@@ -311,9 +311,21 @@ def emptied(detector: Detector, plans: list[Measured]) -> Detector:
     kept = ~missing(study)
     if not np.any(~kept & ~missing(detector.study)):
         return detector
-    others = np.where(kept[:, None], detector.fitter.others, 0.0)
-    raw = np.where(kept[:, None], detector.columns.raw, np.float32(0.0))
-    fitter = replace(detector.fitter, study=study, whiten=replace(detector.whiten, study=study), others=others)
-    columns = Columns.of(raw, detector.columns.batches, detector.columns.heat, others)
-    lost = replace(detector.lost, responses=np.where(kept[:, None], detector.lost.responses, 0.0))
-    return replace(detector, study=study, fitter=fitter, columns=columns, lost=lost)
+    whiten = replace(detector.whiten, study=study)
+    own = replace(detector, study=study, fitter=replace(detector.fitter, study=study, whiten=whiten))
+    return weighted(own, kept.astype(float))
+
+
+def weighted(detector: Detector, weight: np.ndarray) -> Detector:
+    """The detector where each number counts by a weight (m,): the standard deviation that it has by that it really
+    has, 0 where it is not measured. Thresholds stay as they are."""
+    own = detector.whiten.weight
+    whiten = replace(detector.whiten, weight=weight if own is None else weight * own)
+    others = weight[:, None] * detector.fitter.others
+    raw = weight[:, None].astype(np.float32) * detector.columns.raw
+    return replace(
+        detector,
+        fitter=replace(detector.fitter, whiten=whiten, others=others),
+        columns=Columns.of(raw, detector.columns.batches, detector.columns.heat, others),
+        lost=replace(detector.lost, responses=weight[:, None] * detector.lost.responses),
+    )

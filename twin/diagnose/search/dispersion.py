@@ -36,9 +36,9 @@ import numpy as np
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.accepted import Accepted, readings_columns
+from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.contest import worth
-from twin.diagnose.search.detector import FLOOR, Detector
+from twin.diagnose.search.detector import FLOOR, Detector, weighted
 from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.look import Search, look
@@ -56,6 +56,7 @@ class Dispersion:
     heat: bool  # unknown heat is in that explanation
     errors: np.ndarray | None = None  # (m, q) white: slow errors of single channels, where the model is poor
     beside: float = 0.0  # r^T Pi r with slow errors in Pi
+    weight: np.ndarray | None = None  # (m,) of the numbers: what leaps weighs less (`weights_of`); None: all alike
     lasting: float = np.inf  # of r^T Pi r beyond m, in channels where neighbours are alike beyond chance
 
     @property
@@ -76,22 +77,25 @@ class Dispersion:
 def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing, and the dispersion of the
     first search: where that is no chance, causes must explain more (`raised`)."""
-    detector = afresh(detector)
+    described = detector = afresh(detector)
     start = begun(detector, y)
-    first = search(detector, y, start)
-    own = dispersion_of(first)
+    first, weight = search(detector, y, start), np.ones(len(y))
+    for _ in range(detector.policy.weighings):
+        before, weight = weight, weights_of(first, weight)
+        if np.array_equal(weight < 1.0, before < 1.0):
+            break
+        detector = weighted(described, weight)
+        start = begun(detector, y)
+        first = search(detector, y, start)
+    own = replace(dispersion_of(first), weight=weight)
     if own.share > detector.policy.dispersed:
         own = _with_errors(own, detector, y)
-        wide = raised(detector, own)
+        wide = raised(described, own)
         found = search(wide, y, begun(wide, y))
         return (found if found.accepted else search_again(detector, y, start, first, math.inf)), own
     if not (least := own.least(detector.policy)):
         return first, own
-    found = search_again(detector, y, start, first, least)
-    while doubted := _doubted(found) - start.refused:
-        start = replace(start, refused=start.refused | doubted)
-        found = search_again(detector, y, start, found, least)
-    return found, own
+    return search_again(detector, y, start, first, least), own
 
 
 def dispersion_of(found: Search) -> Dispersion:
@@ -103,34 +107,35 @@ def dispersion_of(found: Search) -> Dispersion:
     return Dispersion(left, measured, passes, lasting=_lasting(found))
 
 
-def _doubted(found: Search) -> frozenset[tuple[str, str]]:
-    """Family and name of the causes that explain less than they need by the channels that tell them."""
-    return frozenset(
-        (a.hypothesis.family, a.hypothesis.name) for a in found.accepted if a.statistic < FLOOR * told_by(found, a)
-    )
-
-
-def told_by(found: Search, a: Accepted) -> float:
-    """c of the channels that tell a cause, each with what its own numbers explain of it; no less than 1."""
-    response = readings_columns(found.detector, a.hypothesis) @ a.amplitude
-    evidence = response * found.detector.fitter.linear(found.x0)[2](response)
-    told = scaled = 0.0
+def weights_of(found: Search, weight: np.ndarray) -> np.ndarray:
+    """(m,) of the measured numbers, from what a search with weights (m,) leaves. A channel that leaps by more than its
+    noise from one reading to the next has that as its noise. All weigh 1 where no more leaps than lasts, or than the
+    response to a cause is wrong by: that is an error of the model."""
+    result, leaps, policy = np.ones_like(weight), 0.0, found.detector.policy
     for channel in _channels(found.detector, found.residual):
-        own = max(float(evidence[channel].sum()), 0.0)
-        told += own
-        scaled += own / max(float(np.mean(found.unexplained[channel] ** 2)) if len(channel) else 1.0, 1.0)
-    return told / scaled if scaled > 0.0 else 1.0
+        w = found.unexplained[channel] / weight[channel]
+        excess = float(w @ w) - len(w)
+        if excess > policy.chance * math.sqrt(2.0 * len(w)) and not _alike(w, policy):
+            result[channel] = math.sqrt(len(w) / float(w @ w))
+            leaps += excess
+    named = policy.misfit * max((a.statistic for a in found.accepted), default=0.0)
+    return result if leaps > _lasting(found) + named else np.ones_like(weight)
 
 
 def _lasting(found: Search) -> float:
-    """Sum of w^2 - 1 of the channels whose white numbers w are like their neighbours beyond chance: of n independent
-    ones the sum of products of neighbours has a standard deviation of n^(1/2)."""
+    """Sum of w^2 - 1 of the channels whose white numbers w are like their neighbours beyond chance."""
     total, policy = 0.0, found.detector.policy
     for channel in _channels(found.detector, found.residual):
         w = found.unexplained[channel]
-        if w[1:] @ w[:-1] > policy.chance * math.sqrt(len(w)):
+        if _alike(w, policy):
             total += max(float(w @ w) - len(w), 0.0)
     return total
+
+
+def _alike(w: np.ndarray, policy: SearchPolicy) -> bool:
+    """Whether white numbers (n,) are like their neighbours beyond chance: of independent ones the sum of products of
+    neighbours has a standard deviation of n^(1/2)."""
+    return bool(w[1:] @ w[:-1] > policy.chance * math.sqrt(len(w)))
 
 
 def _channels(detector: Detector, residual: np.ndarray) -> Iterator[np.ndarray]:
@@ -164,7 +169,8 @@ def wrong_temperatures(found: Search) -> bool:
 
 def raised(detector: Detector, own: Dispersion) -> Detector:
     """The detector of a model with that dispersion: no threshold below what a cause must explain."""
-    wide = detector if own.errors is None else with_errors(detector, own.errors)
+    wide = detector if own.weight is None or own.weight.min() == 1.0 else weighted(detector, own.weight)
+    wide = wide if own.errors is None else with_errors(wide, own.errors)
     return wide.at_least(own.least(detector.policy))
 
 

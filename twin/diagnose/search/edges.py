@@ -89,6 +89,18 @@ def moved(study: Study, elements: Elements, h: Hypothesis, shifts: Sequence[tupl
     return replace(h, when=replace(h.when, name=named(ends, spans), windows=tuple(ends)))
 
 
+def longer(study: Study, elements: Elements, h: Hypothesis) -> Hypothesis:
+    """The hypothesis in windows twice as long, as far as the next one and the run's end let them; h itself where none
+    can be."""
+    windows, shifts = h.when.windows, list[tuple[Edge, float]]()
+    for edge in edges_of(study, h):
+        if edge.what == "end":
+            w, later = windows[edge.window], windows[edge.window + 1 :]
+            room = min((o.start - w.end - SHORTEST for o in later if o.run == w.run), default=np.inf)
+            shifts.append((edge, max(min(w.end - w.start, room), 0.0)))
+    return moved(study, elements, h, shifts) if any(by > 0.0 for _, by in shifts) else h
+
+
 def named(windows: Sequence[Window], spans: dict[str, float]) -> str:
     """Windows in words; spans: when every run ends [s]."""
     first, runs = windows[0], [w.run for w in windows]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -19,10 +20,10 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
-from twin.diagnose.search.accepted import Accepted, exchanged, settled
+from twin.diagnose.search.accepted import Accepted, exchanged, settled, strong
 from twin.diagnose.search.contest import judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
-from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
+from twin.diagnose.search.exact import beginning, misfit, misfit_of_each, unexplained
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Search, Step, cosines, distinct, look
@@ -40,15 +41,14 @@ def search(described: Detector, y: np.ndarray, start: Start | None = None) -> Se
 
 def search_again(described: Detector, y: np.ndarray, start: Start, first: Search, least: float) -> Search:
     """What a first search has found where causes must explain more than `least`, from fits that are known. Anew it is
-    searched only where one of them no longer does or is refused: what remains might not have been named without it."""
+    searched only where one of them no longer does: what remains might not have been named without it."""
     fewer = start.detector.at_least(least)
     start = replace(start, detector=fewer, loose=loose_ones(fewer, y, start.fitted, start.x0, start.freed))
     if ended := _one_number(start, y):
         return ended
     named = sorted(first.accepted, key=lambda a: -a.statistic)
     beside = _limits(fewer, named[:1])
-    stand = all(a.statistic > (beside[a.hypothesis.family] if i else least) for i, a in enumerate(named))
-    if stand and not start.refused & {(a.hypothesis.family, a.hypothesis.name) for a in named}:
+    if all(a.statistic > (beside[a.hypothesis.family] if i else least) for i, a in enumerate(named)):
         accepted = tuple(replace(a, threshold=max(a.threshold, least)) for a in first.accepted)
         return replace(first, detector=fewer, loose=start.loose, accepted=accepted)
     return _forward(described.at_least(least), y, start)
@@ -68,7 +68,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
     detector, policy, fitted, x = start.detector, start.detector.policy, start.fitted, start.x0
     covariance, loose = start.covariance, start.loose
     accepted, steps = list[Accepted](), list[Step]()
-    refused, fruitless, imitated = set(start.refused), 0, False
+    refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
         seen, ranked, step = look(detector, fitted) if accepted or refused else start.glance
         if restless := _restless(detector, accepted, step.parts):
@@ -82,7 +82,8 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
             break
         ahead = sorted((_starts(seen, h, policy) for h in passing), key=lambda starts: -worth(starts[0], policy))
         rest = exchanged(detector.study, y, accepted)
-        proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead[: policy.ahead]))
+        named = partial(_named, detector, y, fitted, accepted)
+        proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead[: policy.ahead]), named)
         standing = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
         if not any(proof(detector, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
@@ -110,6 +111,21 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         detector, start.x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance,
         misfit_of_each(detector, fitted), unexplained(detector, fitted), loose,
     )  # fmt: skip
+
+
+def _named(
+    detector: Detector, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], h: Hypothesis
+) -> Hypothesis:
+    """A strong hypothesis by what is left once it is named; unchanged where that explains no more."""
+    excess = misfit(detector, fitted) - float(np.isfinite(fitted.residual).sum())  # no cause explains more
+    if fault_of(h).curved or not strong(detector, h, excess):
+        return h
+    own = Accepted(h, units_of(detector.study, h), np.array(h.amplitude), np.eye(h.batch.q), h.statistic, 0.0, ())
+    try:
+        after, _ = refit(detector, y, beginning(fitted.x, detector.policy), [*accepted, own])
+    except np.linalg.LinAlgError:  # measurements beyond all reason have bent the model as far: nothing is compared
+        return h
+    return replace(h, statistic=max(h.statistic, misfit(detector, fitted) - misfit(detector, after)))
 
 
 def _limits(detector: Detector, accepted: Sequence[Accepted]) -> dict[str, float]:

@@ -34,6 +34,7 @@ class SearchPolicy:
 
     # a model that is wrong in its form, and members that it lacks
     chance: float = _rule(3.0, DERIVED, "by which what is left is more than chance", "standard deviations")
+    weighings: int = _rule(2, SOLVER, "of channels that leap by more than their noise, each from what a search leaves")
     excess: float = _rule(0.5, PARTS, "of what is left beyond noise, discrepancy, slow errors: a cause must explain it")
     dispersed: float = _rule(3.0, LUMPED, "of what is left per measured number, from which it becomes slow errors")
     slow_rows: int = _rule(12, JUDGED, "of a channel in a run, from which a slow error is learned")

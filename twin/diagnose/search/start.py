@@ -44,7 +44,6 @@ class Start:
     glance: Glance  # with the exact fits of those that are declared
     loose: tuple[Loose, ...]
     freed: Freed
-    refused: frozenset[tuple[str, str]] = frozenset()  # family and name of what may not be named
 
 
 def afresh(detector: Detector) -> Detector:

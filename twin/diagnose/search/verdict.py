@@ -121,15 +121,16 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     chosen, lead = found.accepted[0], found.accepted[0].hypothesis
     # a tolerance tells it, and it has passed no threshold: what explains as much was chosen with it
     unproved = bool(relaxed) and chosen.threshold < thresholds[lead.family]
-    for other, cosine in chosen.rivals:
+    # of two that explain as much the data have decided nothing, however unlike each other they are
+    close = max(policy.close, policy.misfit * lead.statistic)
+    for other, _ in chosen.rivals:
         more = policy.amplitude * (other.batch.q - lead.batch.q)
-        near = other.statistic - more > lead.statistic - policy.close
-        apart = min(lead.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
+        near = other.statistic - more > lead.statistic - close
         alike = other.family == lead.family and Spot.read(other.name).owner == Spot.read(lead.name).owner
         # two histories of one place, and two factors of one signal, are written otherwise into the description
         two = fault_of(lead).corrects or (lead.when.signal and other.when.name != lead.when.name)
         same = alike and not two
-        passes = near and not apart and other.statistic >= thresholds[other.family]
+        passes = near and other.statistic >= thresholds[other.family]
         if not same and (unproved or passes):
             return "ambiguous", causes
     # a sensor at fault does not keep what is beside it out of the description
