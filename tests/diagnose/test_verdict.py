@@ -89,6 +89,23 @@ def test_factors_of_one_signal_that_explain_nearly_the_same_are_ambiguous(less, 
     assert cause.ci95 == ((0.5, 0.707) if wanted == "ambiguous" else (0.5, 0.5))
 
 
+@pytest.mark.parametrize(
+    ("statistic", "less", "wanted"), [(800.0, 3.0, "ambiguous"), (800.0, 9.0, "named"), (50_000.0, 100.0, "ambiguous")]
+)
+def test_of_equal_misfits_the_data_have_decided_nothing(statistic, less, wanted):
+    """However unlike each other two causes are; of a strong one the error of its response is more than chance."""
+    batches = {b.kind: b for b in small_case.made_detector().columns.batches if b.q == 1}
+    heat, warmer = (
+        Hypothesis(batches[kind], 0, batches[kind].histories[0], s, (10.0,) * batches[kind].q, 1.0)
+        for kind, s in (("heat", statistic), ("contact", statistic - less))
+    )
+    one = Accepted(heat, (), np.full(1, 10.0), np.eye(1), statistic, 36.0, ((warmer, 0.9),))
+    found = SimpleNamespace(detector=small_case.made_detector(), accepted=(one,), steps=[SimpleNamespace(parts={})])
+    verdict, (cause,) = verdict_of(found, FAMILIES)
+    assert verdict == wanted
+    assert bool(cause.rivals[0].remedy) == (wanted == "ambiguous")
+
+
 def test_limits_of_factors_are_factors():
     detector = small_case.made_detector()
     gain = next(b for b in detector.columns.batches if b.kind == "gain")

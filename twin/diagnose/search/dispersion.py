@@ -10,9 +10,11 @@ Anderson, Model Selection and Multimodel Inference, 2002, section 2.5). More is 
 thresholds are c times as high. Above 3 it becomes model discrepancy of its own (slow errors, below), and a cause must
 explain more than half of what is left beside that; heat of any history is not told then.
 
-That is enough for what leaps from one reading to the next: no cause that lasts for hours looks like it. Where channels
-that tell a cause have a larger c of their own, it counts. What a form leaves in a channel for hours one place may
-explain half of, and a cause must explain more.
+A channel may leap by more than its noise from one reading to the next, as a sensor at a screw does when the nut passes.
+That is its noise, and it weighs as its own mean square says: every other channel would need as much more otherwise, and
+the fit would follow it (variances of groups of measurements, estimated from what a fit leaves: Searle, Casella,
+McCulloch, Variance Components, 1992, chapter 6). What a form leaves in a channel for hours one place may explain half
+of, and a cause must explain more.
 
 Slow errors last for hours and are far larger in some channels than in others. Of the white numbers w of a channel in a
 run, less what calibration explains, mean square and product of neighbours say

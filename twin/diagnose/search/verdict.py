@@ -43,7 +43,7 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
         family=h.family, place=said.place, parameter="", amplitude=value, ci95=(low, high), unit=h.batch.unit,
         statistic=float(a.statistic), threshold=float(a.threshold), history=h.when.name, signal=h.when.signal,
         exponent=h.when.exponent, windows=said.windows, settings=settings,
-        rivals=tuple(_rival(a.hypothesis, other, cosine, policy.apart) for other, cosine in a.rivals),
+        rivals=tuple(_rival(a.hypothesis, other, cosine, policy) for other, cosine in a.rivals),
     )  # fmt: skip
 
 
@@ -67,9 +67,16 @@ def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
     return Rival(h.family, place, h.when.name, told(value), h.batch.unit, h.statistic, cosine, remedy, ci95)
 
 
-def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float, apart: float) -> Rival:
-    separable = min(chosen.statistic, other.statistic) * (1.0 - cosine**2) > apart
-    return rival_of(other, cosine, "" if separable else remedy(chosen, other))
+def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float, policy: SearchPolicy) -> Rival:
+    apart = min(chosen.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
+    return rival_of(other, cosine, "" if apart and not _as_good(other, chosen, policy) else remedy(chosen, other))
+
+
+def _as_good(other: Hypothesis, lead: Hypothesis, policy: SearchPolicy) -> bool:
+    """Whether another hypothesis explains what the leading one does, but for chance and the error of its response: the
+    data have decided nothing then, however unlike each other they are."""
+    price = policy.amplitude * (other.batch.q - lead.batch.q)
+    return other.statistic - price > lead.statistic - max(policy.close, policy.misfit * lead.statistic)
 
 
 def remedy(a: Hypothesis, b: Hypothesis) -> str:
@@ -121,16 +128,12 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     chosen, lead = found.accepted[0], found.accepted[0].hypothesis
     # a tolerance tells it, and it has passed no threshold: what explains as much was chosen with it
     unproved = bool(relaxed) and chosen.threshold < thresholds[lead.family]
-    # of two that explain as much the data have decided nothing, however unlike each other they are
-    close = max(policy.close, policy.misfit * lead.statistic)
     for other, _ in chosen.rivals:
-        more = policy.amplitude * (other.batch.q - lead.batch.q)
-        near = other.statistic - more > lead.statistic - close
         alike = other.family == lead.family and Spot.read(other.name).owner == Spot.read(lead.name).owner
         # two histories of one place, and two factors of one signal, are written otherwise into the description
         two = fault_of(lead).corrects or (lead.when.signal and other.when.name != lead.when.name)
         same = alike and not two
-        passes = near and other.statistic >= thresholds[other.family]
+        passes = _as_good(other, lead, policy) and other.statistic >= thresholds[other.family]
         if not same and (unproved or passes):
             return "ambiguous", causes
     # a sensor at fault does not keep what is beside it out of the description
