@@ -78,7 +78,7 @@ class Dispersion:
 
 def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing, and the dispersion of the
-    first search: where that is no chance, causes must explain more (`raised`)."""
+    first search, of channels as they leap: where that is no chance, causes must explain more (`raised`)."""
     described = detector = afresh(detector)
     start = begun(detector, y)
     first, weight = search(detector, y, start), np.ones(len(y))
