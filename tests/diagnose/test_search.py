@@ -204,6 +204,7 @@ def test_what_leaps_from_reading_to_reading_is_noise_of_that_channel():
     assert own.share < 1.2
     assert own.least(POLICY) == 0.0
     weight = found.detector.whiten.weight
+    np.testing.assert_array_equal(weight, own.weight)  # by which limits are stated
     assert weight[channel == 0] == pytest.approx(1.0 / np.hypot(1.0, 5.0), rel=0.3)  # the rest is fitted
     assert weight[channel != 0].min() > 0.7  # a fit that leaps have drawn aside leaves more
     _, slow = searched(detector, measured(seed=4) + slow_discrepancy(0.1))

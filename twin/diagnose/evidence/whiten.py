@@ -46,7 +46,8 @@ class Whitener:
         return result if self.weight is None else result * self.weight.reshape(-1, *([1] * len(rest)))
 
     def colour(self, white: np.ndarray) -> np.ndarray:
-        """White values (m,) back in their units, of channels without memory; NaN where nothing was measured."""
+        """White values (m,) back in their units, of channels without memory that weigh alike; NaN where nothing
+        was measured."""
         parts = []
         for (_, T, w), (sensors, tcp) in zip(self.study.split(white), self.channels, strict=True):
             parts += [(T * sensors.sigma).ravel(), (w * tcp.sigma).ravel()]

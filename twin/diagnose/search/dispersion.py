@@ -83,10 +83,10 @@ def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
     start = begun(detector, y)
     first, weight = search(detector, y, start), np.ones(len(y))
     for _ in range(detector.policy.weighings):
-        before, weight = weight, weights_of(first, weight)
-        if np.array_equal(weight < 1.0, before < 1.0):
+        now = weights_of(first, weight)
+        if np.array_equal(now < 1.0, weight < 1.0):
             break
-        detector = weighted(described, weight)
+        weight, detector = now, weighted(described, now)
         start = begun(detector, y)
         first = search(detector, y, start)
     own = replace(dispersion_of(first), weight=weight)

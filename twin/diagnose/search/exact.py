@@ -80,14 +80,14 @@ def closer(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> 
     Every step otherwise counts what the most likely parameters of the linear model would leave: far from the minimum
     even a wrong linear model explains nearly all, and one of several strong causes leads by that alone.
     """
-    if fault_of(h).curved or not strong(detector, h, _excess(detector, fitted)):
+    if fault_of(h).curved or not strong(detector, h, excess(detector, fitted)):
         return h
     x = beginning(fitted.x, detector.policy).copy()
     found = _descended(detector, y, fitted, _Point(np.array(h.amplitude), x, h), detector.policy.window_passes, True)
     return max(h, found, key=lambda own: own.statistic)
 
 
-def _excess(detector: Detector, fitted: Fitted) -> float:
+def excess(detector: Detector, fitted: Fitted) -> float:
     """What a fit leaves beyond noise: no cause explains more."""
     return misfit(detector, fitted) - float(np.isfinite(fitted.residual).sum())
 
@@ -99,7 +99,7 @@ def _descended(
     study, policy, h = detector.study, detector.policy, now.h
     fault, q = fault_of(h), h.batch.q
     before, inner = misfit(detector, fitted), edges_of(study, h)
-    explained = _excess(detector, fitted) if closely else 0.0
+    explained = excess(detector, fitted) if closely else 0.0
     read = readings_columns(detector, h) if fault.read else np.zeros((len(y), q))
     (low, high), (mean, inverse), floor = bounds(study), fault.prior(q), lowest(detector, h)
     a = np.maximum(now.a, floor)
