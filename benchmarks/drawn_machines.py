@@ -76,10 +76,11 @@ def trials(drawn: DrawnMachine, machine: Machine, power: float) -> list[tuple[st
 
 
 def places(machine: Machine) -> dict[str, list[str]]:
-    """Where each family or kind may be hidden."""
+    """Where each family or kind may be hidden. Heat enters no side that another part is joined to."""
     sensors = [f"sensors.{n}" for n, s in machine.sensors.items() if s.environment is None]
     surfaces = [s for f in machine.films.values() for s in f.surfaces if not s.endswith("*")]
-    sides = [f"{p}.{side}" for p in machine.parts for side in ("x_max", "y_max", "z_max")]
+    joined = {s for c in machine.contacts.values() for pair in (c.surfaces or (), *c.pairs) for s in pair}
+    sides = [s for p in machine.parts for side in ("x_max", "y_max", "z_max") if (s := f"{p}.{side}") not in joined]
     return {
         "heat_source": (surfaces or sides) if machine.parts else list(machine.nodes),
         "loss_law": [f"sources.{s}" for s in machine.sources],

@@ -161,6 +161,19 @@ def test_a_parameter_is_out_of_its_tolerance_where_few_synthetic_measurements_mo
     assert pulls.strain(far, -far)[named] == 0.0  # the calibrations contradict each other
 
 
+def test_films_that_form_moves_far_hide_no_loss():
+    """Losses of a healthy machine lie within their tolerance; films pass theirs in one of ten measurements."""
+    known = parameters(small_case.machine())
+    kinds = np.array([p.kind for p in known])
+    rng = np.random.default_rng(2)
+    x = rng.uniform(-1.0, 1.0, (400, len(known)))
+    far = kinds == "film"
+    x[:, far] *= np.where(rng.random((400, far.sum())) < 0.1, 3.0, 1.0)
+    spread = Pulls.of(known, x, x).fitted
+    assert spread.limit[kinds == "source"].max() < 1.4
+    assert spread.limit[far].min() > 2.0
+
+
 def simulated(machine: Machine, seed: int, folder: Path) -> Run:
     """Two hours by the full model, without noise."""
     loads_of_run(machine, seed, folder.name, 2.0, 60.0, {}).write(folder)

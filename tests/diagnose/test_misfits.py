@@ -206,7 +206,7 @@ def test_a_number_that_one_fit_alone_is_sure_of_is_moved_by_the_other_too(monkey
     fitted, n = detector.fitter(y), len(detector.study.probed.parameters)
     unsure = lambda *_: (np.zeros(n), np.eye(n))  # noqa: E731
     monkeypatch.setattr(sys.modules[loose_ones.__module__], "settled_alone", unsure)
-    limit = detector.pulls.settled.sigma * detector.pulls.settled.limit
+    limit = detector.pulls.settled.limit
     moved = np.where(np.arange(n) == j, np.sign(fitted.x) * limit, 0.0)
     found = {own.index: own for own in loose_ones(detector, y, fitted, 0.6 * moved, Freed())}
     assert not found[j].settled

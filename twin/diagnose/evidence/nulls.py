@@ -21,7 +21,9 @@ from twin.machine.description import Machine
 from twin.rom.drive import Drive
 from twin.rom.parameter import OF_LAWS
 
-SPREAD = 0.6  # of parameters, in prior standard deviations: tolerances are stated with care
+# of parameters, in prior standard deviations: all that lies within the stated tolerance is alike likely, and nothing
+# beyond it (rectangular distribution; JCGM 100:2008, 4.3.7)
+SPREAD = 3.0**-0.5
 
 
 @dataclass(frozen=True)
@@ -72,17 +74,18 @@ class Instruments:
 
 
 def null(
-    study: Study, J: list[np.ndarray], seed: int, instruments: Instruments, form: Form = Form(), spread: float = SPREAD,
+    study: Study, J: list[np.ndarray], seed: int, instruments: Instruments, form: Form = Form(),
     differences: Sequence[Difference] = (),
 ) -> np.ndarray:  # fmt: skip
-    """Measurements (m,) of the fitted runs without a cause; NaN where the plan has none. J: nominal Jacobians by run.
+    """Measurements (m,) of the fitted runs without a cause; NaN where the plan has none.
 
-    spread: of the numbers of the description, in prior standard deviations.
+    J: nominal Jacobians by run.
     """
     rng = np.random.default_rng([seed, 17])
     probed = study.probed
-    x = np.clip(rng.standard_normal(len(probed.parameters)), -2.5, 2.5)
-    x[[p.kind not in OF_LAWS for p in probed.parameters]] *= spread
+    of_laws = np.array([p.kind in OF_LAWS for p in probed.parameters], dtype=bool)
+    within = rng.uniform(-1.0, 1.0, len(of_laws))
+    x = np.where(of_laws, np.clip(rng.standard_normal(len(of_laws)), -2.5, 2.5), within)
     (body,) = probed.base.bodies
     load = probed.base.load_model
     local = np.clip(form.local_film * rng.standard_normal(len(probed.places)), -0.8, 0.8)

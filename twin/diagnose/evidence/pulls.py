@@ -1,12 +1,13 @@
 """How far calibration moves each parameter of a machine that has nothing but its tolerances: what is far beyond that.
 
 Whether a loss 1.6 times as large is news follows from this machine's own synthetic measurements without a cause: each
-parameter's moves there have their own spread, and the farthest of all its own distribution. Two calibrations tell: the
-one that finds causes is sure of fast and local effects, the settled one of slow ones.
+parameter's moves there have their own spread, and the farthest of a kind its own distribution. Two calibrations tell:
+the one that finds causes is sure of fast and local effects, the settled one of slow ones.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,27 +16,33 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.rom.parameter import Parameter
 
 NAMED = ("source", "film", "joint", "contact", "expansion")  # kinds whose number may be named out of its tolerance
-# prior standard deviations: the least spread that is counted with, a quarter of a tolerance (chosen before any result)
-LEAST = 0.25
+LEAST = 0.75  # prior standard deviations: of its tolerance that no number is out of (chosen before any result)
 TAIL = 0.03  # of synthetic measurements that may have a parameter farther off: as of all other causes together
 
 
 @dataclass(frozen=True)
 class Spread:
-    """How far one calibration moves n parameters; infinite for those that are not named."""
+    """How far one calibration moves n parameters."""
 
-    sigma: np.ndarray  # (n,) prior standard deviations: rms
-    limit: float  # times that, beyond which a parameter is out of its tolerance
+    limit: np.ndarray  # (n,) prior standard deviations, beyond which one is out; infinite for those that are not named
 
     @classmethod
-    def of(cls, named: np.ndarray, x: np.ndarray) -> Spread:
-        """From parameters (nulls, n) of synthetic measurements; named (n,) bool."""
-        sigma = np.where(named, np.maximum(np.sqrt(np.mean(x**2, axis=0)), LEAST), np.inf)
-        return cls(sigma, tail(np.abs(x / sigma).max(axis=1, initial=0.0), TAIL))
+    def of(cls, parameters: Sequence[Parameter], x: np.ndarray) -> Spread:
+        """From parameters (nulls, n) of synthetic measurements.
+
+        By kind, as errors of form move a joint or a film farther than its tolerance does, and hardly any loss.
+        """
+        kinds = np.array([p.kind if p.scale == "log" else "" for p in parameters])
+        named = [kind for kind in NAMED if (kinds == kind).any()]
+        limit, sigma = np.full(len(kinds), np.inf), np.maximum(np.sqrt(np.mean(x**2, axis=0)), 1e-9)
+        farthest = [np.abs(x / sigma)[:, kinds == kind].max(axis=1) for kind in named]
+        for kind, most in zip(named, tails(np.array(farthest).T, TAIL) if named else (), strict=True):
+            limit[kinds == kind] = np.maximum(most * sigma[kinds == kind], LEAST)
+        return cls(limit)
 
     def strain(self, x: np.ndarray) -> np.ndarray:
         """(n,) 1 at the limit."""
-        return np.asarray(np.abs(x) / self.sigma / self.limit)
+        return np.asarray(np.abs(x) / self.limit)
 
 
 @dataclass(frozen=True)
@@ -46,10 +53,9 @@ class Pulls:
     settled: Spread
 
     @classmethod
-    def of(cls, parameters: tuple[Parameter, ...], fitted: np.ndarray, settled: np.ndarray) -> Pulls:
+    def of(cls, parameters: Sequence[Parameter], fitted: np.ndarray, settled: np.ndarray) -> Pulls:
         """From parameters (nulls, n) of synthetic measurements, by both calibrations."""
-        named = np.array([p.kind in NAMED and p.scale == "log" for p in parameters], dtype=bool)
-        return cls(Spread.of(named, fitted), Spread.of(named, settled))
+        return cls(Spread.of(parameters, fitted), Spread.of(parameters, settled))
 
     def strain(self, fitted: np.ndarray, settled: np.ndarray) -> np.ndarray:
         """(n,) 1 at the limit of how far parameters (n,) are moved; 0 where the calibrations contradict each other."""
@@ -69,10 +75,19 @@ class Loose:
     settled: bool = True  # x and sigma are those of the settled calibration
 
 
-def tail(values: np.ndarray, share: float) -> float:
-    """What a share of values like these passes, by their Gumbel tail."""
-    at, scale = gumbel(values)
-    return float(at - scale * np.log(-np.log1p(-share)))
+def tails(values: np.ndarray, share: float) -> np.ndarray:
+    """(k,) limits to (n, k) values, of which `share` of the rows pass any: Gumbel tails at one probability for all."""
+    at, scale = np.array([gumbel(own) for own in values.T]).T
+
+    def limits(p: float) -> np.ndarray:
+        return np.asarray(at - scale * np.log(-np.log1p(-p)))
+
+    low, high = 1e-6, 0.3
+    for _ in range(40):
+        p = np.sqrt(low * high)
+        passing = float(np.mean(np.any(values > limits(p), axis=1)))
+        low, high = (p, high) if passing <= share else (low, p)
+    return limits(low)
 
 
 def gumbel(values: np.ndarray) -> tuple[float, float]:

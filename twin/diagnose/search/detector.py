@@ -21,7 +21,7 @@ from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.evidence.fitter import Fitted, Fitter
 from twin.diagnose.evidence.formal import known_forms
 from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, null
-from twin.diagnose.evidence.pulls import Pulls, gumbel
+from twin.diagnose.evidence.pulls import Pulls, tails
 from twin.diagnose.evidence.settled import settled_nearly
 from twin.diagnose.evidence.sight import Columns, sight
 from twin.diagnose.evidence.unknown import heat_of
@@ -254,21 +254,10 @@ def _whitened(whiten: Whitener, raw: np.ndarray) -> np.ndarray:
 
 
 def thresholds_of(nulls: dict[str, np.ndarray], alarm: float = ALARM) -> dict[str, float]:
-    """Per family what a common probability of Gumbel tails allows, so that `alarm` of all nulls pass any of them."""
-    tails = {name: gumbel(values) for name, values in nulls.items() if len(values) and values.max() > 0.0}
-    if not tails:
-        return dict.fromkeys(nulls, FLOOR)
-    table = np.stack([nulls[name] for name in tails], axis=1)
-
-    def limits(p: float) -> np.ndarray:
-        return np.array([at - scale * np.log(-np.log1p(-p)) for at, scale in tails.values()])
-
-    low, high = 1e-6, 0.3
-    for _ in range(40):
-        p = np.sqrt(low * high)
-        share = float(np.mean(np.any(table > limits(p), axis=1)))
-        low, high = (p, high) if share <= alarm else (low, p)
-    found = dict(zip(tails, limits(low), strict=True))
+    """Per family what `alarm` of all nulls pass any of."""
+    tailed = [name for name, values in nulls.items() if len(values) and values.max() > 0.0]
+    limits = tails(np.stack([nulls[name] for name in tailed], axis=1), alarm) if tailed else ()
+    found = dict(zip(tailed, limits, strict=True))
     return {name: float(max(found.get(name, FLOOR), FLOOR)) for name in nulls}
 
 
