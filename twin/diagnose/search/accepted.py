@@ -39,6 +39,12 @@ class Accepted:
     by_run: tuple[Size, ...] = ()  # the first amplitude in each fitted run alone, after the last refit
 
 
+def as_scored(study: Study, h: Hypothesis, threshold: float = 0.0) -> Accepted:
+    """A hypothesis as a cause of the size that it scores with, before any refit; its covariance is not known yet."""
+    amplitude = np.array(h.amplitude)
+    return Accepted(h, units_of(study, h), amplitude, np.eye(len(amplitude)), h.statistic, threshold, ())
+
+
 def parameter_of(study: Study, name: str) -> int | None:
     """The parameter of this path, or of what this is called OWN; None where `[[parameters]]` leaves it out."""
     paths = [p.path for p in study.probed.parameters]

@@ -157,21 +157,29 @@ def _fitted_with(detector: Detector, y: np.ndarray, change: np.ndarray) -> float
 
 
 def _fitted_by(detector: Detector, y: np.ndarray, study: Study, enough: float) -> float:
-    """The misfit of a study with other loads, parameters fitted. Where it is below `enough`, with exact derivatives."""
-    low, high = bounds(study)
+    """The misfit of a study with other loads, parameters fitted. Where it is below `enough`, with exact derivatives:
+    where these end a surrogate of other loads does not."""
+    (low, high), policy = bounds(study), detector.policy
     x, hotter, left = np.zeros(len(low)), imitating(detector.study, study), np.inf
-    for i in range(detector.policy.exact_passes + 1):
-        if i < detector.policy.exact_passes:
-            J = detector.fitter.surrogate.at(x + hotter)[1]
-        elif left < enough:
-            J = jacobian_of(study, x)
-        else:
-            break
+
+    def step(x: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, float]:
         projector = detector.fitter.projector(J)
         white = detector.whiten(y - study.all_outputs(x) + J @ x)
-        left = float(white @ projector(white))
-        x = np.clip(projector.most_likely(white)[: len(x)], low, high)
-    return left
+        return np.clip(projector.most_likely(white)[: len(x)], low, high), float(white @ projector(white))
+
+    for _ in range(policy.exact_passes):
+        x, left = step(x, detector.fitter.surrogate.at(x + hotter)[1])
+    if left >= enough:
+        return left
+    there, least = np.full_like(x, np.inf), np.inf
+    for _ in range(policy.exact_passes):
+        if np.abs(x - there).max(initial=0.0) > policy.anew:
+            there, J = x, jacobian_of(study, x)
+        x, left = step(x, J)
+        if left > least - policy.less:
+            break
+        least = left
+    return min(least, left)
 
 
 def imitating(described: Study, corrected: Study) -> np.ndarray:

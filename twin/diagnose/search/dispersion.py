@@ -36,9 +36,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.evidence.fitter import Fitted
-from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.accepted import as_scored
 from twin.diagnose.search.contest import worth
 from twin.diagnose.search.detector import FLOOR, Detector, weighted
 from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
@@ -158,7 +157,7 @@ def _with_errors(own: Dispersion, detector: Detector, y: np.ndarray) -> Dispersi
         size = np.array(h.amplitude)
         if fault_of(h).conducts:  # no score ends at zero
             size[0] = max(size[0], detector.policy.lowest_change)
-        named = Accepted(h, units_of(detector.study, h), size, np.eye(h.batch.q), h.statistic, 0.0, ())
+        named = replace(as_scored(detector.study, h), amplitude=size)
         plain = refit(detector, y, beginning(plain.x, detector.policy), [named])[0]
     return replace(own, errors=slow_errors(detector, plain), beside=float(misfit_of_each(wide, fitted).sum()) - most)
 

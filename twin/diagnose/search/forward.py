@@ -16,11 +16,10 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.consistency import differs
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.sight import Sight
-from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
-from twin.diagnose.search.accepted import Accepted, exchanged, settled, strong
+from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, settled, strong
 from twin.diagnose.search.contest import judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.exact import beginning, excess, misfit, misfit_of_each, unexplained
@@ -70,7 +69,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
     accepted, steps = list[Accepted](), list[Step]()
     refused, fruitless, imitated = set[tuple[str, str]](), 0, False
     while True:
-        seen, ranked, step = look(detector, fitted) if accepted or refused else start.glance
+        seen, ranked, step = look(detector, fitted) if accepted else start.glance
         if restless := _restless(detector, accepted, step.parts):
             imitated = True
             fitted, accepted = _without(detector, y, fitted, accepted, restless)
@@ -119,9 +118,8 @@ def _named(
     """A strong hypothesis by what is left once it is named; unchanged where that explains no more."""
     if fault_of(h).curved or not strong(detector, h, excess(detector, fitted)):
         return h
-    own = Accepted(h, units_of(detector.study, h), np.array(h.amplitude), np.eye(h.batch.q), h.statistic, 0.0, ())
     try:
-        after, _ = refit(detector, y, beginning(fitted.x, detector.policy), [*accepted, own])
+        after, _ = refit(detector, y, beginning(fitted.x, detector.policy), [*accepted, as_scored(detector.study, h)])
     except np.linalg.LinAlgError:  # measurements beyond all reason have bent the model as far: nothing is compared
         return h
     return replace(h, statistic=max(h.statistic, misfit(detector, fitted) - misfit(detector, after)))
@@ -166,9 +164,8 @@ def _covering(detector: Detector, standing: Sequence[Hypothesis], parts: dict[st
 
 def _chosen(detector: Detector, fitted: Fitted, h: Hypothesis, ranked: Sequence[Hypothesis]) -> Accepted:
     """A hypothesis as a cause, before it is refitted beside the others; ranked: among which its rivals are."""
-    a, units = np.array(h.amplitude), units_of(detector.study, h)
-    rivals = _rivals(detector, fitted, h, ranked)
-    return Accepted(h, units, a, np.eye(len(a)), h.statistic, detector.thresholds[h.family], rivals)
+    one = as_scored(detector.study, h, detector.thresholds[h.family])
+    return replace(one, rivals=_rivals(detector, fitted, h, ranked))
 
 
 def _without(

@@ -64,13 +64,16 @@ def begun(described: Detector, y: np.ndarray) -> Start:
     glance = _with(straight, declared) if straight else first
     loose = loose_ones(detector, y, fitted, x0, freed)
     if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
-        closer = [*declared_exactly(detector, y, fitted), *misplaced_candidates(detector, y, fitted)]
-        exact = {h.name: h for h in closer}
+        factors = declared_exactly(detector, y, fitted)
+        exact = {h.name: h for h in (*factors, *misplaced_candidates(detector, y, fitted))}
         # an exact fit ends where it cannot reach half a threshold: of what promises less to first order it says nothing
         told = {h.name: h for h in declared if h.statistic < 0.5 * detector.thresholds[h.family]}
         exact |= {name: told[name] for name, h in exact.items() if name in told and h.statistic <= 0.0}
         declared = [h for h in ({h.name: h for h in declared} | exact).values() if h.statistic > 0.0]
-        glance = _with(straight, declared) if straight else look(detector, fitted, declared, known)
+        if straight:
+            glance = _with((straight[0], _unfitted(straight[1], factors), straight[2]), declared)
+        else:
+            glance = look(detector, fitted, declared, (known[0], _unfitted(known[1], factors)))
     return Start(detector, fitted, x0, covariance, first, declared, glance, loose, freed)
 
 
@@ -85,6 +88,12 @@ def _from_description(detector: Detector, y: np.ndarray, fitted: Fitted) -> Glan
     if not any(h.statistic > detector.thresholds[h.family] for h in own):
         return None
     return seen, own, replace(step, parts={part: evidence - less for part, evidence in step.parts.items()})
+
+
+def _unfitted(scores: Sequence[Hypothesis], fitted: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Scores but those of what was fitted exactly: far from the description the score of a factor says little."""
+    known = {(h.family, h.name) for h in fitted}
+    return [h for h in scores if (h.family, h.name) not in known]
 
 
 def _with(glance: Glance, declared: Sequence[Hypothesis]) -> Glance:

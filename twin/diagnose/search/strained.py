@@ -17,10 +17,9 @@ from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.evidence.sight import Sight
-from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.loss_law import is_source
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns, settled
+from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, misfit_of_each, unbent, unexplained
@@ -280,8 +279,7 @@ def _freed(
     within the tolerance."""
     policy = detector.policy
     if h.name not in known.refitted:
-        units = units_of(detector.study, h)
-        one = Accepted(h, units, np.array(h.amplitude), np.eye(1), h.statistic, policy.pulled**2, ())
+        one = as_scored(detector.study, h, policy.pulled**2)
         at, (one,) = refit(detector, y, beginning(fitted.x, policy), [one])
         known.refitted[h.name] = at, one
     fitted, one = known.refitted[h.name]
