@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from functools import cache
 
@@ -20,6 +21,7 @@ from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.search.accepted import Accepted, exchanged, jacobian
 from twin.diagnose.search.declared import (
+    _fitted_by,
     declared_candidates,
     declared_exactly,
     misplaced_candidates,
@@ -28,6 +30,7 @@ from twin.diagnose.search.declared import (
 )
 from twin.diagnose.search.exact import misfit
 from twin.diagnose.search.forward import _reads, search
+from twin.diagnose.search.start import begun
 from twin.diagnose.search.verdict import verdict_of
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
@@ -90,6 +93,26 @@ def test_the_right_factor_explains_most_by_the_exact_model():
     assert line[right] < 0.8 * exact[right]
     numbers = int(np.isfinite(y).sum())
     assert misfit(detector, fitted) - exact[right] < numbers + 4.0 * np.sqrt(2.0 * numbers)  # noise
+
+
+def test_an_exact_fit_of_a_factor_ends_where_it_stays():
+    detector, study = small_case.made_detector(), logged("spindle_speed", 2.0)
+    rng = np.random.default_rng(4)
+    y = with_noise(study, outputs(study, rng.standard_normal(len(study.probed.parameters))), rng)
+    corrected = with_signal(detector.study, "spindle_speed", 2.0)
+    further = replace(detector, policy=replace(detector.policy, exact_passes=12))
+    left, then = (_fitted_by(own, y, corrected, np.inf) for own in (detector, further))
+    assert left == pytest.approx(then, abs=detector.policy.close)
+
+
+def test_a_factor_counts_by_its_exact_fit_and_not_by_its_score(monkeypatch):
+    detector, y = small_case.made_detector(), of_another("spindle_speed")
+    factors = declared_exactly(detector, y, detector.fitter(y))
+    less = [replace(h, statistic=1.0) for h in factors if h.statistic > 0.0]
+    monkeypatch.setattr(sys.modules[begun.__module__], "declared_exactly", lambda *_: less)
+    ranked = {h.name: h.statistic for h in begun(detector, y).glance[1]}
+    assert less
+    assert all(ranked[h.name] == h.statistic for h in less)
 
 
 def test_it_is_named_without_another_explanation():
