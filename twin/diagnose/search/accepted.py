@@ -86,8 +86,9 @@ def jacobian(detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesi
 
 def strong(detector: Detector, h: Hypothesis, explained: float) -> bool:
     """Whether an error of a twentieth of the response to a cause that explains so much would pass for another cause.
-    Not where it has the place of a parameter, beside whose change the surrogate knows what others do."""
-    if detector.policy.misfit * explained <= min(detector.thresholds.values()):
+    Not where it has the place of a parameter, beside whose change the surrogate knows what others do. A source that is
+    elsewhere is, whatever it explains: the surrogate knows what its number does where the source is not."""
+    if detector.policy.misfit * explained <= (0.0 if fault_of(h).elsewhere else min(detector.thresholds.values())):
         return False
     return bool(units_of(detector.study, h)) and not freed(detector.study, h)
 

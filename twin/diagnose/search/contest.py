@@ -19,7 +19,7 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import edges_of, longer
-from twin.diagnose.search.exact import by_chance, closer, exact, misfit
+from twin.diagnose.search.exact import by_chance, closer, exact, misfit, reached
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
@@ -169,14 +169,20 @@ def _closely(
 ) -> list[Hypothesis]:  # fmt: skip
     """Candidates in order, once the strong ones among those near the leader are fitted closer: few, and where the
     leader leaves more than chance, for derivatives beside a cause take as long as a calibration. Of several, each then
-    is named: one may lead by the errors of another one's response, which channels show otherwise than the model."""
-    policy = detector.policy
-    if order and misfit(detector, fitted) - order[0].statistic <= by_chance(fitted.residual, policy):
-        return list(order)
-    worthy = partial(worth, policy=policy)
+    is named: one may lead by the errors of another one's response, which channels show otherwise than the model.
+
+    Where a source may be elsewhere or heat be missing, whatever the leader leaves: to first order a source loses all of
+    its heat for a few units, and what is missing where it really is does the same."""
+    policy, worthy = detector.policy, partial(worth, policy=detector.policy)
     least = (1.0 - policy.behind) * max((worthy(h) for h in order), default=0.0)
-    near = [closer(detector, y, fitted, h) for h in order[: policy.closest] if worthy(h) > least]
-    compared = [named(h) for h in near] if len(near) > 1 else near
+    near = [h for h in order[: policy.closest] if worthy(h) > least]
+    if len({fault_of(h).elsewhere for h in near}) > 1:
+        compared = [reached(detector, y, fitted, h) for h in near]
+    elif order and misfit(detector, fitted) - order[0].statistic <= by_chance(fitted.residual, policy):
+        return list(order)
+    else:
+        compared = [closer(detector, y, fitted, h) for h in near]
+        compared = [named(h) for h in compared] if len(near) > 1 else compared
     return sorted([*compared, *order[len(near) :]], key=worthy, reverse=True)
 
 

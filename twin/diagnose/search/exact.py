@@ -82,9 +82,16 @@ def closer(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> 
     """
     if fault_of(h).curved or not strong(detector, h, excess(detector, fitted)):
         return h
+    return max(h, reached(detector, y, fitted, h), key=lambda own: own.statistic)
+
+
+def reached(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+    """A hypothesis that has been compared, by what the parameters that are reached leave; unchanged where its size is
+    known or does not act in proportion."""
+    if fault_of(h).curved or h.batch.fixed:
+        return h
     x = beginning(fitted.x, detector.policy).copy()
-    found = _descended(detector, y, fitted, _Point(np.array(h.amplitude), x, h), detector.policy.window_passes, True)
-    return max(h, found, key=lambda own: own.statistic)
+    return _descended(detector, y, fitted, _Point(np.array(h.amplitude), x, h), detector.policy.window_passes, True)
 
 
 def excess(detector: Detector, fitted: Fitted) -> float:
