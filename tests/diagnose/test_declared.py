@@ -20,6 +20,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.study import Study, make_study
 from twin.diagnose.search.accepted import Accepted, exchanged, jacobian
+from twin.diagnose.search.contest import _closely
 from twin.diagnose.search.declared import (
     _fitted_by,
     declared_candidates,
@@ -30,7 +31,8 @@ from twin.diagnose.search.declared import (
 )
 from twin.diagnose.search.exact import misfit
 from twin.diagnose.search.forward import _reads, search
-from twin.diagnose.search.start import begun
+from twin.diagnose.search.look import look
+from twin.diagnose.search.start import afresh, begun
 from twin.diagnose.search.verdict import verdict_of
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
@@ -167,16 +169,21 @@ def test_beside_a_corrected_signal_parameters_do_what_they_do_at_its_heat():
     assert not np.allclose(anew, detector.fitter.surrogate.at(x)[1], rtol=0.2)
 
 
-def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description():
+@cache
+def with_the_front_source_at_the_housing() -> np.ndarray:
+    """(m,) of a machine whose front bearing heats the housing."""
     text = (lumped_case.FOLDER / "machine.toml").read_text("utf-8")
     elsewhere = text.replace('surface = "bearing_front"', 'surface = "housing"')
     assert elsewhere != text
     machine = load_machine(lumped_case.FOLDER / "machine.toml", elsewhere)
-    study, detector = small_case.study(), small_case.made_detector()
     own = make_probed_model(machine, parameters(machine), small_case.runs())
     other = with_film_laws(replace(small_case.described(), probed=own), small_case.form())
-    x = 0.5 * np.random.default_rng(4).standard_normal(len(study.probed.parameters))
-    y = with_noise(study, outputs(other, x), np.random.default_rng(5))
+    x = 0.5 * np.random.default_rng(4).standard_normal(len(small_case.study().probed.parameters))
+    return with_noise(small_case.study(), outputs(other, x), np.random.default_rng(5))
+
+
+def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description():
+    detector, y = small_case.made_detector(), with_the_front_source_at_the_housing()
     fitted = detector.fitter(y)
     best = max(misplaced_candidates(detector, y, fitted), key=lambda h: h.statistic)
     assert best.name == "sources.front>housing"
@@ -186,6 +193,21 @@ def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description
         "named", "misplaced_source", "sources.front", "housing"
     )  # fmt: skip
     assert cause.ci95[0] < 1.0 < cause.ci95[1]
+
+
+def test_heat_where_a_source_really_is_does_not_pass_for_it_by_a_loss_that_only_a_line_takes_away():
+    detector, y = afresh(small_case.made_detector()), with_the_front_source_at_the_housing()
+    fitted = detector.fitter(y)
+    elsewhere = max(misplaced_candidates(detector, y, fitted), key=lambda h: h.statistic)
+    missing = max(
+        (h for h in look(detector, fitted)[1] if h.family == "heat_source" and h.name == "housing"),
+        key=lambda h: h.statistic,
+    )
+    missing = replace(missing, statistic=elsewhere.statistic + 10.0)
+    found = _closely(detector, y, fitted, [missing, elsewhere], lambda h: h)
+    assert [h.family for h in found] == ["misplaced_source", "heat_source"]
+    assert found[0].statistic > elsewhere.statistic > found[1].statistic
+    assert found[0].amplitude[0] == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_signal_is_misread_by_what_its_unit_allows():
