@@ -81,6 +81,16 @@ def test_heat_that_goes_down_by_steps_is_no_window(watts, leave, monkeypatch):
     assert (verdict_of(found, FAMILIES)[0] == "unknown") != leave
 
 
+@pytest.mark.parametrize(("share", "verdict"), [(0.3, "named"), (0.5, "unknown")])
+def test_what_calibration_had_imitated_is_no_small_part_of_what_is_left(share, verdict):
+    """What is left counts against what the cause explains, also where a fit without it leaves little heat."""
+    found = search(small_case.made_detector(), measured("heat", "housing", 400.0, seed=3))
+    left = {"housing": share * found.accepted[0].statistic}
+    steps = tuple(replace(step, parts=left) for step in found.steps)
+    assert min(left.values()) > found.detector.thresholds["unknown"]
+    assert verdict_of(replace(found, steps=steps), FAMILIES)[0] == verdict
+
+
 def test_a_second_cause_explains_more_than_the_first_ones_misfits(monkeypatch):
     study, y = small_case.study(), measured("heat", "housing", 400.0, seed=3)
     first = 0

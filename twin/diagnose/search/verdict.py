@@ -111,9 +111,10 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     groups = {f.name: f.group for f in families}
     thresholds, policy = found.detector.thresholds, found.detector.policy
     left = max(found.steps[-1].parts.values(), default=0.0)
-    # a declared number out of its tolerance had been fitted before, as far as its tolerance went
-    relaxed = [a.statistic for a in found.accepted if freed(found.detector.study, a.hypothesis)]
-    before = max([*found.steps[0].parts.values(), *relaxed], default=0.0)
+    relaxed = any(freed(found.detector.study, a.hypothesis) for a in found.accepted)
+    # calibration had imitated what is in the machine before, as far as tolerances went
+    imitated = [a.statistic for a in found.accepted if a.units or fault_of(a.hypothesis).parameter]
+    before = max([*found.steps[0].parts.values(), *imitated], default=0.0)
     causes = tuple(cause_of(a, found.detector.study, found.detector.policy) for a in found.accepted)
     much = left > thresholds["unknown"] and (not causes or left > policy.remainder * before)
     if much and not _more_alike(found, left):
@@ -127,7 +128,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         return "ambiguous" if strained[0].rivals else "out_of_tolerance", strained
     chosen, lead = found.accepted[0], found.accepted[0].hypothesis
     # a tolerance tells it, and it has passed no threshold: what explains as much was chosen with it
-    unproved = bool(relaxed) and chosen.threshold < thresholds[lead.family]
+    unproved = relaxed and chosen.threshold < thresholds[lead.family]
     for other, _ in chosen.rivals:
         alike = other.family == lead.family and Spot.read(other.name).owner == Spot.read(lead.name).owner
         # two histories of one place, and two factors of one signal, are written otherwise into the description
