@@ -76,13 +76,11 @@ def trials(drawn: DrawnMachine, machine: Machine, power: float) -> list[tuple[st
 
 
 def places(machine: Machine) -> dict[str, list[str]]:
-    """Where each family or kind may be hidden. Heat enters no side that another part is joined to."""
+    """Where each family or kind may be hidden."""
     sensors = [f"sensors.{n}" for n, s in machine.sensors.items() if s.environment is None]
     surfaces = [s for f in machine.films.values() for s in f.surfaces if not s.endswith("*")]
-    joined = {s for c in machine.contacts.values() for pair in (c.surfaces or (), *c.pairs) for s in pair}
-    sides = [s for p in machine.parts for side in ("x_max", "y_max", "z_max") if (s := f"{p}.{side}") not in joined]
     return {
-        "heat_source": (surfaces or sides) if machine.parts else list(machine.nodes),
+        "heat_source": (surfaces or _sides(machine)) if machine.parts else list(machine.nodes),
         "loss_law": [f"sources.{s}" for s in machine.sources],
         "joint": [f"contacts.{c}" for c in machine.contacts],
         "film_gain": [f"films.{f}" for f in machine.films],
@@ -92,6 +90,13 @@ def places(machine: Machine) -> dict[str, list[str]]:
         "swapped": sensors if len(sensors) > 2 else [],
         "factor": [f"signals.{n}" for n, s in machine.signals.items() if str(s.unit) == "A"],
     }
+
+
+def _sides(machine: Machine) -> list[str]:
+    """Three of every box, where heat may enter: no other part is joined to them."""
+    joined = {s for c in machine.contacts.values() for pair in (c.surfaces or (), *c.pairs) for s in pair}
+    sides = [f"{part}.{side}" for part in machine.parts for side in ("x_max", "y_max", "z_max")]
+    return [side for side in sides if side not in joined]
 
 
 def answer(row: Row) -> str:
