@@ -197,6 +197,7 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
 
     monkeypatch.setattr(contest, "exact", exact)
     monkeypatch.setattr(contest, "longer", lambda study, elements, h: h)
+    monkeypatch.setattr(contest, "without_one", lambda study, h: [])
     nothing = np.zeros(0)
     far = replace(wetted, statistic=0.2 * behind.statistic)
     order = tried(SEARCHED, nothing, None, [(heat,), (behind,), (wetted, cold), (far,)])
@@ -225,9 +226,26 @@ def test_a_coolant_is_tried_in_longer_windows_while_they_explain_more(monkeypatc
     monkeypatch.setattr(
         contest, "longer", lambda study, elements, h: replace(h, amplitude=(2.0 * h.amplitude[0], -1.0))
     )
-    found = contest._longest(small_case.made_detector(), np.zeros(0), None, a_coolant(1, 1.0, -1.0))
+    found = contest._in_other_windows(small_case.made_detector(), np.zeros(0), None, a_coolant(1, 1.0, -1.0))
     assert found.statistic == 400.0
     assert tries == [2.0, 4.0, 8.0]
+
+
+def test_a_coolant_is_tried_without_a_window_that_explains_nothing(monkeypatch):
+    contest, detector = sys.modules[worth.__module__], small_case.made_detector()
+    first, second = (detector.study.runs[k].run.name for k in detector.study.fitted)
+    right, wrong = Window(first, 3600.0, 7200.0), Window(second, 3600.0, 7200.0)
+    one = a_coolant(1, 20.0, -20.0)
+    both = replace(one, when=replace(one.when, windows=(right, wrong)))
+
+    def exact(detector, y, fitted, h, most):
+        return replace(h, statistic=150.0 if h.when.windows == (right,) else 50.0)
+
+    monkeypatch.setattr(contest, "exact", exact)
+    monkeypatch.setattr(contest, "longer", lambda study, elements, h: h)
+    found = contest._in_other_windows(detector, np.zeros(0), None, both)
+    assert found.when.windows == (right,)
+    assert found.when.name == f"from 1.0 h to 2.0 h of {first}"
 
 
 def test_a_capacity_further_behind_is_refitted(monkeypatch):

@@ -207,7 +207,7 @@ def test_what_leaps_from_reading_to_reading_is_noise_of_that_channel():
     np.testing.assert_array_equal(weight, own.weight)  # by which limits are stated
     assert weight[channel == 0] == pytest.approx(1.0 / np.hypot(1.0, 5.0), rel=0.3)  # the rest is fitted
     assert weight[channel != 0].min() > 0.7  # a fit that leaps have drawn aside leaves more
-    _, slow = searched(detector, measured(seed=4) + slow_discrepancy(0.1))
+    _, slow = searched(detector, measured(seed=4) + slow_discrepancy(0.08))
     assert 1.0 < slow.share < POLICY.dispersed
     assert slow.lasting > 0.5 * (slow.left - slow.measured)
     assert slow.least(POLICY) == 0.5 * slow.lasting > 36.0 * slow.share
@@ -252,11 +252,12 @@ def test_slow_errors_of_channels_are_not_held_against_a_cause():
 @pytest.mark.slow
 def test_what_is_left_beyond_noise_must_be_explained_by_less_than_a_cause():
     detector = small_case.made_detector()
-    found, own = searched(detector, measured(seed=4) + slow_discrepancy(0.09))
+    found, own = searched(detector, measured(seed=4) + slow_discrepancy(0.07))
     assert 1.3 < own.share < POLICY.dispersed
     assert verdict_of(found, FAMILIES)[0] != "too_poor"
-    least = 0.5 * (own.left - own.measured)
+    least = 0.5 * own.lasting
     assert found.detector.least == least > 36.0
+    assert 0.5 * (own.left - own.measured) < own.lasting <= own.left - own.measured
     assert min(found.detector.thresholds.values()) == pytest.approx(max(least, min(detector.thresholds.values())))
     named, same = searched(detector, measured("heat", "housing", 400.0, seed=3) + slow_discrepancy(0.07))
     assert same.share < POLICY.dispersed
@@ -271,7 +272,7 @@ def test_where_the_fit_bends_parameters_others_score_little_at_the_description()
     assert max(h.statistic for h in others) > 0.5 * lead.statistic
     lead, *others = start.glance[1]
     assert (lead.family, lead.name, lead.when.name) == ("heat_source", "housing", "always")
-    assert max(h.statistic for h in others) < 0.25 * lead.statistic
+    assert max(h.statistic for h in others) < 0.35 * lead.statistic
 
 
 @pytest.mark.parametrize(("size", "bent"), [(0.0, False), (3000.0, True)])

@@ -18,7 +18,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.edges import edges_of, longer
+from twin.diagnose.search.edges import edges_of, longer, without_one
 from twin.diagnose.search.exact import by_chance, closer, exact, misfit, reached
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
@@ -103,28 +103,32 @@ def tried(
     detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
 ) -> list[Sequence[Hypothesis]]:
     """Candidates of `judged`, most worthy first. Where a coolant leads, it and others within `saturates` have been
-    refitted for some passes, from the last of their starts and in ever longer windows: a film saturates most at the
-    wetted face, which linearity would leave aside, and within the hour, where linearity ends its window."""
+    refitted for some passes, from the last of their starts, in ever longer windows and in fewer: a film saturates most
+    at the wetted face, which linearity would leave aside, and within the hour, where linearity ends its window."""
     order = sorted(candidates, key=lambda starts: -worth(starts[0], detector.policy))
     if not order or not fault_of(order[0][0]).wets:
         return order
     least = (1.0 - detector.policy.saturates) * worth(order[0][0], detector.policy)
     passed = [
-        (_longest(detector, y, fitted, exact(detector, y, fitted, starts[-1], detector.policy.trial)),)
+        (_in_other_windows(detector, y, fitted, exact(detector, y, fitted, starts[-1], detector.policy.trial)),)
         if fault_of(starts[0]).wets and worth(starts[0], detector.policy) > least else starts
         for starts in order
     ]  # fmt: skip
     return sorted(passed, key=lambda starts: -worth(starts[0], detector.policy))
 
 
-def _longest(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
-    """A refitted coolant in windows twice as long, and so on, while that explains more."""
-    while (start := longer(detector.study, detector.elements, h)) is not h:
-        found = exact(detector, y, fitted, start, detector.policy.trial)
-        if found.statistic <= h.statistic:
-            break
-        h = found
-    return h
+def _in_other_windows(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+    """A refitted coolant in windows twice as long, or without one of them, and so on, while that explains more: they
+    were chosen by scores that take its film as linear."""
+    study, policy = detector.study, detector.policy
+    worthy = partial(worth, policy=policy)
+    while True:
+        starts = [s for s in (longer(study, detector.elements, h), *without_one(study, h)) if s is not h]
+        tried_ones = (exact(detector, y, fitted, s, policy.trial) for s in starts)
+        best = max(tried_ones, key=worthy, default=h)
+        if worthy(best) <= worthy(h):
+            return h
+        h = best
 
 
 def _fair(

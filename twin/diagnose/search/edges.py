@@ -101,6 +101,13 @@ def longer(study: Study, elements: Elements, h: Hypothesis) -> Hypothesis:
     return moved(study, elements, h, shifts) if any(by > 0.0 for _, by in shifts) else h
 
 
+def without_one(study: Study, h: Hypothesis) -> list[Hypothesis]:
+    """The hypothesis without each of its windows in turn; none where it has a single one."""
+    windows, spans = h.when.windows, _spans(study)
+    fewer = [(*windows[:i], *windows[i + 1 :]) for i in range(len(windows) if len(windows) > 1 else 0)]
+    return [replace(h, when=replace(h.when, name=named(left, spans), windows=left)) for left in fewer]
+
+
 def named(windows: Sequence[Window], spans: dict[str, float]) -> str:
     """Windows in words; spans: when every run ends [s]."""
     first, runs = windows[0], [w.run for w in windows]

@@ -83,7 +83,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         rest = exchanged(detector.study, y, accepted)
         named = partial(_named, detector, y, fitted, accepted)
         proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead[: policy.ahead]), named)
-        standing = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
+        standing = [h for h in proved if proof(detector, h) > policy.named * limits[h.family] and _possible(h)]
         if not any(proof(detector, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
@@ -245,6 +245,11 @@ def _parts(study: Study, name: str) -> set[str]:
     if spot.of is Of.FILM:
         return {Spot.read(p.name).part for p in study.probed.places if p.film == spot.name}
     return {spot.part}
+
+
+def _possible(h: Hypothesis) -> bool:
+    """Whether a hypothesis has a size that physics allows."""
+    return h.batch.fixed or h.batch.possible(h.place, h.amplitude[0])
 
 
 def stands(detector: Detector, a: Accepted) -> bool:
