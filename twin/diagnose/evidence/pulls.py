@@ -16,7 +16,8 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.rom.parameter import Parameter
 
 NAMED = ("source", "film", "joint", "contact", "expansion")  # kinds whose number may be named out of its tolerance
-LEAST = 0.75  # prior standard deviations: of its tolerance that no number is out of (chosen before any result)
+# prior standard deviations: no limit is lower; three times a spread of a quarter of a tolerance (before any result)
+LEAST = 0.75
 TAIL = 0.03  # of synthetic measurements that may have a parameter farther off: as of all other causes together
 
 
