@@ -195,7 +195,7 @@ def test_all_the_heat_of_a_source_at_another_node_is_judged_from_the_description
     assert cause.ci95[0] < 1.0 < cause.ci95[1]
 
 
-def test_heat_where_a_source_really_is_does_not_pass_for_it_by_a_loss_that_only_a_line_takes_away():
+def test_a_source_elsewhere_leads_missing_heat_by_what_both_leave():
     detector, y = afresh(small_case.made_detector()), with_the_front_source_at_the_housing()
     fitted = detector.fitter(y)
     elsewhere = max(misplaced_candidates(detector, y, fitted), key=lambda h: h.statistic)

@@ -161,7 +161,7 @@ def test_a_parameter_is_out_of_its_tolerance_where_few_synthetic_measurements_mo
     assert pulls.strain(far, -far)[named] == 0.0  # the calibrations contradict each other
 
 
-def test_films_that_form_moves_far_hide_no_loss():
+def test_the_limit_of_losses_does_not_follow_the_discrepancy_of_films():
     """Losses of a healthy machine lie within their tolerance; films pass theirs in one of ten measurements."""
     known = parameters(small_case.machine())
     kinds = np.array([p.kind for p in known])

@@ -31,7 +31,7 @@ class Spread:
     def of(cls, parameters: Sequence[Parameter], x: np.ndarray) -> Spread:
         """From parameters (nulls, n) of synthetic measurements.
 
-        By kind: model discrepancy moves a joint or a film farther than its tolerance does, and hardly any loss.
+        One limit per kind: model discrepancy biases joints and films by more than their tolerances, losses by less.
         """
         kinds = np.array([p.kind if p.scale == "log" else "" for p in parameters])
         named = [kind for kind in NAMED if (kinds == kind).any()]
