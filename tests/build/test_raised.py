@@ -104,7 +104,7 @@ def test_a_mesh_has_the_heights_of_one_that_is_drawn_elsewhere():
     assert [body.raised is None for body in full.thermal.bodies] == [True, False]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_one_body_of_all_has_the_heights_of_each(tmp_path):
     """What calibrations step: bodies together in one basis."""
     climbing(tmp_path)

@@ -113,7 +113,7 @@ def absolute(certificate: dict[str, Any]) -> bool:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 20))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
 def test_build_and_verify_judge_a_symmetric_machine_by_its_absolute_limits(tmp_path: Path, seed: int) -> None:
     """A reduced model of few states, near its limits, whose dx is wrong by many percent of next to nothing."""
     machine, artefact = tmp_path / "machine.toml", tmp_path / "mill.h5"

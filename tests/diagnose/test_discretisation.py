@@ -68,7 +68,7 @@ def test_bars_of_finer_elements_tell_the_error_of_the_described_ones(both):
     )  # the nut heats within an element: less than second order
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_difference_follows_the_parameters(both):
     study = small_case.described()
     n = len(study.probed.parameters)

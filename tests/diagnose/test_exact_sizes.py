@@ -180,7 +180,7 @@ def test_a_wrong_factor_of_the_one_signal_that_a_source_reads_is_its_rival(sourc
     assert all("instrument" in remedy for remedy in rivals.values())
 
 
-@pytest.mark.parametrize("film", [50.0, 200.0])
+@pytest.mark.parametrize("film", [50.0, pytest.param(200.0, marks=pytest.mark.slow)])
 def test_a_liquid_is_found_with_its_film_and_its_temperature_while_the_air_drifts(film):
     study, degrees = small_case.study(), 12.0
     probed, k = study.probed, study.fitted[0]

@@ -26,7 +26,7 @@ DESCRIBED = 6.0  # W/(m^2 K), of films.air
 RADIATION = 5.2  # W/(m^2 K) of a surface of emissivity 0.9 at 22 degC: 4 sigma eps T^3
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_laminar_free_convection_where_a_constant_is_described():
     """The film's gain and its exponent explain all but a tenth of what both machines differ by: that of 1/4 in what
     convection is of the film."""

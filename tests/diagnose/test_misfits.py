@@ -71,7 +71,9 @@ def test_one_window_may_leave_no_heat_but_a_strong_ones_misfits():
     assert not _leaking(detector, [always], {"elsewhere": amounts[-1]})
 
 
-@pytest.mark.parametrize(("watts", "leave"), [(60.0, True), (60.0, False), (300.0, False)])
+@pytest.mark.parametrize(
+    ("watts", "leave"), [(60.0, True), (60.0, False), pytest.param(300.0, False, marks=pytest.mark.slow)]
+)
 def test_heat_that_goes_down_by_steps_is_no_window(watts, leave, monkeypatch):
     """It is named as one only where windows may leave what they like."""
     if leave:

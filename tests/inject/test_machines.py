@@ -267,13 +267,13 @@ def real_response(made: DrawnMachine, folder: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 2, 3))])
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 def test_a_real_network_gets_warm_and_moves(seed, tmp_path):
     real_response(drawn(seed, "lumped"), tmp_path)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_real_machine_of_boxes_gets_warm_and_moves(seed, tmp_path):
     real_response(drawn(seed, "boxes"), tmp_path)
 

@@ -33,7 +33,7 @@ WANTED = (
     Channel("coolant", "degC", True, 20.0, 10.0, 40.0),  # has a default, and no name in the standard
 )
 OWN = replace(FACTS, channels=WANTED, axis_channels=(0,))
-LONG = pytest.mark.long  # a server starts in seconds
+LONG, SLOW = pytest.mark.long, pytest.mark.slow  # a server starts in seconds
 UNITS = {"mm": "MMT", "deg": "DD", "Nm": "NU", "rpm": "RPM", "kW": "KWT"}
 
 
@@ -160,9 +160,9 @@ def test_a_file_says_what_the_server_calls_a_drive_and_names_the_rest(machine, t
     ("begun", "told"),
     [
         ({"axes": ("Y", "B")}, r"axes Y, B, spindles S1\): x_position: no axis is called 'x'; x_torque: no drive"),
-        pytest.param({"spindles": ("S1", "S2")}, "spindle_speed: no spindle is called 'spindle'", marks=LONG),
-        pytest.param({"interfaces": 2}, "x_position: 2 drives are called 'x'", marks=LONG),
-        pytest.param({"unit": ""}, "x_position: the server states no unit of it", marks=LONG),
+        pytest.param({"spindles": ("S1", "S2")}, "spindle_speed: no spindle is called 'spindle'", marks=SLOW),
+        pytest.param({"interfaces": 2}, "x_position: 2 drives are called 'x'", marks=SLOW),
+        pytest.param({"unit": ""}, "x_position: the server states no unit of it", marks=SLOW),
         pytest.param({"unit": "kW"}, "x_position: is in kW", marks=LONG),
     ],
 )

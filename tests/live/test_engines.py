@@ -117,7 +117,7 @@ def test_a_state_goes_on_bit_by_bit(engine, spindle, compiled):
     assert one.displacements() == other.displacements()
 
 
-@pytest.mark.parametrize("engine", ["c", "jax"])
+@pytest.mark.parametrize("engine", ["c", pytest.param("jax", marks=pytest.mark.slow)])
 def test_the_struts_of_a_platform_are_corrected(engine, hexapod, tmp_path):
     """Twenty minutes of paths in all six directions: offsets are those of `twin correction`."""
     run = shutil.copytree(HEXAPOD / "runs" / "mixed_paths", tmp_path / "run")

@@ -94,8 +94,13 @@ def test_order_of_convergence_against_the_exact_exponential(integrated, tableau)
 
 
 @TABLEAUS
-@pytest.mark.parametrize("projection", ["galerkin", "oblique"])
-@pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.parametrize(
+    ("substeps", "projection"),
+    [
+        (3, "oblique"),
+        *(pytest.param(*more, marks=pytest.mark.slow) for more in ((1, "galerkin"), (1, "oblique"), (3, "galerkin"))),
+    ],
+)
 @pytest.mark.long
 def test_host_and_jax_give_the_same_states_and_close_the_heat_balance(tableau, projection, substeps):
     """Axes move; factors exact."""

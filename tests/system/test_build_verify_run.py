@@ -167,7 +167,9 @@ def test_equal_input_gives_an_equal_file(built_artefact, tmp_path, monkeypatch):
     assert contents[0] == contents[1]
 
 
-@pytest.mark.parametrize("stage", ["meshes", "rich basis", "compact against rich"])
+@pytest.mark.parametrize(
+    "stage", ["rich basis", *(pytest.param(s, marks=pytest.mark.slow) for s in ("meshes", "compact against rich"))]
+)
 @pytest.mark.long
 def test_interrupted_build_leaves_nothing_and_can_be_repeated(tmp_path, stage):
     target = tmp_path / "slide.h5"

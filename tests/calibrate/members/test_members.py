@@ -128,7 +128,7 @@ def test_held_out_rows_are_not_seen():
     assert (one > 0.0).all()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_beside_a_machine_of_parts(tmp_path):
     """What follows the wall is named beside parts, too, and what is written computes what was found."""
     machine = planted.machine(tmp_path / "box", planted_box.TEXT)

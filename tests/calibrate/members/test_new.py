@@ -38,7 +38,7 @@ def logs(tmp_path_factory):
     return [write_log(folder / f"day_{seed}.csv", planted.measured(real, seed)) for seed in range(6)]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_network_beats_the_regression_and_runs(logs, tmp_path):
     out = tmp_path / "found"
     arguments = ["new", str(out), *(f"--from-log={p}" for p in logs[:4]), *(f"--sealed={p}" for p in logs[4:])]
