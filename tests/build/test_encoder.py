@@ -21,8 +21,9 @@ from twin.build.springs import spring_system
 from twin.build.structure import Structure, assemble_structure
 from twin.errors import DescriptionError
 from twin.machine.bodies import bodies_of
-from twin.machine.description import Axis, Box, Contact, Encoder, Machine, Part, Support, TcpSide
+from twin.machine.description import Axis, Box, Contact, Encoder, Machine, Part, Support
 from twin.machine.load import load_machine
+from twin.machine.tcp import TcpSide
 
 SLIDE = Path(__file__).parents[1] / "machines" / "slide" / "machine.toml"
 POSITIONS = [-0.2, -0.113, 0.0, 0.05, 0.2]  # m

@@ -9,9 +9,10 @@ import numpy as np
 from twin.build.lumped_body import LumpedBody, borders, row, unit
 from twin.build.scales import added_scale
 from twin.errors import DescriptionError
-from twin.machine.description import Machine, Scale, Strut
+from twin.machine.description import Machine, Scale
 from twin.machine.kinematics import direction, linear_axes, rail_moves
 from twin.machine.platform import geometry_of, struts_of
+from twin.machine.tcp import Strut
 from twin.rom.lumped_structure import LumpedStructure, Screw
 from twin.rom.scales import AddedScale
 from twin.rom.struts import Growth, Spread, StrutPlatform

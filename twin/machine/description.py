@@ -8,63 +8,42 @@ All part meshes are in machine coordinates [m] with every axis at position zero.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import core_schema
+from pydantic import Field
 
-from twin.units import machine_temperature, surroundings_temperature, to_si
+from twin.machine.quantities import (
+    Acceleration,
+    Area,
+    Capacity,
+    Conductance,
+    Conductivity,
+    Density,
+    Entry,
+    Expansion,
+    FilmCoefficient,
+    HeatCapacity,
+    Jerk,
+    Length,
+    Mass,
+    Point,
+    Pressure,
+    Speed,
+    Stiffness,
+    Surroundings,
+    Temperature,
+    TemperatureDifference,
+    TemperatureGradient,
+    Vector,
+    Volume,
+)
+from twin.machine.tcp import Strut, Tcp
 
 # W/(m^2 K), and W/K of lumped machines: a micrometre of copper has 4e8. Tighter contacts are one part, and beside them
 # whatever else conducts is lost to rounding.
 TIGHTEST = 1e9
 BOX_SURFACES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
-
-
-@dataclass(frozen=True)
-class _Quantity:
-    """Turn '120 mm' (or a bare SI number) into SI and check the dimension; editors learn that both may be written."""
-
-    unit: str
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        return core_schema.no_info_before_validator_function(lambda v: to_si(v, self.unit), handler(source))
-
-    def __get_pydantic_json_schema__(
-        self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return {"type": ["number", "string"], "description": f"SI number or a string with a unit of {self.unit}"}
-
-
-Length = Annotated[float, _Quantity("m")]
-Temperature = Annotated[float, AfterValidator(machine_temperature), _Quantity("degC")]  # a point on the scale, degC
-Surroundings = Annotated[float, AfterValidator(surroundings_temperature), _Quantity("degC")]
-TemperatureDifference = Annotated[float, _Quantity("K")]
-Conductivity = Annotated[float, _Quantity("W/(m*K)")]
-Density = Annotated[float, _Quantity("kg/m^3")]
-HeatCapacity = Annotated[float, _Quantity("J/(kg*K)")]
-Pressure = Annotated[float, _Quantity("Pa")]
-Expansion = Annotated[float, _Quantity("1/K")]
-FilmCoefficient = Annotated[float, _Quantity("W/(m^2*K)")]
-Stiffness = Annotated[float, _Quantity("N/m")]
-Speed = Annotated[float, _Quantity("m/s")]
-Acceleration = Annotated[float, _Quantity("m/s^2")]
-Jerk = Annotated[float, _Quantity("m/s^3")]
-TemperatureGradient = Annotated[float, _Quantity("K/m")]
-Area = Annotated[float, _Quantity("m^2")]
-Volume = Annotated[float, _Quantity("m^3")]
-Mass = Annotated[float, _Quantity("kg")]
-Capacity = Annotated[float, _Quantity("J/K")]
-Conductance = Annotated[float, _Quantity("W/K")]
-DisplacementPerKelvin = Annotated[float, _Quantity("m/K")]
-Vector = tuple[float, float, float]
-Point = tuple[Length, Length, Length]
-
-
-class Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def _not_given() -> float:
@@ -273,33 +252,6 @@ class Sensor(Entry):
     environment: str | None = None  # a sensor in the air
 
 
-class TcpSide(Entry):
-    """The patch whose mean displacement and tilt carry the point (paper 000, Fig. 6)."""
-
-    surface: str  # "part.surface"
-    point: Point | None = None  # tool side only: the tool centre point at axis positions zero
-
-
-class Strut(Entry):
-    """Of a parallel machine: what sets the distance between a joint on the frame and one on the platform."""
-
-    axis: str  # linear: its position zero is the length between `base` and `joint`, positive is longer
-    base: Point  # centre of the joint on the frame
-    joint: Point  # of that on the platform, at axis positions zero
-    screw: str  # bar; from its fixed end to the nut it adds its growth to the length
-    growth: dict[str, DisplacementPerKelvin] = {}  # m/K that the strut gains per kelvin of a node, or of a bar's mean
-
-
-class Platform(Entry):
-    """Of a parallel machine: a platform that six [struts] carry."""
-
-    side: Literal["tool", "work"] = "tool"  # that it carries
-    point: Point  # tool centre point at axis positions zero
-    moving: str | None = None  # node whose expansion spreads the joints of the platform about the point
-    frame: str | None = None  # node whose expansion spreads the joints of the frame about `ground`
-    ground: Point = (0.0, 0.0, 0.0)  # where the frame holds the other side
-
-
 class Instance(Entry):
     """A template's entries under names of their own, at a place of their own (`twin.machine.instances`)."""
 
@@ -307,18 +259,6 @@ class Instance(Entry):
     origin: Point = (0.0, 0.0, 0.0)  # of the template's coordinates in the machine
     x: Vector = (1.0, 0.0, 0.0)  # direction of the template's x in the machine
     z: Vector | None = None  # of its z, made square to x; by default as upright as can be
-
-
-class Tcp(Entry):
-    """The two sides of the TCP; of a lumped machine what each temperature moves the tool by, as seen from the work."""
-
-    tool: TcpSide = TcpSide(surface="")  # both sides are needed where there are parts
-    work: TcpSide = TcpSide(surface="")
-    # TCP displacement along x, y, z per kelvin of a node, or of a bar's mean
-    expansion: dict[str, tuple[DisplacementPerKelvin, DisplacementPerKelvin, DisplacementPerKelvin]] = {}
-    # lumped machines: bars that position an axis; the screw grows from its fixed end, and its nut holds this side
-    screws: dict[str, Literal["tool", "work"]] = {}
-    platform: Platform | None = None  # lumped machines: what six struts carry, instead of screws
 
 
 class Support(Entry):

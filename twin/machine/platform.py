@@ -8,8 +8,9 @@ from itertools import product
 import numpy as np
 
 from twin.errors import ModelError, Problem
-from twin.machine.description import Machine, Strut
+from twin.machine.description import Machine
 from twin.machine.kinematics import linear_axes
+from twin.machine.tcp import Strut
 from twin.nearest import did_you_mean
 from twin.rom.parallel import Geometry, worst_condition
 
