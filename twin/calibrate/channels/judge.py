@@ -57,6 +57,18 @@ def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[st
     )
 
 
+def without_warm_places(
+    judgement: Judgement, sensors: Collection[str], n_runs: int
+) -> tuple[Judgement, tuple[Finding, ...]]:
+    """A judgement without offsets in all of n_runs of channels that are none of a model's sensors, and those offsets:
+    nothing says how warm such a place may be. (Of a real spindle one of 16 is 7 K above the others at all times.)"""
+    warm = tuple(
+        f for f in judgement.findings
+        if f.what == "offset" and len(f.runs) == n_runs and f.channels[0] not in sensors
+    )  # fmt: skip
+    return replace(judgement, findings=tuple(f for f in judgement.findings if f not in warm)), warm
+
+
 def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:
     """What rows of a run itself show of each channel that is noise, rests at a limit or stands still."""
     found = []

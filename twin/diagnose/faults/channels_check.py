@@ -11,6 +11,7 @@ from twin.calibrate.channels.finding import UNITS, Finding
 from twin.calibrate.channels.judge import Judgement, set_aside
 from twin.diagnose.faults.elements import Elements
 from twin.diagnose.result.diagnosis import Cause, Window
+from twin.diagnose.result.numbers import size_words
 from twin.logs.faults.usable import BROKEN, usable
 from twin.logs.run import Run
 
@@ -31,6 +32,15 @@ def channels_at_fault(
     told = {(k, channel) for f in judgement.findings for k in f.runs for channel in f.channels}
     causes = [_cause(f, runs, names) for f in judgement.findings]
     return sound, causes + _leaps(sound, sensors, names, told)
+
+
+def warm_place_note(f: Finding) -> str:
+    """Of an offset in all runs of a channel that the model has no sensor for."""
+    off = size_words(f.size, f.interval, UNITS[f.what])
+    return (
+        f"{f.channels[0]} is off by {off} from what all other channels say, in all runs: "
+        "a place that is always warmer or colder looks the same, and the model has no sensor there"
+    )
 
 
 def warmer_air(elements: Elements, environment: str) -> np.ndarray:
