@@ -34,7 +34,8 @@ from twin.diagnose.result.diagnosis import VERDICTS, Cause, Diagnosis, Gain, Lim
 from twin.diagnose.result.numbers import customary, number, quantity, size_words
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.forward import search
-from twin.diagnose.search.gain import channels_of
+from twin.diagnose.search.gain import Channel, channels_of, gain_of
+from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.verdict import pulls_of, verdict_of
 from twin.errors import TwinError
 
@@ -427,6 +428,18 @@ def test_a_clock_that_is_off_changes_no_description():
     clock = replace(SIGNAL, place="runs.run_1", parameter="", history="clock", amplitude=120.0, unit="s")
     lines = summary_lines(replace(diagnosis("signal"), causes=(clock,)))
     assert "The model of the machine is left as it is." in lines
+
+
+def test_a_channel_that_an_extension_makes_worse_than_it_was_delivered_is_told():
+    """However bad the recalibrated model is: of a real spindle it left 27 um, where 5 were delivered, 7.5 extended."""
+    rng, time = np.random.default_rng(4), 300.0 * np.arange(288.0)
+    errors = [size * rng.standard_normal(len(time)) for size in (5e-6, 27e-6, 7.5e-6)]
+    gain = gain_of(Channel("sealed", "dz", "m", time, errors, True), rng, POLICY)
+    assert gain.ci95[0] > 0.0 > gain.ci95_delivered[1]
+    d = replace(diagnosis("named"), gain=(gain, replace(gain, channel="dx", ci95_delivered=(-1e-6, 1e-6))))
+    (line,) = gain_lines(d)
+    assert line.endswith("better beyond chance in 2, worse in 0; worse than as delivered: dz.")
+    assert gain_table(d).count("better, worse than as delivered") == 1
 
 
 def test_every_sealed_run_is_distinguished():

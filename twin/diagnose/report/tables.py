@@ -89,6 +89,7 @@ def gain_table(d: Diagnosis) -> str:
             interval, sure = "-", ""
         elif low > 0 or high < 0:
             sure = "better" if low > 0 else "worse"
+        sure += ", worse than as delivered" if g.ci95_delivered[1] < 0.0 else ""
         sizes = [quantity(v, g.unit) for v in (g.delivered, g.recalibrated, g.extended)]
         run = [g.run] if several else []
         rows.append([*run, g.channel, *sizes, interval, sure, "yes" if g.affected else "no"])

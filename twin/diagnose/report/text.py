@@ -358,9 +358,11 @@ def gain_lines(d: Diagnosis) -> list[str]:
         head = f"Sealed run {run}" if len(runs) > 1 else "Sealed run"
         counted = f"{len(these)} {name}{'s' if len(these) > 1 else ''}"
         better, worse = sum(g.ci95[0] > 0 for g in these), sum(g.ci95[1] < 0 for g in these)
+        lost = [g.channel for g in these if g.ci95_delivered[1] < 0.0]
         result.append(
             f"{head}: {counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
-            f"noise included); better beyond chance in {better}, worse in {worse}."
+            f"noise included); better beyond chance in {better}, worse in {worse}"
+            + (f"; worse than as delivered: {', '.join(lost)}." if lost else ".")
         )
     return result
 

@@ -105,6 +105,7 @@ class Gain:
     extended: float
     ci95: tuple[float, float]  # of recalibrated - extended, block bootstrap
     affected: bool  # whether the causes move this channel noticeably
+    ci95_delivered: tuple[float, float] = (math.nan, math.nan)  # of delivered - extended, likewise
 
 
 @dataclass(frozen=True)

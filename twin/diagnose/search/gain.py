@@ -145,6 +145,7 @@ def gain_of(channel: Channel, rng: np.random.Generator, policy: SearchPolicy) ->
     draws = []
     for _ in range(policy.draws):
         chosen = np.concatenate([members[b] for b in rng.integers(len(members), size=len(members))])
-        draws.append(np.sqrt(np.mean(own[1][chosen] ** 2)) - np.sqrt(np.mean(own[2][chosen] ** 2)))
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return Gain(run, name, unit, rms[0], rms[1], rms[2], (float(low), float(high)), channel.moved)
+        left = [np.sqrt(np.mean(e[chosen] ** 2)) for e in own]
+        draws.append((left[1] - left[2], left[0] - left[2]))
+    (low, low_delivered), (high, high_delivered) = np.quantile(draws, [0.025, 0.975], axis=0).tolist()
+    return Gain(run, name, unit, rms[0], rms[1], rms[2], (low, high), channel.moved, (low_delivered, high_delivered))
