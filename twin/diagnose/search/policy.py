@@ -80,7 +80,9 @@ class SearchPolicy:
     pulled: float = _rule(2.5, FIVE_AXIS, "that data tell a number from the declared one by", "standard deviations")
     beyond: float = _rule(3.0, FIVE_AXIS, "that a loose number keeps beside any other", "prior standard deviations")
     outside: float = _rule(1.0, DERIVED, "the declared tolerance itself", "prior standard deviations")
-    alone: float = _rule(0.5, LUMPED, "of its limit that settling moves a number of which the other fit alone is sure")
+    alone: float = _rule(
+        0.5, FIVE_AXIS, "of what the other fit alone is sure of, that the settled calibration says too"
+    )
     nearly: float = _rule(0.75, LUMPED, "of a bound, from which the surrogate of the settled calibration says little")
     sure: float = _rule(1.96, DERIVED, "of its own, of a 95 % interval", "standard deviations")
     same: float = _rule(0.998, FIVE_AXIS, "of a signal's factor and a declared number that do the same", "cosine")

@@ -116,17 +116,18 @@ def loose_ones(
     """The declared numbers farthest out of their tolerance, `far` at most, by two calibrations; settled (n,).
 
     Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
-    by the settled calibration, or by the fit that finds causes where the other goes `alone` of its limit. The former is
-    sure of no film of a heavy body; the latter takes for it what another mesh makes of a joint.
+    by the settled calibration, or by the fit that finds causes where the other says `alone` of that, too, sure of it or
+    not. The former is sure of no film of a heavy body and of no small source, but not biased; the latter takes for them
+    what another mesh makes of a joint.
     """
-    strain, by_settling = detector.pulls.strain(fitted.x, settled), detector.pulls.settled.strain(settled)
+    strain = detector.pulls.strain(fitted.x, settled)
     found = []
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
         if j not in known.settled:
             known.settled[j] = settled_alone(detector.fitter, y, (j,))
         x, covariance = known.settled[j]
-        estimates = ((float(x[j]), float(np.sqrt(covariance[j, j])), True), (*_untied(fitted, j), False))
-        for value, sigma, by_settled in estimates[: 2 if by_settling[j] >= detector.policy.alone else 1]:
+        one, other = (float(x[j]), float(np.sqrt(covariance[j, j])), True), (*_untied(fitted, j), False)
+        for value, sigma, by_settled in (one, other) if one[0] / other[0] >= detector.policy.alone else (one,):
             sure = max(detector.policy.sure, np.sqrt(detector.least))
             if np.sign(fitted.x[j]) * value > max(detector.policy.outside, sure * sigma):
                 rivals = _signals(detector, j, value, sigma, float(strain[j]) ** 2)
