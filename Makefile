@@ -10,6 +10,7 @@ READY := $(VENV)/.ready
 OUT ?= out
 WHEELS ?= out/wheelhouse
 PYTEST_ARGS ?=
+NOTEBOOKS := $(filter-out notebooks/execute.py,$(wildcard notebooks/*.py))
 # tests that read the source alone: `make check` runs them, `make test` does not run them again
 SOURCE_TESTS := tests/test_complexity.py tests/test_constants.py tests/test_imports.py tests/test_words.py
 
@@ -94,9 +95,11 @@ wheelhouse: $(READY) ## wheels of twin and all that `twin live` needs, for pip i
 demo: $(READY) ## build, verify and run the shipped five-axis machine; leaves out/ with pictures
 	@$(BIN)/twin demo -o "$(OUT)"
 
-.PHONY: notebooks
-notebooks: $(READY) ## execute the notebooks and check the numbers they assert
-	$(BIN)/python notebooks/execute.py
+.PHONY: notebooks $(NOTEBOOKS)
+notebooks: $(NOTEBOOKS) ## execute the notebooks and check the numbers they assert (make -j 2: side by side)
+
+$(NOTEBOOKS): $(READY)
+	$(BIN)/python notebooks/execute.py $@
 
 .PHONY: lock
 lock: ## resolve requirements.lock anew (keeps pins that still hold; UPGRADE=1 moves them)
