@@ -44,7 +44,7 @@ check: $(READY) ## style, format, types, the import rules, the size of functions
 	$(BIN)/python -m pytest -q -n 2 $(SOURCE_TESTS)
 
 .PHONY: test
-test: $(READY) ## every behaviour, quickly (5 min on two cores); LONG=1 with test-long, which shares what both set up
+test: $(READY) ## every behaviour, quickly (6 min on two cores); LONG=1 with test-long, which shares what both set up
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(addprefix --ignore=,$(SOURCE_TESTS)) \
 	    $(if $(LONG),-m "not slow and (long or not trials)") $(PYTEST_ARGS)
 

@@ -12,8 +12,8 @@ from tests.golden.pinned import PINNED
 # the threads of BLAS fight the test workers and each other.
 for variable, value in PINNED.items():
     os.environ.setdefault(variable, value)
-# Most time of tests that step is spent by XLA's compiler, in code that runs for milliseconds: without its costly passes
-# they take two thirds of the time. Golden values are computed with them, in processes of their own.
+# Tests that step spend most of their time in XLA's compiler, on code that runs for milliseconds: without its costly
+# passes they take two thirds of it. Golden values are computed with these, in processes of their own.
 os.environ["XLA_FLAGS"] += " --xla_backend_optimization_level=0"
 
 ROOT = Path(__file__).parents[1]
