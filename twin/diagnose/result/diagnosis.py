@@ -100,12 +100,12 @@ class Gain:
     run: str
     channel: str  # a sensor, or "dx", "dy", "dz"
     unit: str  # K or m
-    delivered: float
+    delivered: float  # all in unit
     recalibrated: float
     extended: float
     ci95: tuple[float, float]  # of recalibrated - extended, block bootstrap
     affected: bool  # whether the causes move this channel noticeably
-    ci95_delivered: tuple[float, float] = (math.nan, math.nan)  # of delivered - extended, likewise
+    ci95_delivered: tuple[float, float] = (math.nan, math.nan)  # of delivered - extended, block bootstrap
 
 
 @dataclass(frozen=True)

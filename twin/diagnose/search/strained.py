@@ -126,8 +126,11 @@ def loose_ones(
         if j not in known.settled:
             known.settled[j] = settled_alone(detector.fitter, y, (j,))
         x, covariance = known.settled[j]
-        one, other = (float(x[j]), float(np.sqrt(covariance[j, j])), True), (*_untied(fitted, j), False)
-        for value, sigma, by_settled in (one, other) if one[0] / other[0] >= detector.policy.alone else (one,):
+        estimates = [(float(x[j]), float(np.sqrt(covariance[j, j])), True)]
+        untied, spread = _untied(fitted, j)
+        if float(x[j]) / untied >= detector.policy.alone:
+            estimates.append((untied, spread, False))
+        for value, sigma, by_settled in estimates:
             sure = max(detector.policy.sure, np.sqrt(detector.least))
             if np.sign(fitted.x[j]) * value > max(detector.policy.outside, sure * sigma):
                 rivals = _signals(detector, j, value, sigma, float(strain[j]) ** 2)
