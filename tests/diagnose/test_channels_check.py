@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from tests.logs.faults.test_usable import changed, made
 from twin.calibrate.channels.finding import Finding
-from twin.calibrate.channels.judge import Judgement, judge, without_warm_places
+from twin.calibrate.channels.judge import Judgement, judge
 from twin.diagnose.faults.channels_check import channels_at_fault, warm_place_note
 from twin.diagnose.result.diagnosis import Cause
 from twin.logs.run import Run, Table
@@ -134,11 +135,16 @@ def test_a_leap_without_witnesses_is_told_of_sensors_of_the_machine_alone():
     assert channels_at_fault([few], judge([few]), ("t0",), ["monday"])[1] == []
 
 
-def test_a_place_that_is_always_warmer_is_no_fault_where_the_model_does_not_know_it():
+def test_a_place_that_is_always_warmer_is_no_fault_where_the_model_does_not_know_it(monkeypatch):
     def offset(channel: str, *runs: int) -> Finding:
         return Finding("offset", (channel,), runs, 0.0, HOUR, 5.75, (4.7, 6.8), 116.0, 25.0)
 
     known = (offset("bed", 0, 1), offset("oil", 1), replace(offset("oil", 0, 1), what="drift"))
-    kept, (warm,) = without_warm_places(Judgement((*known, offset("oil", 0, 1)), (), ()), {"bed"}, 2)
-    assert kept.findings == known
+    every = Judgement((*known, offset("oil", 0, 1)), (), ())
+    runs = 2 * [Run(Table(TIME, {}, {}), Table(TIME, temperatures(), dict.fromkeys(NAMES, "degC")))]
+    monkeypatch.setattr(sys.modules[judge.__module__], "judged", lambda *_: every)
+    assert judge(runs) == every
+    told = judge(runs, sensors={"bed"})
+    assert told.findings == known
+    (warm,) = told.warm
     assert warm_place_note(warm).startswith("oil is off by 5.8 K (95 % interval 4.7 to 6.8 K)")

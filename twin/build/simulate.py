@@ -93,7 +93,7 @@ def simulate(
     return Simulation(
         time=drive.time,
         temperatures=T + noise.temperature * rng.standard_normal(T.shape),
-        sensors=(*model.sensors, *(name for name, _ in model.ambient_sensors)),
+        sensors=model.all_sensors,
         tcp_time=np.asarray(tcp_time, dtype=float),
         tcp_positions=np.asarray(tcp_positions, dtype=float),
         tcp=tcp + noise.displacement * rng.standard_normal(tcp.shape),

@@ -10,7 +10,7 @@ import numpy as np
 
 from twin import __version__
 from twin.build.cache import arrays_hash, cached, machine_hash
-from twin.calibrate.channels.judge import Judgement, judge, without_warm_places
+from twin.calibrate.channels.judge import Judgement, judge
 from twin.calibrate.channels.table import channel_rows, with_findings
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
@@ -165,8 +165,7 @@ def diagnose(
     names = run_names([*runs, *sealed])
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     logged = {n for run in runs if run.temperatures is not None for n in run.temperatures.columns}
-    known = {*artefact.model.sensors, *dict(artefact.model.ambient_sensors)}
-    judgement, warm = without_warm_places(judge(runs, logged - set(settings.exclude)), known, len(runs))
+    judgement = judge(runs, logged - set(settings.exclude), artefact.model.all_sensors)
     usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
@@ -184,7 +183,7 @@ def diagnose(
     verdict, beside = verdict_of(found, settings.families)  # of what was seen before any search nothing is counted
     shown = beside_sensors(found, y, settings.families) if verdict == "unknown" else found
     groups = {f.name: f.group for f in settings.families}
-    notes = [*(f"{m.name}: {text}" for m in plans for text in m.skipped), *map(warm_place_note, warm)]
+    notes = [*(f"{m.name}: {text}" for m in plans for text in m.skipped), *map(warm_place_note, judgement.warm)]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
     verdict, causes, extension = opened.verdict, opened.causes, opened.extension

@@ -183,7 +183,7 @@ def calibrate(
     import twin.run.jax_setup  # noqa: F401  isort: skip  first: it prepares JAX before NumPy is loaded
 
     from twin.calibrate.channels.filled import filled
-    from twin.calibrate.channels.judge import KNOWN, judge, set_aside, without_warm_places
+    from twin.calibrate.channels.judge import KNOWN, judge, set_aside
     from twin.calibrate.fit.calibration import chosen
 
     options = options or CalibrateOptions()
@@ -198,7 +198,7 @@ def calibrate(
     if unknown:
         raise TwinError(f"no sensor '{unknown[0]}'", "--exclude", f"sensors are: {', '.join(known)}")
     whole = runs_of(given)
-    judgement, _ = without_warm_places(judge(whole), loaded.sensors, len(whole))
+    judgement = judge(whole, sensors=loaded.sensors)
     read_runs = set_aside(whole, judgement.findings)
     if judgement.findings:
         read_runs = filled(whole, read_runs, KNOWN)

@@ -209,7 +209,7 @@ def _of_artefact(path: Path) -> Expected:
 
     model = read_artefact(path).model
     axes = tuple(axis.name for axis in model.load_model.axes)
-    sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
+    sensors = model.all_sensors
     strokes = {axis.name: (axis.low, axis.high) for axis in model.load_model.axes}
     return Expected(model.name, model.load_model.signals, axes, sensors, strokes=strokes)
 

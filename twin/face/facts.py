@@ -48,7 +48,7 @@ def facts(artefact: Artefact) -> dict[str, Any]:
         ],
         "poses": len(model.poses),
         "pose_grid_m": {axis: grid.tolist() for axis, grid in zip(model.pose_axes, model.pose_grid, strict=True)},
-        "sensors": [*model.sensors, *(name for name, _ in model.ambient_sensors)],
+        "sensors": list(model.all_sensors),
         "parameters": parameters,
         "certified_ranges": {
             "signals": {

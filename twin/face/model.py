@@ -47,7 +47,7 @@ class Model:
     @property
     def sensors(self) -> tuple[str, ...]:
         """Structural sensors, then those in the air."""
-        return (*self.artefact.model.sensors, *(name for name, _ in self.artefact.model.ambient_sensors))
+        return self.artefact.model.all_sensors
 
     @property
     def parameters(self) -> dict[str, float]:

@@ -123,6 +123,11 @@ class MachineModel:
         return sum(b.n for b in self.bodies)
 
     @property
+    def all_sensors(self) -> tuple[str, ...]:
+        """Structural sensors, then those in the air: the order of outputs."""
+        return (*self.sensors, *(name for name, _ in self.ambient_sensors))
+
+    @property
     def turning(self) -> tuple[str, ...]:
         """Rotary axes that turn the tool or the work: their angles [rad] may follow positions of the pose axes."""
         return tuple(axis.name for axis in self.load_model.rotary)

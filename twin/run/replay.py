@@ -126,7 +126,7 @@ def replay_drive(
     refuse_unbalanced(drive.time, balance_error)
     return Result(
         time=drive.time,
-        sensors=(*model.sensors, *(name for name, _ in model.ambient_sensors)),
+        sensors=model.all_sensors,
         temperature=np.hstack([temperature, np.concatenate([air[:1], air])]),
         pose_axes=model.pose_axes,
         poses=model.poses,

@@ -88,7 +88,7 @@ class LiveState:
             )  # fmt: skip
         except (KeyError, TypeError, ValueError):
             return None
-        sound = len(step.temperatures) == len(model.sensors) + len(model.ambient_sensors)
+        sound = len(step.temperatures) == len(model.all_sensors)
         return step if sound and len(step.positions) == len(model.load_model.axes) else None
 
     def _changed(self, name: str, when: str, wanted: str) -> dict[str, Any] | None:

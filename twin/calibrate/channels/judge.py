@@ -29,18 +29,24 @@ class Judgement:
     findings: tuple[Finding, ...]  # single channels, in the order of what is surest
     splices: tuple[tuple[int, Fault], ...]  # number of the run, and from where on its rows are of another time
     leaps: tuple[tuple[int, str], ...]  # number of the run and channel of every leap, once for each
+    warm: tuple[Finding, ...] = ()  # channels of places that are warmer or colder than the others at all times
 
 
-def judge(runs: Sequence[Run], within: Collection[str] | None = None) -> Judgement:
+def judge(
+    runs: Sequence[Run], within: Collection[str] | None = None, sensors: Collection[str] | None = None
+) -> Judgement:
     """Find broken and stuck channels and splices in each run, then what all channels together say of each of them.
 
-    within: columns that may be judged, all temperatures by default; all take part as witnesses. Nothing is changed.
+    within: columns that may be judged, all temperatures by default; all take part as witnesses. sensors: of the model,
+    all columns by default: of others nothing says how warm their place may be (of a real spindle one of 16 is 7 K above
+    the others at all times), so that an offset in all runs is none. Nothing is changed.
     """
-    return judged([emptied(run) for run in runs], within)
+    found = judged([emptied(run) for run in runs], within)
+    return found if sensors is None else _without_warm_places(found, sensors, len(runs))
 
 
 def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[str] | None = None) -> Judgement:
-    """The same, of what `emptied` has made of each run."""
+    """The same, of what `emptied` has made of each run, all columns taken for the model's."""
     frozen = _frozen([run for run, _ in parts])
     plain = [_without(run, k, [f for f in frozen if k in f.runs]) for k, (run, _) in enumerate(parts)]
     faults = [(k, f) for k, (_, found) in enumerate(parts) for f in found]
@@ -57,16 +63,13 @@ def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[st
     )
 
 
-def without_warm_places(
-    judgement: Judgement, sensors: Collection[str], n_runs: int
-) -> tuple[Judgement, tuple[Finding, ...]]:
-    """A judgement without offsets in all of n_runs of channels that are none of a model's sensors, and those offsets:
-    nothing says how warm such a place may be. (Of a real spindle one of 16 is 7 K above the others at all times.)"""
+def _without_warm_places(judgement: Judgement, sensors: Collection[str], n_runs: int) -> Judgement:
+    """With offsets in all of n_runs of channels that are none of a model's sensors for themselves."""
     warm = tuple(
         f for f in judgement.findings
         if f.what == "offset" and len(f.runs) == n_runs and f.channels[0] not in sensors
     )  # fmt: skip
-    return replace(judgement, findings=tuple(f for f in judgement.findings if f not in warm)), warm
+    return replace(judgement, findings=tuple(f for f in judgement.findings if f not in warm), warm=warm)
 
 
 def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.calibrate.channels.finding import Finding
-from twin.calibrate.channels.judge import Judgement, judge, set_aside, share, without_warm_places
+from twin.calibrate.channels.judge import Judgement, judge, set_aside, share
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.fitter import Fitted, Fitter
 from twin.diagnose.evidence.whiten import measured_of
@@ -44,7 +44,7 @@ def other_measurements(
     fitted ones measured (m,), and the channels at fault. For campaigns: `twin diagnose` makes a detector of its own."""
     study, n = detector.study, len(detector.study.fitted)
     names, sensors = [p.run.name for p in study.runs[:n]], study.probed.base.sensors
-    judgement, _ = without_warm_places(judge(runs[:n]), {*sensors, *dict(study.probed.base.ambient_sensors)}, n)
+    judgement = judge(runs[:n], sensors=study.probed.base.all_sensors)
 
     def beside(judgement: Judgement) -> tuple[Detector, list[Measured], list[Cause]]:
         sound, faults = channels_at_fault(runs[:n], judgement, sensors, names)

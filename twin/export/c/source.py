@@ -65,7 +65,7 @@ def source_of(artefact: Artefact, single: bool = False, note: str = "") -> Sourc
     out.integers("sensor_body", [*bodies, *(e for _, e in model.ambient_sensors)])
     put_thermal(out, prepared, bodies)
     sizes = put_elastic(out, model, prepared.back) | put_correction(out, artefact)
-    sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
+    sensors = model.all_sensors
     out.names("twin_sensor_name", sensors)
     out.names("twin_flag_name", names)
     out.names("twin_source_name", [s.name for s in load.sources])

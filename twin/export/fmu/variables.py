@@ -50,7 +50,7 @@ def variables_of(artefact: Artefact, step: float, poses: bool, time: bool) -> tu
         found += [Variable(f"gain_{kind}_{identifier(e.name)}", "parameter", "tunable", "1",
                            f"factor of {'the loss' if kind == 'source' else 'the convection'} {e.name}", e.gain)
                   for e in entries]  # fmt: skip
-    sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
+    sensors = model.all_sensors
     found += [Variable(f"T_{identifier(s)}", "output", "discrete", "degC", f"sensor {s}") for s in sensors]
     for c in "xyz":
         found.append(Variable(f"tcp_{c}", "output", "discrete", "m", "TCP error, tool minus work side"))

@@ -156,7 +156,7 @@ def _displacement(full: FullModel, position: np.ndarray, x: list[np.ndarray]) ->
 
 def _truth(model: MachineModel, one: Driven, T: np.ndarray, tcp: np.ndarray) -> Truth:
     """Of one run, from its start on. T: (n, sensors) degC at the drive's times, tcp (m, 3) m."""
-    sensors = (*model.sensors, *(name for name, _ in model.ambient_sensors))
+    sensors = model.all_sensors
     at = one.drive.time[: len(T)] - one.ahead
     inside = at >= -1e-6  # s: rounding of clock times
     return Truth(one.name, at[inside], T[inside], sensors, one.when - one.ahead, one.where, tcp)
