@@ -17,7 +17,7 @@ from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.accepted import Accepted, settled
+from twin.diagnose.search.accepted import Accepted, as_scored, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.declared import declared_candidates
 from twin.diagnose.search.detector import Detector
@@ -213,20 +213,45 @@ def test_without_its_tolerance_a_number_is_what_the_data_alone_say():
     assert sigma == pytest.approx(np.sqrt(covariance[j, j]), rel=1e-3)
 
 
-def test_a_number_that_one_fit_alone_is_sure_of_is_that_of_the_other_too(monkeypatch):
-    """The settled calibration may know next to nothing of a small source: what it says counts, not how far it moves."""
+def test_a_number_that_one_fit_alone_is_sure_of_stands_where_the_other_does_not_contradict(monkeypatch):
+    """The settled calibration may know next to nothing of a small source, and then says nothing against it."""
     detector = small_case.made_detector()
     j, y = small_case.source_off(4.5)
     fitted, n = detector.fitter(y), len(detector.study.probed.parameters)
-    own, moves = _untied(fitted, j)[0], np.where(np.arange(n) == j, 0.01 * np.sign(fitted.x), 0.0)
+    own, moves = _untied(fitted, j)[0], np.where(np.arange(n) == j, -0.01 * np.sign(fitted.x), 0.0)
 
-    def found(share: float) -> dict[int, Loose]:
-        said = np.where(np.arange(n) == j, share * own, 0.0), 100.0 * np.eye(n)  # ten standard deviations either way
+    def found(share: float, sigma: float) -> dict[int, Loose]:
+        said = np.where(np.arange(n) == j, share * own, 0.0), (sigma * own) ** 2 * np.eye(n)
         monkeypatch.setattr(sys.modules[loose_ones.__module__], "settled_alone", lambda *_: said)
         return {loose.index: loose for loose in loose_ones(detector, y, fitted, moves, Freed())}
 
-    loose = found(0.6)[j]
-    assert not loose.settled
-    assert loose.x > 1.96 * loose.sigma
-    assert j not in found(0.4)
-    assert j not in found(-0.6)
+    for share, sigma in ((0.6, 0.5), (0.4, 0.5), (-0.6, 1.0)):
+        loose = found(share, sigma)[j]
+        assert not loose.settled
+        assert loose.x > 1.96 * loose.sigma
+    assert j not in found(0.2, 0.1)  # what it says lies within 0.0 and 0.4
+    assert j not in found(-0.6, 0.5)
+
+
+@pytest.mark.parametrize(("less", "first"), [(5.0, "sources.front"), (7.0, "sources.rear")])
+def test_of_two_that_leave_as_much_the_one_farther_out_counts(less, first, monkeypatch):
+    """Six likelihood-ratio units decide nothing, and what synthetic measurements show does; the other is its rival."""
+    detector = small_case.made_detector()
+    _, y = small_case.source_off(4.5)
+    fitted = detector.fitter(y)
+    paths = [p.path for p in detector.study.probed.parameters]
+    loose = [Loose(paths.index(f"sources.{n}.gain"), 3.0, 0.3, strain) for n, strain in (("front", 1.5), ("rear", 1.2))]
+    left = {"sources.front": 100.0, "sources.rear": 100.0 - less}
+    fits = {name: replace(fitted, reachable=value) for name, value in left.items()}
+    module = sys.modules[strained.__module__]
+    monkeypatch.setattr(module, "misfit", lambda _, of: of.reachable)
+    monkeypatch.setattr(
+        module,
+        "_freed",
+        lambda _d, _y, _f, h, _k: (fits[h.name], as_scored(detector.study, replace(h, statistic=50.0))),
+    )
+    monkeypatch.setattr(module, "_scored", lambda *_: 1e6)
+    fit, one = strained(detector, y, fitted, loose, look(detector, fitted), Freed())
+    assert (one.hypothesis.name, fit.reachable) == (first, left[first])
+    assert [h.name for h, _ in one.rivals] == (["sources.rear"] if less < 6.0 else [])
+    assert all(h.statistic == one.statistic for h, _ in one.rivals)

@@ -59,9 +59,8 @@ class Pulls:
         return cls(Spread.of(parameters, fitted), Spread.of(parameters, settled))
 
     def strain(self, fitted: np.ndarray, settled: np.ndarray) -> np.ndarray:
-        """(n,) 1 at the limit of how far parameters (n,) are moved; 0 where the calibrations contradict each other."""
-        farther = np.maximum(self.fitted.strain(fitted), self.settled.strain(settled))
-        return np.where(np.sign(fitted) == np.sign(settled), farther, 0.0)
+        """(n,) 1 at the limit of how far parameters (n,) are moved, by either calibration."""
+        return np.maximum(self.fitted.strain(fitted), self.settled.strain(settled))
 
 
 @dataclass(frozen=True)

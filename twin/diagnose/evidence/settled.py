@@ -17,7 +17,7 @@ from twin.rom.parameter import OF_LAWS
 
 PASSES, INNER = 3, 6
 LONGEST = 1.0  # prior standard deviations, of a step
-ANY = 10.0  # prior standard deviations, of a parameter without tolerance: more than its bounds are apart
+ANY = 1e3  # prior standard deviations, of a parameter without tolerance: what knows little of it says so as well
 
 Outputs = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 

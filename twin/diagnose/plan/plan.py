@@ -25,7 +25,7 @@ from twin.diagnose.plan.suspicion import Suspicion, known_suspicions
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.limits import over_histories
+from twin.diagnose.search.limits import over_histories, seen_from
 from twin.logs.run import Run
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
@@ -134,14 +134,14 @@ def _foresight(
     for k, batch, p in s.batches(detector):
         chosen = s.histories(batch)
         information = now.ready[k].information[p, chosen]
-        today = min(today, _limit(information, threshold, batch, chosen, detector.policy.power))
+        today = min(today, _limit(detector, batch, p, information, chosen))
         rows = [_among(basis.columns, batch.columns[p], batch.histories[h].weights) for h in chosen]
         W = np.stack([basis.spread(of_history) for of_history in rows])  # (h, q, 2 u)
         for e, f in enumerate(made):
             without, then = (_information(F, W) for F in (f.before, f.after))
             share = np.clip(information / np.maximum(without, 1e-30), LEAST, 1.0)
             more = information + share * np.maximum(then - without, 0.0)
-            best[e] = min(best[e], _limit(more, threshold, batch, chosen, detector.policy.power))
+            best[e] = min(best[e], _limit(detector, batch, p, more, chosen))
     if np.isfinite(stated):
         today, best = stated, best * stated / today
     proposals = [
@@ -156,10 +156,11 @@ def _foresight(
     )  # fmt: skip
 
 
-def _limit(information: np.ndarray, threshold: float, batch: Batch, chosen: Sequence[int], power: float) -> float:
+def _limit(detector: Detector, batch: Batch, place: int, information: np.ndarray, chosen: Sequence[int]) -> float:
     """Of the information (h,) of chosen histories, as `limits.limits_at` takes it."""
-    sizes = (np.sqrt(threshold) + power) / np.sqrt(np.maximum(information, 1e-30))
-    return float(over_histories([batch.histories[h] for h in chosen], np.maximum(sizes, batch.smallest)))
+    histories = [batch.histories[h] for h in chosen]
+    sizes = seen_from(detector, batch, place, information, histories)
+    return float(over_histories(histories, np.maximum(sizes, batch.smallest)))
 
 
 def _hour(detector: Detector, key: Key) -> tuple[str, str, int] | None:

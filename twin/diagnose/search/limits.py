@@ -1,4 +1,14 @@
-"""Detection limits: the smallest sizes that would have been named in 95 of 100 cases in these data."""
+"""Detection limits: the smallest sizes that would have been named in 95 of 100 cases in these data.
+
+A cause is named by its statistic, from (sqrt(threshold) + z) / sqrt(I) on, with I the information about its size after
+everything calibratable is projected out. A declared number is named by calibration as well, which moves it: with the
+tolerance s as its prior, and t = ln(factor) / s its true value, a fit says x = (1 - v) t, and without the tolerance
+x / (1 - v) = t, of the variances v (1 - v) and v / (1 - v), where
+
+    1 - v = s^2 I
+
+as its own tolerance is among what is projected out of I (`strained.loose_ones` says from which x on it is out).
+"""
 
 from __future__ import annotations
 
@@ -11,8 +21,10 @@ from twin.diagnose.evidence.sight import sight
 from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Limit
-from twin.diagnose.search.accepted import curved_change, motion
+from twin.diagnose.search.accepted import curved_change, motion, parameter_of
 from twin.diagnose.search.detector import Detector
+
+LARGEST = 100.0  # logarithm of a factor: beyond every range, and a number still
 
 
 def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
@@ -23,13 +35,43 @@ def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
         batch = own.batch
         if batch.fixed:
             continue
-        needed = float(np.sqrt(detector.thresholds[batch.family])) + detector.policy.power
         if fault_of(batch).curved:
-            sizes = _curved(detector, batch, needed, projector)
+            sizes = _curved(detector, batch, deviations_needed(detector, batch), projector)
         else:
-            sizes = needed / np.sqrt(np.maximum(own.information, 1e-30))
+            sizes = np.stack(
+                [seen_from(detector, batch, p, told, batch.histories) for p, told in enumerate(own.information)]
+            )
         most = np.array(batch.largest or (np.inf,))[:, None]
         yield batch, np.where(sizes > most, np.inf, np.maximum(sizes, batch.smallest))
+
+
+def deviations_needed(detector: Detector, batch: Batch) -> float:
+    """Standard deviations of a size at which 95 of 100 measurements pass the threshold of its family."""
+    return float(np.sqrt(detector.thresholds[batch.family])) + detector.policy.power
+
+
+def seen_from(
+    detector: Detector, batch: Batch, place: int, information: np.ndarray, histories: Sequence[History]
+) -> np.ndarray:
+    """(h,) the amplitude that would have been named in 95 of 100 cases, of its information (h,) with some histories."""
+    sizes = deviations_needed(detector, batch) / np.sqrt(np.maximum(information, 1e-30))
+    j = parameter_of(detector.study, batch.places[place]) if fault_of(batch).declared else None
+    if j is None:
+        return np.asarray(sizes)
+    return np.minimum(sizes, [
+        np.inf if h.windows or h.signal else _by_calibration(detector, batch, j, float(told))
+        for h, told in zip(histories, information, strict=True)
+    ])  # fmt: skip
+
+
+def _by_calibration(detector: Detector, batch: Batch, j: int, information: float) -> float:
+    """From which amplitude on calibration finds the declared number j out of its tolerance, in 95 of 100 cases."""
+    policy, scale, threshold = detector.policy, float(detector.study.scale[j]), detector.thresholds[batch.family]
+    certain = float(np.clip(scale**2 * information, 1e-12, 1.0))  # 1 - v
+    sigma = np.sqrt((1.0 - certain) / certain)
+    out = max(float(detector.pulls.fitted.limit[j]) / certain, policy.outside, float(np.sqrt(threshold)) * sigma)
+    change = min(scale * float(out + policy.power * sigma), LARGEST)
+    return fault_of(batch).amplitude(change)[0]
 
 
 def _curved(detector: Detector, batch: Batch, needed: float, projector: Projector) -> np.ndarray:

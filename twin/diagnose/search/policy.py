@@ -81,7 +81,7 @@ class SearchPolicy:
     beyond: float = _rule(3.0, FIVE_AXIS, "that a loose number keeps beside any other", "prior standard deviations")
     outside: float = _rule(1.0, DERIVED, "the declared tolerance itself", "prior standard deviations")
     alone: float = _rule(
-        0.5, FIVE_AXIS, "of what the other fit alone is sure of, that the settled calibration says too"
+        0.5, FIVE_AXIS, "of what the other fit alone is sure of, that the settled calibration must not exclude"
     )
     nearly: float = _rule(0.75, LUMPED, "of a bound, from which the surrogate of the settled calibration says little")
     sure: float = _rule(1.96, DERIVED, "of its own, of a 95 % interval", "standard deviations")

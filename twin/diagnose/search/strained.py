@@ -18,12 +18,13 @@ from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.loss_law import is_source
-from twin.diagnose.faults.table import fault_of
+from twin.diagnose.faults.table import family_of_parameter, fault_of
 from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, misfit_of_each, unbent, unexplained
 from twin.diagnose.search.look import Search, Step, cosines, look
+from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
 
 
@@ -66,12 +67,13 @@ def closed(
     # both begin at the declared number: what either explains is the same but for what is left
     fits = {h.name for h in declared if h.statistic > removed - detector.policy.close}
     (j,) = freed(detector.study, one.hypothesis)
-    rivals = tuple(
+    rivals = one.rivals + tuple(
         (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in _factors(detector, j)
         if h.name in fits or _does_the_same(detector, one, cosine, heat)
     )  # fmt: skip
     # a part that expands too much moves the expansion of its material, or of another: with the part's free it stays
-    family = [h for h in ranked if h.family == one.hypothesis.family and h.name != one.hypothesis.name]
+    known = {one.hypothesis.name, *(h.name for h, _ in one.rivals)}
+    family = [h for h in ranked if h.family == one.hypothesis.family and h.name not in known]
     most = detector.policy.stands * abs(float(before.x[j]))
     near = [
         h for h in family
@@ -116,29 +118,35 @@ def loose_ones(
     """The declared numbers farthest out of their tolerance, `far` at most, by two calibrations; settled (n,).
 
     Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
-    by the settled calibration, or by the fit that finds causes where the other says `alone` of that, too, sure of it or
-    not. The former is sure of no film of a heavy body and of no small source, but not biased; the latter takes for them
-    what another mesh makes of a joint.
+    by the settled calibration, or by the fit that finds causes where the other does not contradict it. The former is
+    sure of no film of a heavy body and of no small source, but not biased; the latter takes for them what another mesh
+    makes of a joint. So where it alone is sure it is to be as sure as any cause has to be.
     """
-    strain = detector.pulls.strain(fitted.x, settled)
-    found = []
+    policy, strain, found = detector.policy, detector.pulls.strain(fitted.x, settled), list[Loose]()
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
         if j not in known.settled:
             known.settled[j] = settled_alone(detector.fitter, y, (j,))
         x, covariance = known.settled[j]
-        estimates = [(float(x[j]), float(np.sqrt(covariance[j, j])), True)]
-        untied, spread = _untied(fitted, j)
-        if float(x[j]) / untied >= detector.policy.alone:
-            estimates.append((untied, spread, False))
-        for value, sigma, by_settled in estimates:
-            sure = max(detector.policy.sure, np.sqrt(detector.least))
-            if np.sign(fitted.x[j]) * value > max(detector.policy.outside, sure * sigma):
-                rivals = _signals(detector, j, value, sigma, float(strain[j]) ** 2)
-                found.append(Loose(j, value, sigma, float(strain[j]), rivals, by_settled))
+        robust = Loose(j, float(x[j]), float(np.sqrt(covariance[j, j])), float(strain[j]))
+        efficient = Loose(j, *_untied(fitted, j), float(strain[j]), settled=False)
+        family = family_of_parameter(detector.study.probed.parameters[j])
+        estimates = [(robust, max(policy.sure, float(np.sqrt(detector.least))))]
+        if not _contradicted(efficient, robust, policy):
+            estimates.append((efficient, float(np.sqrt(detector.thresholds[family]))))
+        for own, sure in estimates:
+            if np.sign(fitted.x[j]) * own.x > max(policy.outside, sure * own.sigma):
+                found.append(replace(own, rivals=_signals(detector, own)))
                 break
-        if len(found) == detector.policy.far:
+        if len(found) == policy.far:
             break
     return tuple(found)
+
+
+def _contradicted(efficient: Loose, robust: Loose, policy: SearchPolicy) -> bool:
+    """Whether a robust estimate refutes an efficient one, by less than `alone` of which it may differ for other
+    reasons (Hausman, Econometrica 46, 1978: two estimates of which one alone suffers from what is misspecified)."""
+    toward = float(np.sign(efficient.x))
+    return toward * robust.x + policy.sure * robust.sigma < policy.alone * abs(efficient.x)
 
 
 def _untied(fitted: Fitted, j: int) -> tuple[float, float]:
@@ -157,17 +165,16 @@ def _variance(fitted: Fitted, j: int) -> float:
     return min(float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j]), 1.0 - 1e-12)
 
 
-def _signals(
-    detector: Detector, j: int, x: float, sigma: float, statistic: float
-) -> tuple[tuple[Hypothesis, float], ...]:
+def _signals(detector: Detector, own: Loose) -> tuple[tuple[Hypothesis, float], ...]:
     """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says; with
     the source's own statistic, as they do the same."""
-    if not is_source(detector.study.probed.parameters[j]):
+    if not is_source(detector.study.probed.parameters[own.index]):
         return ()
-    policy, scale = detector.policy, float(detector.study.scale[j])
+    policy, scale = detector.policy, float(detector.study.scale[own.index])
     return tuple(
-        (replace(h, statistic=statistic), cosine) for h, cosine, heat in _factors(detector, j)
-        if abs(cosine) >= policy.same and heat > 0.0 and abs(np.log(heat) - scale * x) < policy.sure * scale * sigma
+        (replace(h, statistic=own.strain**2), cosine) for h, cosine, heat in _factors(detector, own.index)
+        if abs(cosine) >= policy.same and heat > 0.0
+        and abs(np.log(heat) - scale * own.x) < policy.sure * scale * own.sigma
     )  # fmt: skip
 
 
@@ -229,8 +236,10 @@ def strained(
     detector: Detector, y: np.ndarray, fitted: Fitted, loose: Sequence[Loose],
     glance: tuple[Sight, list[Hypothesis], Step], known: Freed,
 ) -> tuple[Fitted, Accepted] | None:  # fmt: skip
-    """Of the declared numbers out of their tolerance the one that leaves least, freed of it; None if there is none, or
-    what was seen at a glance explains so much more that it would be left."""
+    """Of the declared numbers out of their tolerance the one that leaves least, freed of it, and as its rivals those
+    that leave as much but for chance; None if there is none, or what was seen at a glance explains so much more that it
+    would be left. Of those the first is the one farthest beyond what synthetic measurements show: a loss that a fit has
+    reached within its tolerance, however surely, leaves no less once it is freed, and discrepancy at a joint does."""
     policy = detector.policy
     strain = {own.index: own.strain for own in loose}
     found = []
@@ -257,7 +266,21 @@ def strained(
             likely or ((1.0 - policy.covers) * made[1].statistic > most and misfit(detector, made[0]) < before)
         ):
             freed_ones.append(made)
-    return min(freed_ones, key=lambda made: misfit(detector, made[0]), default=None)
+    if not freed_ones:
+        return None
+    left = [misfit(detector, fit) for fit, _ in freed_ones]
+    near = [made for made, own in zip(freed_ones, left, strict=True) if own < min(left) + policy.close]
+    (fit, one), *others = sorted(near, key=lambda made: -strain[freed(detector.study, made[1].hypothesis)[0]])
+    return fit, replace(one, rivals=_as_rivals(detector, fitted, one, [other for _, other in others]))
+
+
+def _as_rivals(
+    detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[Accepted]
+) -> tuple[tuple[Hypothesis, float], ...]:
+    """Freed numbers as rivals of one of them, of their own size and its statistic: either explains the same."""
+    rivals = [replace(o.hypothesis, amplitude=tuple(o.amplitude.tolist()), statistic=one.statistic) for o in others]
+    cosine = cosines(detector, fitted, [one.hypothesis, *rivals])
+    return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(rivals))
 
 
 def _scored(detector: Detector, fitted: Fitted, seen: Sight, h: Hypothesis) -> float:
