@@ -11,7 +11,7 @@ from twin.diagnose.evidence.sight import sight
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import parameter_of, settled
 from twin.diagnose.search.limits import deviations_needed, limits_at, seen_from
-from twin.diagnose.search.strained import Freed, _variance, loose_ones
+from twin.diagnose.search.loose import Freed, loose_ones, variance_of
 
 pytestmark = pytest.mark.long
 
@@ -58,7 +58,7 @@ def test_information_says_how_sure_calibration_is():
     _, _, information, j = informed("sources.front")
     fitted = detector.fitter(detector.fitter.surrogate.y0)
     certain = detector.study.scale[j] ** 2 * information[0]
-    assert 1.0 - _variance(fitted, j) == pytest.approx(certain, rel=1e-3)
+    assert 1.0 - variance_of(fitted, j) == pytest.approx(certain, rel=1e-3)
     assert 0.1 < certain < 0.95
 
 

@@ -23,7 +23,8 @@ from twin.diagnose.search.declared import declared_candidates
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import _leaking, _restless, refit, search
 from twin.diagnose.search.look import Search, look
-from twin.diagnose.search.strained import Freed, _untied, _weak, closed, loose_ones, strained
+from twin.diagnose.search.loose import Freed, loose_ones, untied
+from twin.diagnose.search.strained import _weak, closed, strained
 from twin.diagnose.search.verdict import verdict_of
 
 pytestmark = pytest.mark.long
@@ -204,7 +205,7 @@ def test_without_its_tolerance_a_number_is_what_the_data_alone_say():
     detector = small_case.made_detector()
     j, y = small_case.source_off(0.3)
     fitted = detector.fitter(y)
-    value, sigma = _untied(fitted, j)
+    value, sigma = untied(fitted, j)
     N, white = fitted.projector.N, detector.whiten(fitted.residual)
     precision = np.ones(N.shape[1])
     precision[j] = 1e-4
@@ -218,7 +219,7 @@ def test_a_number_that_one_fit_alone_is_sure_of_stands_where_the_other_does_not_
     detector = small_case.made_detector()
     j, y = small_case.source_off(4.5)
     fitted, n = detector.fitter(y), len(detector.study.probed.parameters)
-    own, moves = _untied(fitted, j)[0], np.where(np.arange(n) == j, -0.01 * np.sign(fitted.x), 0.0)
+    own, moves = untied(fitted, j)[0], np.where(np.arange(n) == j, -0.01 * np.sign(fitted.x), 0.0)
 
     def found(share: float, sigma: float) -> dict[int, Loose]:
         said = np.where(np.arange(n) == j, share * own, 0.0), (sigma * own) ** 2 * np.eye(n)

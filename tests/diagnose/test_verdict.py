@@ -19,8 +19,9 @@ from twin.diagnose.search.accepted import Accepted, parameter_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.limits import limits_at, limits_of, over_histories
 from twin.diagnose.search.look import look
+from twin.diagnose.search.loose import Freed, loose_ones
 from twin.diagnose.search.policy import POLICY
-from twin.diagnose.search.strained import Freed, loose_ones, strained
+from twin.diagnose.search.strained import strained
 from twin.diagnose.search.verdict import CALIBRATED, _more_alike, cause_of, rival_of, strained_of, verdict_of
 
 

@@ -26,10 +26,11 @@ from twin.diagnose.search.exact import beginning, excess, misfit, misfit_of_each
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Search, Step, cosines, distinct, look
+from twin.diagnose.search.loose import loose_ones
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
 from twin.diagnose.search.start import Start, afresh, begun
-from twin.diagnose.search.strained import closed, loose_ones, strained
+from twin.diagnose.search.strained import closed, strained
 
 
 def search(described: Detector, y: np.ndarray, start: Start | None = None) -> Search:

@@ -7,7 +7,7 @@ x / (1 - v) = t, of the variances v (1 - v) and v / (1 - v), where
 
     1 - v = s^2 I
 
-as its own tolerance is among what is projected out of I (`strained.loose_ones` says from which x on it is out).
+as its own tolerance is among what is projected out of I (`loose.loose_ones` says from which x on it is out).
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.exact import left_less, unbent
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Step, distinct, look, scored
-from twin.diagnose.search.strained import Freed, loose_ones
+from twin.diagnose.search.loose import Freed, loose_ones
 
 Glance = tuple[Sight, list[Hypothesis], Step]
 

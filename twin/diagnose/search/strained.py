@@ -5,26 +5,23 @@ It is the verdict where freeing it leaves nothing, or so little that a discrepan
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import scipy.linalg
 
 from twin.diagnose.evidence.batch import Hypothesis, score
 from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.evidence.pulls import Loose
-from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.evidence.sight import Sight
-from twin.diagnose.faults.loss_law import is_source
-from twin.diagnose.faults.table import family_of_parameter, fault_of
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, misfit_of_each, unbent, unexplained
 from twin.diagnose.search.look import Search, Step, cosines, look
-from twin.diagnose.search.policy import SearchPolicy
+from twin.diagnose.search.loose import Freed, factors_of, variance_of
 from twin.diagnose.search.refit import refit
 
 
@@ -68,7 +65,7 @@ def closed(
     fits = {h.name for h in declared if h.statistic > removed - detector.policy.close}
     (j,) = freed(detector.study, one.hypothesis)
     rivals = one.rivals + tuple(
-        (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in _factors(detector, j)
+        (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in factors_of(detector, j)
         if h.name in fits or _does_the_same(detector, one, cosine, heat)
     )  # fmt: skip
     # a part that expands too much moves the expansion of its material, or of another: with the part's free it stays
@@ -104,94 +101,6 @@ def _explained(detector: Detector, y: np.ndarray, before: Fitted, fitted: Fitted
     return any((h if h.batch.fixed else exact(detector, y, before, h)).statistic > needed for h in likely)
 
 
-@dataclass(frozen=True)
-class Freed:
-    """What has been freed of its tolerance so far, beside one fit: it takes seconds, and a second search asks again."""
-
-    settled: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)  # by parameter: x (n,), covariance
-    refitted: dict[str, tuple[Fitted, Accepted]] = field(default_factory=dict)  # by place
-
-
-def loose_ones(
-    detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.ndarray, known: Freed
-) -> tuple[Loose, ...]:
-    """The declared numbers farthest out of their tolerance, `far` at most, by two calibrations; settled (n,).
-
-    Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
-    by the settled calibration, or by the fit that finds causes where the other does not contradict it. The former is
-    sure of no film of a heavy body and of no small source, but not biased; the latter takes for them what another mesh
-    makes of a joint. So where it alone is sure it is to be as sure as any cause has to be.
-    """
-    policy, strain, found = detector.policy, detector.pulls.strain(fitted.x, settled), list[Loose]()
-    for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
-        if j not in known.settled:
-            known.settled[j] = settled_alone(detector.fitter, y, (j,))
-        x, covariance = known.settled[j]
-        robust = Loose(j, float(x[j]), float(np.sqrt(covariance[j, j])), float(strain[j]))
-        efficient = Loose(j, *_untied(fitted, j), float(strain[j]), settled=False)
-        family = family_of_parameter(detector.study.probed.parameters[j])
-        estimates = [(robust, max(policy.sure, float(np.sqrt(detector.least))))]
-        if not _contradicted(efficient, robust, policy):
-            estimates.append((efficient, float(np.sqrt(detector.thresholds[family]))))
-        for own, sure in estimates:
-            if np.sign(fitted.x[j]) * own.x > max(policy.outside, sure * own.sigma):
-                found.append(replace(own, rivals=_signals(detector, own)))
-                break
-        if len(found) == policy.far:
-            break
-    return tuple(found)
-
-
-def _contradicted(efficient: Loose, robust: Loose, policy: SearchPolicy) -> bool:
-    """Whether a robust estimate refutes an efficient one, by less than `alone` of which it may differ for other
-    reasons (Hausman, Econometrica 46, 1978: two estimates of which one alone suffers from what is misspecified)."""
-    toward = float(np.sign(efficient.x))
-    return toward * robust.x + policy.sure * robust.sigma < policy.alone * abs(efficient.x)
-
-
-def _untied(fitted: Fitted, j: int) -> tuple[float, float]:
-    """A parameter as the fit has it without its tolerance, to first order, and its standard deviation.
-
-    Of a posterior N(x, v) under the prior N(0, 1), the data alone say N(x / (1 - v), v / (1 - v)).
-    """
-    variance = _variance(fitted, j)
-    return float(fitted.x[j]) / (1.0 - variance), float(np.sqrt(variance / (1.0 - variance)))
-
-
-def _variance(fitted: Fitted, j: int) -> float:
-    """Of a parameter beside all nuisances, in prior variances: below 1."""
-    unit = np.zeros(len(fitted.projector.factor[0]))
-    unit[j] = 1.0
-    return min(float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j]), 1.0 - 1e-12)
-
-
-def _signals(detector: Detector, own: Loose) -> tuple[tuple[Hypothesis, float], ...]:
-    """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says; with
-    the source's own statistic, as they do the same."""
-    if not is_source(detector.study.probed.parameters[own.index]):
-        return ()
-    policy, scale = detector.policy, float(detector.study.scale[own.index])
-    return tuple(
-        (replace(h, statistic=own.strain**2), cosine) for h, cosine, heat in _factors(detector, own.index)
-        if abs(cosine) >= policy.same and heat > 0.0
-        and abs(np.log(heat) - scale * own.x) < policy.sure * scale * own.sigma
-    )  # fmt: skip
-
-
-def _factors(detector: Detector, j: int) -> Iterator[tuple[Hypothesis, float, float]]:
-    """Exact factors of signals: with the cosine of what each and a declared number do, and times what heat, were that
-    number a source's, each multiplies it by."""
-    own = detector.whiten(detector.fitter.linear(np.zeros(len(detector.study.scale)))[1][:, j])
-    own = own / detector.study.scale[j]
-    size = float(own @ own)
-    for batch in detector.columns.batches:
-        for i, _ in enumerate(batch.places if fault_of(batch).corrects else ()):
-            signal = detector.columns.raw[:, batch.columns[i, 0]].astype(float)
-            along = float(signal @ own)
-            cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
-            yield Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), float(cosine), 1.0 + along / size
-
-
 def _size(one: Accepted, loose: Loose, detector: Detector) -> tuple[float, float]:
     """The amplitude of a number out of its tolerance, and its variance, of the settled calibration: the other fit
     leaves to model discrepancy what looks like it. But that knows sizes beyond the bounds, and those of which the
@@ -206,7 +115,7 @@ def _size(one: Accepted, loose: Loose, detector: Detector) -> tuple[float, float
 
 
 def _does_the_same(detector: Detector, one: Accepted, cosine: float, heat: float) -> bool:
-    """Whether a factor of a signal does just what a source's number does (cosine, heat: see `_factors`), and is of the
+    """Whether a factor of a signal does just what a source's number does (cosine, heat: `factors_of`), and is of the
     fitted size: far from the description it may not fit to first order."""
     factor = float(one.amplitude[0])
     sigma = float(np.hypot(np.sqrt(one.covariance[0, 0]), detector.policy.form * factor))
@@ -296,7 +205,7 @@ def _scored(detector: Detector, fitted: Fitted, seen: Sight, h: Hypothesis) -> f
 def _told_alone(detector: Detector, fitted: Fitted, h: Hypothesis) -> float:
     """Likelihood-ratio units by which data without its tolerance tell a fitted number from the declared one."""
     (j,) = freed(detector.study, h)
-    return float(fitted.x[j]) ** 2 * (1.0 / _variance(fitted, j) - 1.0)
+    return float(fitted.x[j]) ** 2 * (1.0 / variance_of(fitted, j) - 1.0)
 
 
 def _freed(

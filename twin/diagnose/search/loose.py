@@ -1,0 +1,111 @@
+"""Declared numbers out of their tolerance, by two calibrations.
+
+The fit that finds causes is efficient and takes for a number what its model has wrong; the settled one is not misled so
+easily, and sure of less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.linalg
+
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.fitter import Fitted
+from twin.diagnose.evidence.pulls import Loose
+from twin.diagnose.evidence.settled import settled_alone
+from twin.diagnose.faults.loss_law import is_source
+from twin.diagnose.faults.table import family_of_parameter, fault_of
+from twin.diagnose.search.accepted import Accepted
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.policy import SearchPolicy
+
+
+@dataclass(frozen=True)
+class Freed:
+    """What has been freed of its tolerance so far, beside one fit: it takes seconds, and a second search asks again."""
+
+    settled: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)  # by parameter: x (n,), covariance
+    refitted: dict[str, tuple[Fitted, Accepted]] = field(default_factory=dict)  # by place
+
+
+def loose_ones(
+    detector: Detector, y: np.ndarray, fitted: Fitted, settled: np.ndarray, known: Freed
+) -> tuple[Loose, ...]:
+    """The declared numbers farthest out of their tolerance, `far` at most, by two calibrations; settled (n,).
+
+    Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
+    by the settled calibration, or by the fit that finds causes where the other does not contradict it. The former is
+    sure of no film of a heavy body and of no small source, but not biased; the latter takes for them what another mesh
+    makes of a joint. So where it alone is sure it is to be as sure as any cause has to be.
+    """
+    policy, strain, found = detector.policy, detector.pulls.strain(fitted.x, settled), list[Loose]()
+    for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
+        if j not in known.settled:
+            known.settled[j] = settled_alone(detector.fitter, y, (j,))
+        x, covariance = known.settled[j]
+        robust = Loose(j, float(x[j]), float(np.sqrt(covariance[j, j])), float(strain[j]))
+        efficient = Loose(j, *untied(fitted, j), float(strain[j]), settled=False)
+        family = family_of_parameter(detector.study.probed.parameters[j])
+        estimates = [(robust, max(policy.sure, float(np.sqrt(detector.least))))]
+        if not _contradicted(efficient, robust, policy):
+            estimates.append((efficient, float(np.sqrt(detector.thresholds[family]))))
+        for own, sure in estimates:
+            if np.sign(fitted.x[j]) * own.x > max(policy.outside, sure * own.sigma):
+                found.append(replace(own, rivals=_signals(detector, own)))
+                break
+        if len(found) == policy.far:
+            break
+    return tuple(found)
+
+
+def _contradicted(efficient: Loose, robust: Loose, policy: SearchPolicy) -> bool:
+    """Whether a robust estimate refutes an efficient one, by less than `alone` of which it may differ for other
+    reasons (Hausman, Econometrica 46, 1978: two estimates of which one alone suffers from what is misspecified)."""
+    toward = float(np.sign(efficient.x))
+    return toward * robust.x + policy.sure * robust.sigma < policy.alone * abs(efficient.x)
+
+
+def untied(fitted: Fitted, j: int) -> tuple[float, float]:
+    """A parameter as the fit has it without its tolerance, to first order, and its standard deviation.
+
+    Of a posterior N(x, v) under the prior N(0, 1), the data alone say N(x / (1 - v), v / (1 - v)).
+    """
+    variance = variance_of(fitted, j)
+    return float(fitted.x[j]) / (1.0 - variance), float(np.sqrt(variance / (1.0 - variance)))
+
+
+def variance_of(fitted: Fitted, j: int) -> float:
+    """Of a parameter beside all nuisances, in prior variances: below 1."""
+    unit = np.zeros(len(fitted.projector.factor[0]))
+    unit[j] = 1.0
+    return min(float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j]), 1.0 - 1e-12)
+
+
+def _signals(detector: Detector, own: Loose) -> tuple[tuple[Hypothesis, float], ...]:
+    """Exact factors of signals that warm what a source warms, by as much as its number without a tolerance says; with
+    the source's own statistic, as they do the same."""
+    if not is_source(detector.study.probed.parameters[own.index]):
+        return ()
+    policy, scale = detector.policy, float(detector.study.scale[own.index])
+    return tuple(
+        (replace(h, statistic=own.strain**2), cosine) for h, cosine, heat in factors_of(detector, own.index)
+        if abs(cosine) >= policy.same and heat > 0.0
+        and abs(np.log(heat) - scale * own.x) < policy.sure * scale * own.sigma
+    )  # fmt: skip
+
+
+def factors_of(detector: Detector, j: int) -> Iterator[tuple[Hypothesis, float, float]]:
+    """Exact factors of signals: with the cosine of what each and a declared number do, and times what heat, were that
+    number a source's, each multiplies it by."""
+    own = detector.whiten(detector.fitter.linear(np.zeros(len(detector.study.scale)))[1][:, j])
+    own = own / detector.study.scale[j]
+    size = float(own @ own)
+    for batch in detector.columns.batches:
+        for i, _ in enumerate(batch.places if fault_of(batch).corrects else ()):
+            signal = detector.columns.raw[:, batch.columns[i, 0]].astype(float)
+            along = float(signal @ own)
+            cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
+            yield Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), float(cosine), 1.0 + along / size
