@@ -66,6 +66,19 @@ def test_an_interval_ends_where_physics_does(sign, ends):
     assert found.ci95 == pytest.approx(ends, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("amplitude", "sigma", "ends"), [(1.25, 0.67, (1.24, 4.09)), (-0.7, 0.05, (0.11, 0.49)), (-0.9, 0.09, (0.0, 0.376))]
+)
+def test_what_a_film_has_gained_is_known_by_a_factor_and_what_it_has_lost_by_a_share(amplitude, sigma, ends):
+    """Beside what the form of the model may have wrong, an eighth of either."""
+    always = (History("always", np.ones((1, 1))),)
+    batch = Batch("film_gain", "group", "1", ("films.air",), np.zeros((1, 1), dtype=int), always)
+    h = Hypothesis(batch, 0, always[0], 9.0, (amplitude,), 1.0)
+    found = cause_of(Accepted(h, (), np.array([amplitude]), sigma**2 * np.eye(1), 9.0, 36.0, ()), small_case.study())
+    assert found.amplitude == pytest.approx(1.0 + amplitude)
+    assert found.ci95 == pytest.approx(ends, abs=0.01)
+
+
 def test_an_exact_factor_is_told_as_a_factor_without_an_interval():
     always = (History("factor", np.ones((1, 1))),)
     batch = Batch(

@@ -30,8 +30,10 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), fault.uncertain(value)))
     told = fault.curve.told
-    change, spread = fault.log_change(value, sigma)  # a conductance is known by a factor
-    low, high = (fault.amplitude(change + z * spread)[0] for z in (-1.96, 1.96))
+    low, high = value - 1.96 * sigma, value + 1.96 * sigma
+    if value > 0.0:  # what a conductance has gained is known by a factor, what it has lost by a share
+        change, spread = fault.log_change(value, sigma)
+        low, high = (fault.amplitude(change + z * spread)[0] for z in (-1.96, 1.96))
     if h.batch.sign:  # the interval ends where physics does
         low, high = (max(low, 0.0), high) if h.batch.sign > 0 else (low, min(high, 0.0))
     size = told(value), told(low), told(high)
