@@ -24,6 +24,7 @@ from twin.diagnose.search.exact import misfit, misfit_of_each
 from twin.diagnose.search.forward import search, search_again
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.limits import limits_at, limits_in, limits_of
+from twin.diagnose.search.loose import loose_ones
 from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.start import begun
 from twin.diagnose.search.strained import strained
@@ -313,12 +314,11 @@ def test_where_more_is_left_the_first_search_stands_or_falls_and_nothing_is_fitt
 
 def test_a_declared_number_is_freed_once(monkeypatch):
     detector, (_, y) = small_case.made_detector(), small_case.source_off(4.5)
-    module = sys.modules[strained.__module__]
     start = begun(detector, y)
     first = search(detector, y, start)
     assert first.loose
     assert [a.hypothesis.family for a in first.accepted] == ["loss_law"]
-    for made in ("settled_alone", "refit"):
-        monkeypatch.setattr(module, made, None)
+    for by, made in ((loose_ones, "settled_alone"), (strained, "refit")):
+        monkeypatch.setattr(sys.modules[by.__module__], made, None)
     again = search_again(detector, y, start, first, 0.5 * first.accepted[0].statistic)
     assert verdict_of(again, FAMILIES)[0] == verdict_of(first, FAMILIES)[0] == "out_of_tolerance"
