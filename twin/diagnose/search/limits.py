@@ -24,8 +24,6 @@ from twin.diagnose.result.diagnosis import Limit
 from twin.diagnose.search.accepted import curved_change, motion, parameter_of
 from twin.diagnose.search.detector import Detector
 
-LARGEST = 100.0  # logarithm of a factor: beyond every range, and a number still
-
 
 def limits_in(detector: Detector) -> Iterator[tuple[Batch, np.ndarray]]:
     """Of every batch whose size is free (p, h): the amplitude that would have been named in 95 of 100 cases, at each
@@ -70,8 +68,8 @@ def _by_calibration(detector: Detector, batch: Batch, j: int, information: float
     certain = float(np.clip(scale**2 * information, 1e-12, 1.0))  # 1 - v
     sigma = np.sqrt((1.0 - certain) / certain)
     out = max(float(detector.pulls.fitted.limit[j]) / certain, policy.outside, float(np.sqrt(threshold)) * sigma)
-    change = min(scale * float(out + policy.power * sigma), LARGEST)
-    return fault_of(batch).amplitude(change)[0]
+    change = scale * float(out + policy.power * sigma)
+    return fault_of(batch).amplitude(change)[0] if change < np.log(np.finfo(float).max) else np.inf
 
 
 def _curved(detector: Detector, batch: Batch, needed: float, projector: Projector) -> np.ndarray:
