@@ -38,8 +38,8 @@ def loose_ones(
 
     Out of its tolerance is what lies outside without one, too, on the same side, and surely not where it was declared:
     by the settled calibration, or by the fit that finds causes where the other does not contradict it. The former is
-    sure of no film of a heavy body and of no small source, but not biased; the latter takes for them what another mesh
-    makes of a joint. So where it alone is sure it is to be as sure as any cause has to be.
+    sure of no film of a heavy body and of no small source, but not biased; the latter is, and takes for a joint what
+    another mesh makes of it. So where it alone is sure it is to be as sure as any cause has to be.
     """
     policy, strain, found = detector.policy, detector.pulls.strain(fitted.x, settled), list[Loose]()
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
@@ -76,8 +76,8 @@ def _as_sure_as_any(detector: Detector, fitted: Fitted, efficient: Loose, robust
 
 
 def _contradicted(efficient: Loose, robust: Loose, policy: SearchPolicy) -> bool:
-    """Whether a robust estimate refutes an efficient one, by less than `alone` of which it may differ for other
-    reasons (Hausman, Econometrica 46, 1978: two estimates of which one alone suffers from what is misspecified)."""
+    """Whether the 95 % interval of a robust estimate excludes even `alone` of an efficient one (Hausman, Econometrica
+    46, 1978, on two estimates of which one alone suffers from what is misspecified)."""
     toward = float(np.sign(efficient.x))
     return toward * robust.x + policy.sure * robust.sigma < policy.alone * abs(efficient.x)
 
