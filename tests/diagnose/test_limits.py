@@ -52,6 +52,18 @@ def test_a_declared_number_is_seen_from_its_limit_on(place):
     assert sum(out_of_tolerance(j, x / 3.0, seed) for seed in range(4)) <= 1
 
 
+def test_losses_are_seen_by_calibration_where_their_statistics_say_at_no_size():
+    """The figures of docs/diagnosis.md: as factors, of which a source may have 5."""
+    detector = small_case.made_detector()
+    alone, seen = [], []
+    for name in ("nut", "motor", "front", "rear"):
+        batch, _, information, _ = informed(f"sources.{name}")
+        alone.append(np.exp(deviations_needed(detector, batch) / np.sqrt(information[0])))
+        seen.append(np.exp(limits_at(detector)[batch.family, batch.unit, f"sources.{name}", False]))
+    assert min(alone) == pytest.approx(6.5, abs=0.05)
+    assert seen == pytest.approx([1.45, 2.36, 2.39, np.inf], abs=0.01)
+
+
 def test_information_says_how_sure_calibration_is():
     """1 - v = s^2 I (module docstring of `limits`)."""
     detector = small_case.made_detector()

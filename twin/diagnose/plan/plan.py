@@ -1,9 +1,9 @@
 """The next experiment: of one more run, or one more sensor, what lowers the detection limit of a suspicion most.
 
 A detection limit is (sqrt(threshold) + z) / sqrt(I) with I the information about a size after everything calibratable
-is projected out (`limits.limits_at`). An experiment adds to I. The detector's I of today is what counts; what an
-experiment adds is computed without the learned modes of model discrepancy (`foreseen`), and reduced by the share of I
-that they leave today: the same discrepancy, as large in the new run.
+is projected out; a declared number has one by calibration, too (`limits.seen_from`). An experiment adds to I. The
+detector's I of today is what counts; what an experiment adds is computed without the learned modes of model discrepancy
+(`foreseen`), and reduced by the share of I that they leave today: the same discrepancy, as large in the new run.
 """
 
 from __future__ import annotations

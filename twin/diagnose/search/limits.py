@@ -63,7 +63,8 @@ def seen_from(
 
 
 def _by_calibration(detector: Detector, batch: Batch, j: int, information: float) -> float:
-    """From which amplitude on calibration finds the declared number j out of its tolerance, in 95 of 100 cases."""
+    """From which amplitude on the fit that finds causes moves the declared number j out of its tolerance, in 95 of 100
+    cases; the settled calibration may see it earlier, and is not counted."""
     policy, scale, threshold = detector.policy, float(detector.study.scale[j]), detector.thresholds[batch.family]
     certain = float(np.clip(scale**2 * information, 1e-12, 1.0))  # 1 - v
     sigma = np.sqrt((1.0 - certain) / certain)
