@@ -24,8 +24,8 @@ from twin.inject.judge.match import effect, known_of, place_of, same_place
 KNOWN = known_of(EXPERIMENT)
 GOLDEN: dict[str, Any] = json.loads((Path(verdicts.__file__).parent / "verdicts.json").read_text(encoding="utf-8"))
 # Of each quantity's own scale. The same processor gives 1e-9; refits stop when they move little, which turns the last
-# digits of another processor's kernels into 1e-8 (seen elsewhere).
-TOLERANCE = 1e-6
+# digits of another processor's kernels into up to 1.7e-5 (thresholds; seen elsewhere).
+TOLERANCE = 1e-4
 ROUGH = ("null_law",)  # right with all synthetic measurements, not with few
 LONG = ("outside", "sun", "two", *OWN)  # minutes long, or for minutes at a null distribution of their own
 AGAIN = (  # of families and kinds that other trials have
