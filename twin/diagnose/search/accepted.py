@@ -59,24 +59,25 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
     return [] if j is None else [j]
 
 
-def jacobian(detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, np.ndarray, float]]) -> np.ndarray:
-    """(m, n) of the outputs by the parameters at x (n,) beside causes of these amplitudes (q,) that explain so much;
-    the column of a number whose place a cause takes is empty.
+def jacobian(
+    detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, np.ndarray]], closely: bool
+) -> np.ndarray:
+    """(m, n) of the outputs by the parameters at x (n,) beside causes of these amplitudes (q,); the column of a number
+    whose place a cause takes is empty. closely: with what parameters do to the response to strong ones.
 
     Causes that take a parameter's place are put there, for a film of nine times its size changes what every other
-    parameter does. Conductances beyond their bounds, corrected signals, and causes so strong that what parameters do to
-    their response counts, get derivatives made anew, for no surrogate knows of them; unless this diagnosis has made
-    some nearer than `anew`, from which the surrogate goes on.
+    parameter does. Conductances beyond their bounds, corrected signals and strong causes get derivatives made anew, for
+    no surrogate knows of them; unless this diagnosis has made some nearer than `anew`, from which the surrogate goes on.
     """
     study = detector.study
     low, high = bounds(study)
     there, held, anew = x.copy(), list[int](), False
-    for h, amplitude, _ in causes:
+    for h, amplitude in causes:
         for j in freed(study, h):
             there[j] = fault_of(h).log_change(float(amplitude[0]))[0] / study.scale[j]
             held.append(j)
             anew |= fault_of(h).conducts and not low[j] <= there[j] <= high[j]
-    beside = [(h, a) for h, a, explained in causes if fault_of(h).corrects or strong(detector, h, explained)]
+    beside = [(h, a) for h, a in causes if fault_of(h).corrects or (closely and strong(detector, h))]
     J = detector.fitter.surrogate.at(there)[1]
     if anew or beside:
         J += _unknown_to_surrogate(detector, there, J, beside)
@@ -84,13 +85,16 @@ def jacobian(detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesi
     return J
 
 
-def strong(detector: Detector, h: Hypothesis, explained: float) -> bool:
-    """Whether an error of a twentieth of the response to a cause that explains so much would pass for another cause.
-    Not where it has the place of a parameter, beside whose change the surrogate knows what others do. A source that is
-    elsewhere is, whatever it explains: the surrogate knows what its number does where the source is not."""
-    if detector.policy.misfit * explained <= (0.0 if fault_of(h).elsewhere else min(detector.thresholds.values())):
+def strong(detector: Detector, h: Hypothesis) -> bool:
+    """Whether an error of a twentieth of the response to a cause would pass for another cause. Of the response as it
+    is: calibration may imitate nearly all of it, and does not imitate the error. Not where the cause has the place of a
+    parameter, beside whose change the surrogate knows what others do. A source that is elsewhere is strong whatever its
+    size: the surrogate knows what its number does where the source is not."""
+    if not units_of(detector.study, h) or freed(detector.study, h):
         return False
-    return bool(units_of(detector.study, h)) and not freed(detector.study, h)
+    response = readings_columns(detector, h) @ np.array(h.amplitude)
+    limit = min(detector.thresholds.values())
+    return fault_of(h).elsewhere or detector.policy.misfit * float(response @ response) > limit
 
 
 def _unknown_to_surrogate(

@@ -80,7 +80,7 @@ def closer(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> 
     Every step otherwise counts what the most likely parameters of the linear model would leave: far from the minimum
     even a wrong linear model explains nearly all, and one of several strong causes leads by that alone.
     """
-    if fault_of(h).curved or not strong(detector, h, excess(detector, fitted)):
+    if fault_of(h).curved or not strong(detector, h):
         return h
     return max(h, reached(detector, y, fitted, h), key=lambda own: own.statistic)
 
@@ -94,11 +94,6 @@ def reached(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) ->
     return _descended(detector, y, fitted, _Point(np.array(h.amplitude), x, h), detector.policy.window_passes, True)
 
 
-def excess(detector: Detector, fitted: Fitted) -> float:
-    """What a fit leaves beyond noise: no cause explains more."""
-    return misfit(detector, fitted) - float(np.isfinite(fitted.residual).sum())
-
-
 def _descended(
     detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, passes: int, closely: bool = False
 ) -> Hypothesis:
@@ -106,7 +101,6 @@ def _descended(
     study, policy, h = detector.study, detector.policy, now.h
     fault, q = fault_of(h), h.batch.q
     before, inner = misfit(detector, fitted), edges_of(study, h)
-    explained = excess(detector, fitted) if closely else 0.0
     read = readings_columns(detector, h) if fault.read else np.zeros((len(y), q))
     (low, high), (mean, inverse), floor = bounds(study), fault.prior(q), lowest(detector, h)
     a = np.maximum(now.a, floor)
@@ -124,7 +118,7 @@ def _descended(
     for i in range(passes or held + (policy.passes if not inner else policy.window_passes)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
         outputs, derivatives = _outputs(detector, now, edges)
-        J = jacobian(detector, now.x, [(now.h, now.a, explained)])
+        J = jacobian(detector, now.x, [(now.h, now.a)], closely)
         projector = detector.fitter.projector(J, fitted.more)
         there = detector.whiten(y - fitted.beside - outputs) - read @ now.a
         left = there + detector.whiten(J @ now.x)

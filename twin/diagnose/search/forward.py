@@ -22,7 +22,7 @@ from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, settled, strong
 from twin.diagnose.search.contest import judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
-from twin.diagnose.search.exact import beginning, excess, misfit, misfit_of_each, unexplained
+from twin.diagnose.search.exact import beginning, misfit, misfit_of_each, unexplained
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Search, Step, cosines, distinct, look
@@ -117,7 +117,7 @@ def _named(
     detector: Detector, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], h: Hypothesis
 ) -> Hypothesis:
     """A strong hypothesis by what is left once it is named; unchanged where that explains no more."""
-    if fault_of(h).curved or not strong(detector, h, excess(detector, fitted)):
+    if fault_of(h).curved or not strong(detector, h):
         return h
     try:
         after, _ = refit(detector, y, beginning(fitted.x, detector.policy), [*accepted, as_scored(detector.study, h)])

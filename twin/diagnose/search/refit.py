@@ -70,16 +70,13 @@ def refit(
     best: Any = None  # the pass with the least misfit, at the parameters and amplitudes that it began with
     # the surrogate's derivatives, until strong causes leave more than chance: others take as long as a calibration
     closely, begun = False, (x, amplitude)
-    closer = any(strong(detector, a.hypothesis, a.statistic) for a in accepted)
+    closer = any(strong(detector, a.hypothesis) for a in accepted)
     J, passes = np.zeros((len(y), len(x))), policy.refits
     while passes:
         passes -= 1
         there = shifted(study, x, gains, amplitude)
-        sizes = [
-            (a.hypothesis, amplitude[own], a.statistic if closely else 0.0)
-            for a, own in zip(accepted, of_each, strict=True)
-        ]
-        J = jacobian(detector, x, sizes)
+        sizes = [(a.hypothesis, amplitude[own]) for a, own in zip(accepted, of_each, strict=True)]
+        J = jacobian(detector, x, sizes, closely)
         bent, states = np.zeros(len(y)), motion(detector, there)
         for a, own in zip(accepted, of_each, strict=True):
             fault = fault_of(a.hypothesis)

@@ -20,8 +20,8 @@ def support_of(found: Search) -> Support | None:
     if not found.accepted:
         return None
     detector, first, others = found.detector, found.accepted[0], found.accepted[1:]
-    sizes = [(a.hypothesis, a.amplitude, a.statistic) for a in found.accepted]
-    J = jacobian(detector, np.clip(found.x, -3.0, 3.0), sizes)
+    sizes = [(a.hypothesis, a.amplitude) for a in found.accepted]
+    J = jacobian(detector, np.clip(found.x, -3.0, 3.0), sizes, closely=True)
     beside = [readings_columns(detector, a.hypothesis) for a in others]
     projector = detector.fitter.projector(J, np.hstack(beside) if beside else None)
     explained = _change(detector, first, found.x)
