@@ -209,19 +209,19 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
     return np.concatenate(parts)
 
 
-def lagged(study: Study, states: Mapping[int, np.ndarray], sensor: str, seconds: float) -> np.ndarray:
+def lagged(study: Study, states: Callable[[int], np.ndarray], sensor: str, seconds: float) -> np.ndarray:
     """(m,) what the fitted runs read more where a sensor follows with a time constant of `seconds` [s], per second.
 
-    states: (n + 1, r) of the runs, by their number. A run begins with the sensor as warm as what it sits on.
+    states: (n + 1, r) of run k. A run begins with the sensor as warm as what it sits on.
     """
     (body,) = study.probed.base.bodies
     parts = []
     for k in study.fitted:
         plan = study.runs[k]
         T = np.zeros(plan.shapes[0])
-        if k in states and sensor in plan.measured.sensors:
+        if sensor in plan.measured.sensors:
             i = plan.measured.sensors.index(sensor)
-            read = states[k] @ body.C[plan.measured.column[i]]
+            read = states(k) @ body.C[plan.measured.column[i]]
             keep = math.exp(-float(plan.run.drive.time[1] - plan.run.drive.time[0]) / seconds)
             followed, _ = lfilter([1.0 - keep], [1.0, -keep], read, zi=[keep * read[0]])
             T[:, i] = plan.measured.mean_of @ (followed - read)

@@ -18,8 +18,7 @@ class Lag(Fault):
     """A sensor that follows late."""
 
     def change(self, study: Study, states: Callable[[int], np.ndarray], name: str, size: float) -> np.ndarray:
-        seen = {k: states(k) for k in study.fitted}
-        return size * lagged(study, seen, self.bare(name), max(size, self.least))
+        return size * lagged(study, states, self.bare(name), max(size, self.least))
 
 
 FAULTS = (
