@@ -11,13 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.diagnose.evidence.leading import LEAST, channel_of, leading, leading_of_each
-from twin.diagnose.evidence.nulls import Form
+from twin.diagnose.evidence.nulls import READ, Form
 from twin.diagnose.evidence.whiten import Whitener
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 
 CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
-READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from twin.rom.parameter import OF_LAWS
 # of parameters, in prior standard deviations: all that lies within the stated tolerance is alike likely, and nothing
 # beyond it (rectangular distribution; JCGM 100:2008, 4.3.7)
 SPREAD = 3.0**-0.5
+READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
 
 
 @dataclass(frozen=True)
@@ -237,7 +238,7 @@ def _body_starts(study: Study, rng: np.random.Generator) -> np.ndarray:
 
 def _readings(study: Study, J: list[np.ndarray], rng: np.random.Generator, form: Form) -> list[np.ndarray]:
     """Per fitted run (size,): each channel's own error of what every source and contact does to it."""
-    sources = [i for i, p in enumerate(study.probed.parameters) if p.kind in ("source", "contact", "joint")]
+    sources = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
     sigma = study.scale[sources]
     names = study.probed.base.sensors
     of_sensor = form.reading * rng.standard_normal((len(names), len(sources)))
