@@ -12,6 +12,7 @@ import numpy as np
 
 from twin.diagnose.evidence.leading import LEAST, channel_of, leading, leading_of_each
 from twin.diagnose.evidence.nulls import READ, Form
+from twin.diagnose.evidence.unknown import correlation
 from twin.diagnose.evidence.whiten import Whitener
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
@@ -58,13 +59,8 @@ def _aside(study: Study, nominal: tuple[Nominal, ...], m: int, form: Form) -> np
 
 def _wobbles(study: Study, described: Described, raw: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
     """Per film the leading directions of its slow variation within runs."""
-    blocks = described.blocks
-    run = np.array([i for i, _, _ in blocks])
-    when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)
     time = study.runs[study.fitted[0]].run.drive.time
-    memory = form.shape_time / (time[1] - time[0])
-    R = np.exp(-0.5 * ((when[:, None] - when) / memory) ** 2) * (run[:, None] == run)
-    root = np.linalg.cholesky(R + 1e-6 * np.eye(len(R)))
+    root = np.linalg.cholesky(correlation(described.blocks, form.shape_time / (time[1] - time[0])))
     return [leading(whiten(form.shape * raw[:, own].astype(float) @ root)) for own in described.slow]
 
 
