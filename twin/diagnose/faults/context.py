@@ -120,9 +120,7 @@ def stretches(context: Context) -> list[Stretch]:
 
 def lasting(context: Context) -> list[Stretch]:
     """From an hour on: to the end of the last run."""
-    last = context.study.runs[context.study.fitted[-1]].run.name
-    n = len(context.elements.histories.blocks)
-    return [w for w in stretches(context) if w[1][n - 1] == 1.0 and w[2][-1].run == last]
+    return [w for w in stretches(context) if w[1][-1] == 1.0]
 
 
 def of_stretches(found: Sequence[Stretch], before: int = 0) -> list[History]:
