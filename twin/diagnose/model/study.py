@@ -18,6 +18,7 @@ from twin.diagnose.model.probed_model import ProbedModel, ProbedRun
 from twin.diagnose.model.slots import Slots, first_slots, no_slots
 from twin.errors import TwinError
 from twin.rom.contact_matrix import ContactPlaces
+from twin.rom.model import MachineModel
 from twin.run.replay import at_rest
 from twin.run.system import Layout
 
@@ -190,11 +191,15 @@ def make_study(probed: ProbedModel, measured: Sequence[Measured], fitted: Sequen
     for run, m in zip(probed.runs, measured, strict=True):
         members = np.asarray(effects.G).reshape(-1, n_poses, 3, body.n)
         rows = Rows(m.tcp_step, m.tcp_share, np.tensordot(m.pose, G, 1), np.einsum("kp,epcr->ekcr", m.pose, members))
-        z0 = (run.start - probed.base.reference_temperature) * body.one
-        if run.rested:
-            z0 = at_rest(probed.base, run.drive, run.start)
-        planned.append(Planned(run, m, rows, z0))
+        planned.append(Planned(run, m, rows, start_of(probed.base, run)))
     return Study(probed, effects, tuple(planned), tuple(fitted))
+
+
+def start_of(model: MachineModel, run: ProbedRun) -> np.ndarray:
+    """State (N,) in which a run of a model begins, in the model's own coordinates."""
+    if run.rested:
+        return at_rest(model, run.drive, run.start)
+    return np.concatenate([(run.start - model.reference_temperature) * b.one for b in model.bodies])
 
 
 def with_measured(study: Study, measured: Sequence[Measured]) -> Study:
