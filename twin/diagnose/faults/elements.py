@@ -57,7 +57,6 @@ class Histories:
     speeds: dict[str, tuple[np.ndarray, ...]]  # "x_speed^0.6": of convection
     blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first step, end)
     unit: dict[str, tuple[str, float, float]]  # history -> signal, exponent, value [SI] at which s = 1
-    same: dict[str, str]  # signal -> the one of its shape that stands for it
 
 
 @dataclass(frozen=True)
@@ -108,8 +107,7 @@ def histories_of(study: Study) -> Histories:
             table[name] = values
             unit[name] = (signal, exponent, scale)
 
-    seen: dict[str, np.ndarray] = {}
-    same: dict[str, str] = {}
+    seen: list[np.ndarray] = []
     for signal in units:
         if signal in positions or any(signal not in run.signals for run in runs):
             continue
@@ -118,10 +116,9 @@ def histories_of(study: Study) -> Histories:
         if top <= 1e-9 * max(bounds[signal], 1e-30):
             continue
         shape = whole / top
-        same[signal] = next((name for name, other in seen.items() if np.abs(shape - other).max() < 1e-3), signal)
-        if same[signal] != signal:
+        if any(np.abs(shape - other).max() < 1e-3 for other in seen):
             continue  # motor speed and axis speed are one history
-        seen[signal] = shape
+        seen.append(shape)
         for e in HEATING.get(units[signal], ()):
             add(signals, signal if e == 1.0 else f"{signal}^{e:.3g}", signal, e, top)
         if units[signal] in SPEEDS:
@@ -133,7 +130,7 @@ def histories_of(study: Study) -> Histories:
         if run.drive.n_steps - edges[-1] < per / 2 and len(edges) > 1:
             edges.pop()
         blocks += [(i, a, b) for a, b in zip(edges, [*edges[1:], run.drive.n_steps], strict=True)]
-    return Histories(signals, speeds, tuple(blocks), unit, same)
+    return Histories(signals, speeds, tuple(blocks), unit)
 
 
 def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
