@@ -102,10 +102,8 @@ def histories_of(study: Study) -> Histories:
     unit: dict[str, tuple[str, float, float]] = {"always": ("", 1.0, 1.0)}
 
     def add(table: dict[str, tuple[np.ndarray, ...]], name: str, signal: str, exponent: float, scale: float) -> None:
-        values = tuple(np.abs(run.signals[signal] / scale) ** exponent for run in runs)
-        if max(float(v.max()) for v in values) > 0.02:
-            table[name] = values
-            unit[name] = (signal, exponent, scale)
+        table[name] = tuple(np.abs(run.signals[signal] / scale) ** exponent for run in runs)
+        unit[name] = (signal, exponent, scale)
 
     seen: list[np.ndarray] = []
     for signal in units:
