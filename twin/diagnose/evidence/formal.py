@@ -64,10 +64,10 @@ def _wobbles(study: Study, described: Described, raw: np.ndarray, whiten: Whiten
     return [leading(whiten(form.shape * raw[:, own].astype(float) @ root)) for own in described.slow]
 
 
-def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.ndarray:
+def of_channels(study: Study, white: np.ndarray) -> np.ndarray:
     """(m, k) columns of unit prior variance: every channel's own error of a white response (m,)."""
     label = channel_of(study)
-    columns = [np.where(label == channel, share * white, 0.0) for channel in np.unique(label)]
+    columns = [np.where(label == channel, CAUSE * white, 0.0) for channel in np.unique(label)]
     kept = [c for c in columns if np.linalg.norm(c) > LEAST]
     return np.stack(kept, axis=1) if kept else np.zeros((len(white), 0))
 
