@@ -141,7 +141,7 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
 
     z = [_state(own.states, np.asarray(p.rows.step) + np.asarray(p.rows.share))
          for p, own in zip(plans, nominal, strict=True)]  # fmt: skip
-    positions = [_positions(plan, t) for plan, t in zip(plans, times, strict=True)]
+    positions = [plan.measured.position for plan in plans]
     axes = [(i, a) for i, a in enumerate(probed.base.load_model.axes)
             if any(np.ptp(p[:, i]) > 1e-6 for p in positions if len(p))]  # fmt: skip
     for m, member in enumerate(body.members):
@@ -235,17 +235,6 @@ def _state(states: np.ndarray, at: np.ndarray) -> np.ndarray:
     step = np.minimum(at.astype(int), len(states) - 2)
     share = (at - step)[:, None]
     return np.asarray(states[step] + share * (states[step + 1] - states[step]))
-
-
-def _positions(plan: Planned, time: np.ndarray) -> np.ndarray:
-    """(k, n_axes) m of the axes where the TCP was measured."""
-    drive = plan.run.drive
-    if not len(time):
-        return np.zeros((0, drive.position.shape[1]))
-    if plan.measured.position is not None:
-        return plan.measured.position
-    step = np.clip(np.searchsorted(drive.time - drive.time[0], time) - 1, 0, drive.n_steps - 1)
-    return np.asarray(drive.position[step])
 
 
 def _at(plan: Planned, signal: str, time: np.ndarray) -> np.ndarray:
