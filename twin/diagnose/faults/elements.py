@@ -174,7 +174,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     for p, place in enumerate(probed.places):
         b = probed.B[p]
         add("heat", place.name, [b] * len(runs), histories.signals, True)
-        e = film_env[films.index(place.film)] if place.film else load.surroundings
+        e = environment_at(study, p)
         flow = [-x @ probed.A[p].T + a[:, [e]] * probed.M[p] for x, a in zip(z, air, strict=True)]
         add("film", place.name, flow, {**always, **histories.speeds}, True)
         stored = [-np.outer(np.diff(own.states @ b, axis=0) * own.rate, b) for own in nominal]
@@ -215,6 +215,12 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
             only_here = [pulse if j == i else None for j in range(len(runs))]
             add("start", f"{runs[i].name}.{m}", [field] * len(runs), {"always": only_here})
     return Elements(histories, tuple(tuple(v) for v in vectors), tuple(columns), index, block_of)
+
+
+def environment_at(study: Study, p: int) -> int:
+    """Number of the environment that the film of place p is in."""
+    load, film = study.probed.base.load_model, study.probed.places[p].film
+    return next((f.environment for f in load.films if f.name == film), load.surroundings)
 
 
 def pivot(study: Study, e: int) -> float:
