@@ -59,8 +59,7 @@ def _aside(study: Study, nominal: tuple[Nominal, ...], m: int, form: Form) -> np
 
 def _wobbles(study: Study, described: Described, raw: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
     """Per film the leading directions of its slow variation within runs."""
-    time = study.runs[study.fitted[0]].run.drive.time
-    root = np.linalg.cholesky(correlation(described.blocks, form.shape_time / (time[1] - time[0])))
+    root = np.linalg.cholesky(correlation(described.blocks, form.shape_time / study.fitted_runs[0][1]))
     return [leading(whiten(form.shape * raw[:, own].astype(float) @ root)) for own in described.slow]
 
 

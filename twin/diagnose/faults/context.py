@@ -81,17 +81,15 @@ def logs(context: Context, names: Sequence[str], n: int) -> list[History]:
 
 def windows_of(context: Context) -> list[Stretch]:
     """Every stretch of hours within a run, and from every hour on to the end."""
-    blocks = context.elements.histories.blocks
-    study = context.study
-    runs = [study.runs[k].run for k in study.fitted]
+    blocks, runs = context.elements.histories.blocks, context.study.fitted_runs
     own = [[b for b, (i, _, _) in enumerate(blocks) if i == r] for r in range(len(runs))]
 
     def part(r: int, first: int, last: int) -> tuple[np.ndarray, Window]:
-        dt = runs[r].drive.time[1] - runs[r].drive.time[0]
+        name, dt = runs[r]
         chosen = own[r][first : last + 1]
         weights = np.zeros(len(blocks))
         weights[chosen] = 1.0
-        return weights, Window(runs[r].name, blocks[chosen[0]][1] * dt, blocks[chosen[-1]][2] * dt)
+        return weights, Window(name, blocks[chosen[0]][1] * dt, blocks[chosen[-1]][2] * dt)
 
     result: list[Stretch] = []
     for r, of_run in enumerate(own):
