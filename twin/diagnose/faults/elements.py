@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.places import beside
+from twin.diagnose.evidence.film_laws import SPEEDS
 from twin.diagnose.evidence.nulls import convection
 from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.integration import gammas
@@ -42,7 +43,6 @@ MISREAD = {
     "1/s": (0.5, 2.0, 60.0, 1 / 60.0),
 }
 EXPONENT = 0.6  # of speeds in forced convection
-SPEEDS = ("m/s", "1/s")  # units
 HEATING = {"A": (2.0,), "m/s": (1.0,), "1/s": (1.0, 5.0 / 3.0), "W": (1.0,), "1": (1.0,)}  # exponents by unit, of heat
 LAWS = (1.0, 5.0 / 3.0, 2.0, 8.0 / 3.0)  # exponents of speeds in losses
 
