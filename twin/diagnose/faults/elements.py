@@ -31,6 +31,7 @@ from twin.diagnose.model.integration import gammas
 from twin.diagnose.model.study import Study, own_place
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place
+from twin.rom.load_model import LoadModel, Signal
 from twin.run.system import System
 
 BLOCK = 3600.0  # s
@@ -93,9 +94,6 @@ def histories_of(study: Study) -> Histories:
     """Histories of the logged signals that tell how hard a drive works, and blocks of an hour."""
     load = study.probed.base.load_model
     runs = [planned.run for planned in study.runs]
-    positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
-    units = {s.name: s.unit for s in load.signals}
-    bounds = {s.name: max(abs(s.low), abs(s.high)) for s in load.signals}
     n = [run.drive.n_steps for run in runs]
     signals: dict[str, tuple[np.ndarray, ...]] = {"always": tuple(np.ones(k) for k in n)}
     speeds: dict[str, tuple[np.ndarray, ...]] = {}
@@ -106,21 +104,22 @@ def histories_of(study: Study) -> Histories:
         unit[name] = (signal, exponent, scale)
 
     seen: list[np.ndarray] = []
-    for signal in units:
-        if signal in positions or any(signal not in run.signals for run in runs):
+    for signal in _of_drives(load):
+        name = signal.name
+        if any(name not in run.signals for run in runs):
             continue
-        whole = np.abs(np.concatenate([run.signals[signal] for run in runs]))
+        whole = np.abs(np.concatenate([run.signals[name] for run in runs]))
         top = float(whole.max())
-        if top <= 1e-9 * max(bounds[signal], 1e-30):
+        if top <= 1e-9 * max(abs(signal.low), abs(signal.high), 1e-30):
             continue
         shape = whole / top
         if any(np.abs(shape - other).max() < 1e-3 for other in seen):
             continue  # motor speed and axis speed are one history
         seen.append(shape)
-        for e in HEATING.get(units[signal], ()):
-            add(signals, signal if e == 1.0 else f"{signal}^{e:.3g}", signal, e, top)
-        if units[signal] in SPEEDS:
-            add(speeds, f"{signal}^{EXPONENT:g}", signal, EXPONENT, top)
+        for e in HEATING.get(signal.unit, ()):
+            add(signals, name if e == 1.0 else f"{name}^{e:.3g}", name, e, top)
+        if signal.unit in SPEEDS:
+            add(speeds, f"{name}^{EXPONENT:g}", name, EXPONENT, top)
     blocks = []
     for i, run in enumerate(runs[: len(study.fitted)]):
         per = round(BLOCK / (run.drive.time[1] - run.drive.time[0]))
@@ -129,6 +128,12 @@ def histories_of(study: Study) -> Histories:
             edges.pop()
         blocks += [(i, a, b) for a, b in zip(edges, [*edges[1:], run.drive.n_steps], strict=True)]
     return Histories(signals, speeds, tuple(blocks), unit)
+
+
+def _of_drives(load: LoadModel) -> list[Signal]:
+    """Logged signals but positions of axes and temperatures of air."""
+    others = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
+    return [s for s in load.signals if s.name not in others]
 
 
 def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
@@ -282,7 +287,6 @@ def _signals(
     """(signal, factor, per run (n, r)): what all laws that read a signal would add, were it larger by a factor."""
     probed, load = study.probed, study.probed.base.load_model
     (body,) = probed.base.bodies
-    positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
     uses = [s.use for s in load.sources] + [f.use for f in load.films]
     read = {s for use in uses for s in use.signals.values()}
     A, M = np.asarray(probed.system.A[0]), np.asarray(probed.system.M)
@@ -291,8 +295,8 @@ def _signals(
     B[:, list(body.sources)] = body.B
     B[:, in_contact] = 0.0
     result = []
-    for signal in load.signals:
-        if signal.name in positions or signal.name not in read:
+    for signal in _of_drives(load):
+        if signal.name not in read:
             continue
         for factor in MISREAD.get(signal.unit, ()):
             per_run, moves = [], False
