@@ -41,13 +41,10 @@ def heat_of(study: Study, blocks: Sequence[tuple[int, int, int]], of_place: Mapp
     run, first step, end)."""
     parts = list(dict.fromkeys(m for p in study.probed.places for m in p.members))
     length = float(np.median([b - a for _, a, b in blocks]))
-    surfaces, columns = [], []
-    for part in parts:
-        own = [p.name for p in study.probed.places if part in p.members and not Spot.read(p.name).pad]
-        c = np.concatenate([of_place[name] for name in own]) if own else np.zeros(0, int)
-        surfaces.append(tuple(own))
-        columns.append(c)
-    return Heat(tuple(parts), tuple(surfaces), tuple(columns), (), (), (), correlation(blocks, MEMORY * length))
+    faces = [p for p in study.probed.places if not Spot.read(p.name).pad]
+    surfaces = tuple(tuple(p.name for p in faces if part in p.members) for part in parts)
+    columns = tuple(np.concatenate([np.zeros(0, int), *(of_place[name] for name in own)]) for own in surfaces)
+    return Heat(tuple(parts), surfaces, columns, (), (), (), correlation(blocks, MEMORY * length))
 
 
 def correlation(blocks: Sequence[tuple[int, int, int]], memory: float) -> np.ndarray:
