@@ -128,11 +128,11 @@ def of_stretches(found: Sequence[Stretch], before: int = 0) -> list[History]:
 
 def most_heat(context: Context) -> float:
     """W: what no undescribed source can exceed, all that the machine is said to turn into heat at once in any run."""
-    most = 0.0
+    most = CABINET
     for k in context.study.fitted:
         drive = context.study.runs[k].run.drive
         total = drive.power.sum(axis=1) + np.abs(drive.port_heat).sum(axis=1)
         if drive.losses.index:
             total = total + drive.losses.value.max(axis=2).sum(axis=1)
         most = max(most, float(total.max(initial=0.0)))
-    return max(most, CABINET)
+    return most
