@@ -117,7 +117,7 @@ def null(
                 A += strength * probed.A[p]
                 M += strength * probed.M[p]
         rise = run.drive.environment[:, load.surroundings] - probed.base.reference_temperature
-        slow = _smooth(rng, n, len(load.films), form.shape_time / (run.drive.time[1] - run.drive.time[0]))
+        slow = _smooth(rng, n, len(load.films), form.shape_time / run.step)
         wobble = law * (1.0 + mean + form.shape * slow) - 1.0
         forcing = np.zeros((n, body.n))
         for j, vector in enumerate(split):

@@ -122,7 +122,7 @@ def histories_of(study: Study) -> Histories:
             add(speeds, f"{name}^{EXPONENT:g}", name, EXPONENT, top)
     blocks = []
     for i, run in enumerate(runs[: len(study.fitted)]):
-        per = round(BLOCK / (run.drive.time[1] - run.drive.time[0]))
+        per = round(BLOCK / run.step)
         edges = list(range(0, run.drive.n_steps, per))
         if run.drive.n_steps - edges[-1] < per / 2 and len(edges) > 1:
             edges.pop()
@@ -335,8 +335,7 @@ def _evaluated(study: Study, k: int, signal: str, factor: float) -> tuple[list[i
     only = replace(load, pairs=(), joints=(), rails=(), ports=(), axes=(), sources=reading,
                    films=tuple(load.films[f] for f in films))  # fmt: skip
     signals = {name: values * (factor if name == signal else 1.0) for name, values in run.signals.items()}
-    dt = run.drive.time[1] - run.drive.time[0]
-    return sources, films, evaluate(only, run.drive.time[:-1], signals, dt, run.drive.n_steps)
+    return sources, films, evaluate(only, run.drive.time[:-1], signals, run.step, run.drive.n_steps)
 
 
 def _fields(study: Study) -> list[tuple[str, np.ndarray]]:

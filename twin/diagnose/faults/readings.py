@@ -200,7 +200,7 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
         plan = study.runs[k]
         T, w = None, None
         if k in states:
-            z, steps = states[k], by / float(plan.run.drive.time[1] - plan.run.drive.time[0])
+            z, steps = states[k], by / plan.run.step
             read = z @ body.C.T[:, plan.measured.column]
             T = plan.measured.mean_of @ (_state(read, np.arange(len(z)) - steps) - read)
             at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
@@ -222,7 +222,7 @@ def lagged(study: Study, states: Callable[[int], np.ndarray], sensor: str, secon
         if sensor in plan.measured.sensors:
             i = plan.measured.sensors.index(sensor)
             read = states(k) @ body.C[plan.measured.column[i]]
-            keep = math.exp(-float(plan.run.drive.time[1] - plan.run.drive.time[0]) / seconds)
+            keep = math.exp(-plan.run.step / seconds)
             followed, _ = lfilter([1.0 - keep], [1.0, -keep], read, zi=[keep * read[0]])
             T[:, i] = plan.measured.mean_of @ (followed - read)
         parts.append(_numbers(plan, T) / seconds)
@@ -241,7 +241,7 @@ def _at(plan: Planned, signal: str, time: np.ndarray) -> np.ndarray:
     values = plan.run.signals.get(signal)
     if values is None:
         return np.zeros(len(time))
-    step = np.clip((time / (plan.run.drive.time[1] - plan.run.drive.time[0])).astype(int), 0, len(values) - 1)
+    step = np.clip((time / plan.run.step).astype(int), 0, len(values) - 1)
     return np.asarray(values[step])
 
 

@@ -73,8 +73,7 @@ class Study:
     @property
     def fitted_runs(self) -> list[tuple[str, float]]:
         """Name and step [s] of each fitted run."""
-        runs = [self.runs[k].run for k in self.fitted]
-        return [(run.name, float(run.drive.time[1] - run.drive.time[0])) for run in runs]
+        return [(run.name, run.step) for run in (self.runs[k].run for k in self.fitted)]
 
     @property
     def rows(self) -> list[slice]:
