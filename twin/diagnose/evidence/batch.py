@@ -151,7 +151,7 @@ def best(ready: Sequence[Prepared], g: np.ndarray, count: int = 12) -> list[Hypo
     for own in ready:
         scores, information = score(own, g), own.information
         top = np.argmax(scores.statistic, axis=1)
-        for p in np.argsort(-scores.statistic[np.arange(len(top)), top])[:count]:
+        for p in np.argsort(-scores.statistic.max(axis=1))[:count]:
             h = int(top[p])
             amplitude = tuple(map(float, scores.amplitude[p, h]))
             statistic = float(scores.statistic[p, h])

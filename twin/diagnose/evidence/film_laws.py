@@ -35,6 +35,7 @@ FORCED = 2.0
 # hidden had a film of 2.5 times
 STATED = 5.0
 LEAST = 1.0  # W/(m^2 K), of a film at rest
+SPEEDS = ("m/s", "1/s")  # units
 # bounds, standard deviations: as far as synthetic measurements draw
 MOST = 2.5
 
@@ -83,7 +84,7 @@ def _relative_speeds(study: Study) -> list[np.ndarray]:
         for signal in film.use.signals.values():
             values = [np.abs(run.signals.get(signal, np.zeros(run.drive.n_steps))) for run in runs]
             top = max(float(values[k].max()) for k in study.fitted)
-            if units.get(signal) in ("m/s", "1/s") and top > 0.0:
+            if units.get(signal) in SPEEDS and top > 0.0:
                 for own, v in zip(result, values, strict=True):
                     own[:, f] = v / top
     return result

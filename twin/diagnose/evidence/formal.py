@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from twin.diagnose.evidence.leading import LEAST, channel_of, leading, leading_of_each
-from twin.diagnose.evidence.nulls import Form
+from twin.diagnose.evidence.nulls import READ, Form
+from twin.diagnose.evidence.unknown import correlation
 from twin.diagnose.evidence.whiten import Whitener
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 
 CAUSE = 0.04  # of what a cause does to a channel: that channel's own error in it
-READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
 
 
 @dataclass(frozen=True)
@@ -59,20 +59,14 @@ def _aside(study: Study, nominal: tuple[Nominal, ...], m: int, form: Form) -> np
 
 def _wobbles(study: Study, described: Described, raw: np.ndarray, whiten: Whitener, form: Form) -> list[np.ndarray]:
     """Per film the leading directions of its slow variation within runs."""
-    blocks = described.blocks
-    run = np.array([i for i, _, _ in blocks])
-    when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)
-    time = study.runs[study.fitted[0]].run.drive.time
-    memory = form.shape_time / (time[1] - time[0])
-    R = np.exp(-0.5 * ((when[:, None] - when) / memory) ** 2) * (run[:, None] == run)
-    root = np.linalg.cholesky(R + 1e-6 * np.eye(len(R)))
+    root = np.linalg.cholesky(correlation(described.blocks, form.shape_time / study.fitted_runs[0][1]))
     return [leading(whiten(form.shape * raw[:, own].astype(float) @ root)) for own in described.slow]
 
 
-def of_channels(study: Study, white: np.ndarray, share: float = CAUSE) -> np.ndarray:
+def of_channels(study: Study, white: np.ndarray) -> np.ndarray:
     """(m, k) columns of unit prior variance: every channel's own error of a white response (m,)."""
     label = channel_of(study)
-    columns = [np.where(label == channel, share * white, 0.0) for channel in np.unique(label)]
+    columns = [np.where(label == channel, CAUSE * white, 0.0) for channel in np.unique(label)]
     kept = [c for c in columns if np.linalg.norm(c) > LEAST]
     return np.stack(kept, axis=1) if kept else np.zeros((len(white), 0))
 

@@ -24,6 +24,7 @@ from twin.rom.parameter import OF_LAWS
 # of parameters, in prior standard deviations: all that lies within the stated tolerance is alike likely, and nothing
 # beyond it (rectangular distribution; JCGM 100:2008, 4.3.7)
 SPREAD = 3.0**-0.5
+READ = ("source", "contact", "joint")  # kinds of parameters whose effect every channel reads in its own way
 
 
 @dataclass(frozen=True)
@@ -89,13 +90,15 @@ def null(
     (body,) = probed.base.bodies
     load = probed.base.load_model
     local = np.clip(form.local_film * rng.standard_normal(len(probed.places)), -0.8, 0.8)
+    mean, apart = shared_by_film(study, local)
+    names = [f.name for f in load.films]
     contact = np.expm1(form.contact * np.clip(rng.standard_normal(study.slots(0).contact.shape[2]), -2.0, 2.0))
     joint = np.expm1(form.contact * np.clip(rng.standard_normal(len(load.joints)), -2.0, 2.0))
     split = [_beside(study, j, rng, form) for j in range(len(load.sources))]
     E = np.zeros_like(body.A0)
-    for place in heated_places(study):
-        lump = lump_of(study, place, form) * float(np.clip(rng.standard_normal(), -1.8, 1.8))
-        E += lump * np.outer(probed.B[place], probed.B[place])
+    for p in heated_places(study):
+        lump = lump_of(study, p, form) * float(np.clip(rng.standard_normal(), -1.8, 1.8))
+        E += lump * np.outer(probed.B[p], probed.B[p])
     law = np.exp(form.law * np.clip(rng.standard_normal(len(load.films)), -1.5, 1.5)) if form.law else 1.0
     readings = _readings(study, J, rng, form)
     aside = form.aside * rng.standard_normal(len(probed.base.sensors))
@@ -106,16 +109,15 @@ def null(
         slots = study.slots(k)
         n = slots.gate.shape[0]
         run = planned.run
-        films = np.array([[f.name for f in load.films].index(p.film) if p.film else -1 for p in probed.places])
-        mean, apart = shared_by_film(study, local)
         least = convection(run.drive, len(load.films)).min(axis=0)
         A, M = np.zeros_like(body.A0), np.zeros(body.n)
-        for p in np.flatnonzero(films >= 0):
-            strength = apart[p] * least[films[p]]
-            A += strength * probed.A[p]
-            M += strength * probed.M[p]
+        for p, place in enumerate(probed.places):
+            if place.film:
+                strength = apart[p] * least[names.index(place.film)]
+                A += strength * probed.A[p]
+                M += strength * probed.M[p]
         rise = run.drive.environment[:, load.surroundings] - probed.base.reference_temperature
-        slow = _smooth(rng, n, len(load.films), form.shape_time / (run.drive.time[1] - run.drive.time[0]))
+        slow = _smooth(rng, n, len(load.films), form.shape_time / run.step)
         wobble = law * (1.0 + mean + form.shape * slow) - 1.0
         forcing = np.zeros((n, body.n))
         for j, vector in enumerate(split):
@@ -195,10 +197,8 @@ def _power(study: Study, k: int, source: int) -> np.ndarray:
     if source in drive.losses.index:
         i = drive.losses.index.index(source)
         place = int(np.searchsorted(drive.losses.grid, 30.0))
-        power = drive.losses.value[:, i, place]
-    else:
-        power = drive.power[:, source]
-    return power
+        return drive.losses.value[:, i, place]
+    return drive.power[:, source]
 
 
 def lump_of(study: Study, place: int, form: Form) -> float:
@@ -237,7 +237,7 @@ def _body_starts(study: Study, rng: np.random.Generator) -> np.ndarray:
 
 def _readings(study: Study, J: list[np.ndarray], rng: np.random.Generator, form: Form) -> list[np.ndarray]:
     """Per fitted run (size,): each channel's own error of what every source and contact does to it."""
-    sources = [i for i, p in enumerate(study.probed.parameters) if p.kind in ("source", "contact", "joint")]
+    sources = [i for i, p in enumerate(study.probed.parameters) if p.kind in READ]
     sigma = study.scale[sources]
     names = study.probed.base.sensors
     of_sensor = form.reading * rng.standard_normal((len(names), len(sources)))

@@ -40,18 +40,20 @@ def heat_of(study: Study, blocks: Sequence[tuple[int, int, int]], of_place: Mapp
     """The unknown channel of a study, without matrices yet; of_place: columns of 1 W in every block (fitted
     run, first step, end)."""
     parts = list(dict.fromkeys(m for p in study.probed.places for m in p.members))
+    length = float(np.median([b - a for _, a, b in blocks]))
+    faces = [p for p in study.probed.places if not Spot.read(p.name).pad]
+    surfaces = tuple(tuple(p.name for p in faces if part in p.members) for part in parts)
+    columns = tuple(np.concatenate([np.zeros(0, int), *(of_place[name] for name in own)]) for own in surfaces)
+    return Heat(tuple(parts), surfaces, columns, (), (), (), correlation(blocks, MEMORY * length))
+
+
+def correlation(blocks: Sequence[tuple[int, int, int]], memory: float) -> np.ndarray:
+    """(n_blocks, n_blocks) of blocks (fitted run, first step, end), squared-exponential over a memory in steps; blocks
+    of different runs have none."""
     run = np.array([i for i, _, _ in blocks])
     when = np.array([(a + b) / 2 for _, a, b in blocks], dtype=float)
-    length = float(np.median([b - a for _, a, b in blocks]))
-    correlation = np.exp(-0.5 * ((when[:, None] - when) / (MEMORY * length)) ** 2) * (run[:, None] == run)
-    correlation = correlation + 1e-6 * np.eye(len(blocks))
-    surfaces, columns = [], []
-    for part in parts:
-        own = [p.name for p in study.probed.places if part in p.members and not Spot.read(p.name).pad]
-        c = np.concatenate([of_place[name] for name in own]) if own else np.zeros(0, int)
-        surfaces.append(tuple(own))
-        columns.append(c)
-    return Heat(tuple(parts), tuple(surfaces), tuple(columns), (), (), (), correlation)
+    R = np.exp(-0.5 * ((when[:, None] - when) / memory) ** 2) * (run[:, None] == run)
+    return np.asarray(R + 1e-6 * np.eye(len(blocks)))
 
 
 def with_information(heat: Heat, F: Sequence[np.ndarray]) -> Heat:

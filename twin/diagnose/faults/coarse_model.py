@@ -9,10 +9,9 @@ import numpy as np
 from twin.calibrate.fit.training import states_at
 from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
-from twin.diagnose.model.study import Study
+from twin.diagnose.model.study import Study, start_of
 from twin.rom.model import MachineModel
 from twin.rom.tcp import by_body, is_exact, tcp_at
-from twin.run.replay import at_rest
 
 COARSE = 1.0  # of a sensor's or the probe's noise: a model may differ by this (rms)
 BETWEEN = ", interpolated between its poses"
@@ -48,11 +47,7 @@ def too_coarse(model: MachineModel, study: Study, temperature_sigma: float, tcp_
     for k in study.fitted:
         planned = study.runs[k]
         m = planned.measured
-        one = np.concatenate([b.one for b in model.bodies])
-        start = (planned.run.start - model.reference_temperature) * one
-        if planned.run.rested:
-            start = at_rest(model, planned.run.drive, planned.run.start)
-        states = states_at(model, (), {}, planned.run.drive, start, SUBSTEPS)
+        states = states_at(model, (), {}, planned.run.drive, start_of(model, planned.run), SUBSTEPS)
         T = np.full((len(states), len(model.sensors)), model.reference_temperature)
         for body, own in zip(model.bodies, by_body(model, states), strict=True):
             T[:, list(body.sensors)] += own @ body.C.T

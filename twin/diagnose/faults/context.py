@@ -81,17 +81,15 @@ def logs(context: Context, names: Sequence[str], n: int) -> list[History]:
 
 def windows_of(context: Context) -> list[Stretch]:
     """Every stretch of hours within a run, and from every hour on to the end."""
-    blocks = context.elements.histories.blocks
-    study = context.study
-    runs = [study.runs[k].run for k in study.fitted]
+    blocks, runs = context.elements.histories.blocks, context.study.fitted_runs
     own = [[b for b, (i, _, _) in enumerate(blocks) if i == r] for r in range(len(runs))]
 
     def part(r: int, first: int, last: int) -> tuple[np.ndarray, Window]:
-        dt = runs[r].drive.time[1] - runs[r].drive.time[0]
+        name, dt = runs[r]
         chosen = own[r][first : last + 1]
         weights = np.zeros(len(blocks))
         weights[chosen] = 1.0
-        return weights, Window(runs[r].name, blocks[chosen[0]][1] * dt, blocks[chosen[-1]][2] * dt)
+        return weights, Window(name, blocks[chosen[0]][1] * dt, blocks[chosen[-1]][2] * dt)
 
     result: list[Stretch] = []
     for r, of_run in enumerate(own):
@@ -120,9 +118,7 @@ def stretches(context: Context) -> list[Stretch]:
 
 def lasting(context: Context) -> list[Stretch]:
     """From an hour on: to the end of the last run."""
-    last = context.study.runs[context.study.fitted[-1]].run.name
-    n = len(context.elements.histories.blocks)
-    return [w for w in stretches(context) if w[1][n - 1] == 1.0 and w[2][-1].run == last]
+    return [w for w in stretches(context) if w[1][-1] == 1.0]
 
 
 def of_stretches(found: Sequence[Stretch], before: int = 0) -> list[History]:
@@ -132,11 +128,11 @@ def of_stretches(found: Sequence[Stretch], before: int = 0) -> list[History]:
 
 def most_heat(context: Context) -> float:
     """W: what no undescribed source can exceed, all that the machine is said to turn into heat at once in any run."""
-    most = 0.0
+    most = CABINET
     for k in context.study.fitted:
         drive = context.study.runs[k].run.drive
         total = drive.power.sum(axis=1) + np.abs(drive.port_heat).sum(axis=1)
         if drive.losses.index:
             total = total + drive.losses.value.max(axis=2).sum(axis=1)
         most = max(most, float(total.max(initial=0.0)))
-    return max(most, CABINET)
+    return most

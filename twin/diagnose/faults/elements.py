@@ -24,12 +24,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.places import beside
+from twin.diagnose.evidence.film_laws import SPEEDS
 from twin.diagnose.evidence.nulls import convection
 from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.integration import gammas
 from twin.diagnose.model.study import Study, own_place
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place
+from twin.rom.load_model import LoadModel, Signal
 from twin.run.system import System
 
 BLOCK = 3600.0  # s
@@ -42,7 +44,6 @@ MISREAD = {
     "1/s": (0.5, 2.0, 60.0, 1 / 60.0),
 }
 EXPONENT = 0.6  # of speeds in forced convection
-SPEEDS = ("m/s", "1/s")  # units
 HEATING = {"A": (2.0,), "m/s": (1.0,), "1/s": (1.0, 5.0 / 3.0), "W": (1.0,), "1": (1.0,)}  # exponents by unit, of heat
 LAWS = (1.0, 5.0 / 3.0, 2.0, 8.0 / 3.0)  # exponents of speeds in losses
 
@@ -57,7 +58,6 @@ class Histories:
     speeds: dict[str, tuple[np.ndarray, ...]]  # "x_speed^0.6": of convection
     blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first step, end)
     unit: dict[str, tuple[str, float, float]]  # history -> signal, exponent, value [SI] at which s = 1
-    same: dict[str, str]  # signal -> the one of its shape that stands for it
 
 
 @dataclass(frozen=True)
@@ -94,46 +94,46 @@ def histories_of(study: Study) -> Histories:
     """Histories of the logged signals that tell how hard a drive works, and blocks of an hour."""
     load = study.probed.base.load_model
     runs = [planned.run for planned in study.runs]
-    positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
-    units = {s.name: s.unit for s in load.signals}
-    bounds = {s.name: max(abs(s.low), abs(s.high)) for s in load.signals}
     n = [run.drive.n_steps for run in runs]
     signals: dict[str, tuple[np.ndarray, ...]] = {"always": tuple(np.ones(k) for k in n)}
     speeds: dict[str, tuple[np.ndarray, ...]] = {}
     unit: dict[str, tuple[str, float, float]] = {"always": ("", 1.0, 1.0)}
 
     def add(table: dict[str, tuple[np.ndarray, ...]], name: str, signal: str, exponent: float, scale: float) -> None:
-        values = tuple(np.abs(run.signals[signal] / scale) ** exponent for run in runs)
-        if max(float(v.max()) for v in values) > 0.02:
-            table[name] = values
-            unit[name] = (signal, exponent, scale)
+        table[name] = tuple(np.abs(run.signals[signal] / scale) ** exponent for run in runs)
+        unit[name] = (signal, exponent, scale)
 
-    seen: dict[str, np.ndarray] = {}
-    same: dict[str, str] = {}
-    for signal in units:
-        if signal in positions or any(signal not in run.signals for run in runs):
+    seen: list[np.ndarray] = []
+    for signal in _of_drives(load):
+        name = signal.name
+        if any(name not in run.signals for run in runs):
             continue
-        whole = np.abs(np.concatenate([run.signals[signal] for run in runs]))
+        whole = np.abs(np.concatenate([run.signals[name] for run in runs]))
         top = float(whole.max())
-        if top <= 1e-9 * max(bounds[signal], 1e-30):
+        if top <= 1e-9 * max(abs(signal.low), abs(signal.high), 1e-30):
             continue
         shape = whole / top
-        same[signal] = next((name for name, other in seen.items() if np.abs(shape - other).max() < 1e-3), signal)
-        if same[signal] != signal:
+        if any(np.abs(shape - other).max() < 1e-3 for other in seen):
             continue  # motor speed and axis speed are one history
-        seen[signal] = shape
-        for e in HEATING.get(units[signal], ()):
-            add(signals, signal if e == 1.0 else f"{signal}^{e:.3g}", signal, e, top)
-        if units[signal] in SPEEDS:
-            add(speeds, f"{signal}^{EXPONENT:g}", signal, EXPONENT, top)
+        seen.append(shape)
+        for e in HEATING.get(signal.unit, ()):
+            add(signals, name if e == 1.0 else f"{name}^{e:.3g}", name, e, top)
+        if signal.unit in SPEEDS:
+            add(speeds, f"{name}^{EXPONENT:g}", name, EXPONENT, top)
     blocks = []
     for i, run in enumerate(runs[: len(study.fitted)]):
-        per = round(BLOCK / (run.drive.time[1] - run.drive.time[0]))
+        per = round(BLOCK / run.step)
         edges = list(range(0, run.drive.n_steps, per))
         if run.drive.n_steps - edges[-1] < per / 2 and len(edges) > 1:
             edges.pop()
         blocks += [(i, a, b) for a, b in zip(edges, [*edges[1:], run.drive.n_steps], strict=True)]
-    return Histories(signals, speeds, tuple(blocks), unit, same)
+    return Histories(signals, speeds, tuple(blocks), unit)
+
+
+def _of_drives(load: LoadModel) -> list[Signal]:
+    """Logged signals but positions of axes and temperatures of air."""
+    others = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
+    return [s for s in load.signals if s.name not in others]
 
 
 def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
@@ -179,7 +179,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     for p, place in enumerate(probed.places):
         b = probed.B[p]
         add("heat", place.name, [b] * len(runs), histories.signals, True)
-        e = film_env[films.index(place.film)] if place.film else load.surroundings
+        e = environment_at(study, p)
         flow = [-x @ probed.A[p].T + a[:, [e]] * probed.M[p] for x, a in zip(z, air, strict=True)]
         add("film", place.name, flow, {**always, **histories.speeds}, True)
         stored = [-np.outer(np.diff(own.states @ b, axis=0) * own.rate, b) for own in nominal]
@@ -220,6 +220,12 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
             only_here = [pulse if j == i else None for j in range(len(runs))]
             add("start", f"{runs[i].name}.{m}", [field] * len(runs), {"always": only_here})
     return Elements(histories, tuple(tuple(v) for v in vectors), tuple(columns), index, block_of)
+
+
+def environment_at(study: Study, p: int) -> int:
+    """Number of the environment that the film of place p is in."""
+    load, film = study.probed.base.load_model, study.probed.places[p].film
+    return next((f.environment for f in load.films if f.name == film), load.surroundings)
 
 
 def pivot(study: Study, e: int) -> float:
@@ -281,7 +287,6 @@ def _signals(
     """(signal, factor, per run (n, r)): what all laws that read a signal would add, were it larger by a factor."""
     probed, load = study.probed, study.probed.base.load_model
     (body,) = probed.base.bodies
-    positions = {a.position for a in load.axes} | {e.signal for e in load.environments if e.signal}
     uses = [s.use for s in load.sources] + [f.use for f in load.films]
     read = {s for use in uses for s in use.signals.values()}
     A, M = np.asarray(probed.system.A[0]), np.asarray(probed.system.M)
@@ -290,8 +295,8 @@ def _signals(
     B[:, list(body.sources)] = body.B
     B[:, in_contact] = 0.0
     result = []
-    for signal in load.signals:
-        if signal.name in positions or signal.name not in read:
+    for signal in _of_drives(load):
+        if signal.name not in read:
             continue
         for factor in MISREAD.get(signal.unit, ()):
             per_run, moves = [], False
@@ -330,8 +335,7 @@ def _evaluated(study: Study, k: int, signal: str, factor: float) -> tuple[list[i
     only = replace(load, pairs=(), joints=(), rails=(), ports=(), axes=(), sources=reading,
                    films=tuple(load.films[f] for f in films))  # fmt: skip
     signals = {name: values * (factor if name == signal else 1.0) for name, values in run.signals.items()}
-    dt = run.drive.time[1] - run.drive.time[0]
-    return sources, films, evaluate(only, run.drive.time[:-1], signals, dt, run.drive.n_steps)
+    return sources, films, evaluate(only, run.drive.time[:-1], signals, run.step, run.drive.n_steps)
 
 
 def _fields(study: Study) -> list[tuple[str, np.ndarray]]:

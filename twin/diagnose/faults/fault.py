@@ -217,18 +217,17 @@ class Fault:
         return None
 
     # readings
-    def change(
-        self, study: Study, nominal: Sequence[Nominal], states: Callable[[int], np.ndarray], name: str, size: float
-    ) -> np.ndarray:
+    def change(self, study: Study, states: Callable[[int], np.ndarray], name: str, size: float) -> np.ndarray:
         """(m,) what the fitted runs read otherwise, of what is `curved`; states: of run k, (n + 1, r)."""
         raise NotImplementedError(f"{self.kind} is in proportion to its size")
 
     def read_in(
-        self, one: Study, nominal: Sequence[Nominal], name: str, size: float, known: Mapping[str, np.ndarray]
+        self, one: Study, states: np.ndarray, name: str, size: float, known: Mapping[str, np.ndarray]
     ) -> np.ndarray:
-        """(size,) what it adds to the reading of the one run of a study; known: its columns of that run, by name."""
+        """(size,) what it adds to the reading of the one run of a study, of states (n + 1, r); known: its columns of
+        that run, by name."""
         if self.curved:
-            return self.change(one, nominal, lambda k: nominal[k].states, name, size)
+            return self.change(one, lambda _: states, name, size)
         column = known.get(self.bare(name))
         return np.zeros(one.runs[0].size) if column is None else np.asarray(size * column)
 

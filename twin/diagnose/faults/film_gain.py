@@ -9,6 +9,7 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import Batch, Hypothesis
 from twin.diagnose.faults.context import Context, alone
+from twin.diagnose.faults.elements import environment_at
 from twin.diagnose.faults.fault import Curve, Family, Fault, Slot
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
@@ -39,12 +40,6 @@ class Group(Fault):
     def fill(self, slot: Slot) -> None:
         films = [f.name for f in slot.study.probed.base.load_model.films]
         slot.slots.film[:, slot.s, films.index(slot.unit.place)] = slot.shape
-
-
-def environment_at(study: Study, p: int) -> int:
-    """Number of the environment that the film of place p is in."""
-    load, film = study.probed.base.load_model, study.probed.places[p].film
-    return next((f.environment for f in load.films if f.name == film), load.surroundings)
 
 
 GROUP = Group(

@@ -141,7 +141,7 @@ def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add
 
     z = [_state(own.states, np.asarray(p.rows.step) + np.asarray(p.rows.share))
          for p, own in zip(plans, nominal, strict=True)]  # fmt: skip
-    positions = [_positions(plan, t) for plan, t in zip(plans, times, strict=True)]
+    positions = [plan.measured.position for plan in plans]
     axes = [(i, a) for i, a in enumerate(probed.base.load_model.axes)
             if any(np.ptp(p[:, i]) > 1e-6 for p in positions if len(p))]  # fmt: skip
     for m, member in enumerate(body.members):
@@ -200,7 +200,7 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
         plan = study.runs[k]
         T, w = None, None
         if k in states:
-            z, steps = states[k], by / float(plan.run.drive.time[1] - plan.run.drive.time[0])
+            z, steps = states[k], by / plan.run.step
             read = z @ body.C.T[:, plan.measured.column]
             T = plan.measured.mean_of @ (_state(read, np.arange(len(z)) - steps) - read)
             at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
@@ -209,20 +209,20 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
     return np.concatenate(parts)
 
 
-def lagged(study: Study, states: Mapping[int, np.ndarray], sensor: str, seconds: float) -> np.ndarray:
+def lagged(study: Study, states: Callable[[int], np.ndarray], sensor: str, seconds: float) -> np.ndarray:
     """(m,) what the fitted runs read more where a sensor follows with a time constant of `seconds` [s], per second.
 
-    states: (n + 1, r) of the runs, by their number. A run begins with the sensor as warm as what it sits on.
+    states: (n + 1, r) of run k. A run begins with the sensor as warm as what it sits on.
     """
     (body,) = study.probed.base.bodies
     parts = []
     for k in study.fitted:
         plan = study.runs[k]
         T = np.zeros(plan.shapes[0])
-        if k in states and sensor in plan.measured.sensors:
+        if sensor in plan.measured.sensors:
             i = plan.measured.sensors.index(sensor)
-            read = states[k] @ body.C[plan.measured.column[i]]
-            keep = math.exp(-float(plan.run.drive.time[1] - plan.run.drive.time[0]) / seconds)
+            read = states(k) @ body.C[plan.measured.column[i]]
+            keep = math.exp(-plan.run.step / seconds)
             followed, _ = lfilter([1.0 - keep], [1.0, -keep], read, zi=[keep * read[0]])
             T[:, i] = plan.measured.mean_of @ (followed - read)
         parts.append(_numbers(plan, T) / seconds)
@@ -237,22 +237,11 @@ def _state(states: np.ndarray, at: np.ndarray) -> np.ndarray:
     return np.asarray(states[step] + share * (states[step + 1] - states[step]))
 
 
-def _positions(plan: Planned, time: np.ndarray) -> np.ndarray:
-    """(k, n_axes) m of the axes where the TCP was measured."""
-    drive = plan.run.drive
-    if not len(time):
-        return np.zeros((0, drive.position.shape[1]))
-    if plan.measured.position is not None:
-        return plan.measured.position
-    step = np.clip(np.searchsorted(drive.time - drive.time[0], time) - 1, 0, drive.n_steps - 1)
-    return np.asarray(drive.position[step])
-
-
 def _at(plan: Planned, signal: str, time: np.ndarray) -> np.ndarray:
     values = plan.run.signals.get(signal)
     if values is None:
         return np.zeros(len(time))
-    step = np.clip((time / (plan.run.drive.time[1] - plan.run.drive.time[0])).astype(int), 0, len(values) - 1)
+    step = np.clip((time / plan.run.step).astype(int), 0, len(values) - 1)
     return np.asarray(values[step])
 
 

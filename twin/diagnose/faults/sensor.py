@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
 from twin.diagnose.faults.readings import lagged
-from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 
 
@@ -18,11 +17,8 @@ from twin.diagnose.model.study import Study
 class Lag(Fault):
     """A sensor that follows late."""
 
-    def change(
-        self, study: Study, nominal: Sequence[Nominal], states: Callable[[int], np.ndarray], name: str, size: float
-    ) -> np.ndarray:
-        seen = {k: states(k) for k in study.fitted}
-        return size * lagged(study, seen, self.bare(name), max(size, self.least))
+    def change(self, study: Study, states: Callable[[int], np.ndarray], name: str, size: float) -> np.ndarray:
+        return size * lagged(study, states, self.bare(name), max(size, self.least))
 
 
 FAULTS = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Described, Family, Fault
 from twin.diagnose.faults.readings import late
-from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.spot import Of, Spot
@@ -33,9 +32,7 @@ class Factor(Fault):
 class Clock(Fault):
     """A run's clock."""
 
-    def change(
-        self, study: Study, nominal: Sequence[Nominal], states: Callable[[int], np.ndarray], name: str, size: float
-    ) -> np.ndarray:
+    def change(self, study: Study, states: Callable[[int], np.ndarray], name: str, size: float) -> np.ndarray:
         own = [k for k in study.fitted if study.runs[k].run.name == self.bare(name)]
         return size * late(study, {k: states(k) for k in own}, size)
 

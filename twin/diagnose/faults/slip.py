@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
 from twin.diagnose.faults.readings import play
-from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 
 
@@ -18,9 +17,7 @@ from twin.diagnose.model.study import Study
 class Slip(Fault):
     """Of a component of the TCP."""
 
-    def change(
-        self, study: Study, nominal: Sequence[Nominal], states: Callable[[int], np.ndarray], name: str, size: float
-    ) -> np.ndarray:
+    def change(self, study: Study, states: Callable[[int], np.ndarray], name: str, size: float) -> np.ndarray:
         return size * play(study, states, self.kind, self.bare(name), abs(size))
 
 

@@ -41,11 +41,8 @@ FAULTS = (SUN,)
 def batches(context: Context) -> list[Batch]:
     """Bells on every outer surface, at the same hours of every run, an amplitude per run."""
     study, blocks = context.study, context.elements.histories.blocks
-    longest = 0.0
-    for i, start, end in blocks:
-        time = study.runs[study.fitted[i]].run.drive.time
-        longest = max(longest, (start + end) / 2 * (time[1] - time[0]))
     runs, histories = study.fitted_runs, []
+    longest = max((start + end) / 2 * runs[i][1] for i, start, end in blocks)
     for length in BELLS:
         for centre in np.arange(length / 2, longest + HOUR, HOUR):
             bell = bells.Bell((float(centre),) * len(runs), length)

@@ -98,9 +98,7 @@ def _integrated(
     (body,) = study.probed.base.bodies
     n_steps, r = len(nominal.states) - 1, body.n
     C = body.C[planned.measured.column].astype(np.float32)
-    used = sorted({c.vector for c in columns})
-    place = {v: j for j, v in enumerate(used)}
-    which = np.array([place[c.vector] for c in columns])
+    used, which = np.unique([c.vector for c in columns], return_inverse=True)
     S = np.stack([np.asarray(c.histories[k], dtype=np.float32) for c in columns], axis=1)  # (n_steps, n)
     X = np.zeros((r, len(columns)), dtype=np.float32)
     T = np.zeros((n_steps + 1, len(C), len(columns)), dtype=np.float32)

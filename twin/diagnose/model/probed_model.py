@@ -56,6 +56,11 @@ class ProbedRun:
     loads: ProbedLoads
     rested: bool = False  # it starts in equilibrium with its surroundings, `start` being those of the machine
 
+    @property
+    def step(self) -> float:
+        """Of its drive [s]."""
+        return float(self.drive.time[1] - self.drive.time[0])
+
 
 @dataclass(frozen=True)
 class ProbedModel:

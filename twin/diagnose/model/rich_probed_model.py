@@ -62,7 +62,6 @@ def rich_probed_model(
             V_of = [from_vertices_and_tanks(mesh, body.n) for mesh, body in pairs]
             height = [V.T @ h for V, h in zip(V_of, height, strict=True)]
             model = replace(model, bodies=tuple(linear_body(mesh, body) for mesh, body in pairs))
-        n_films = len(full.thermal.load_model.films)
         if machine.lumped:
             bases = [np.diag(np.asarray(body.E.diagonal()) ** -0.5) for body in model.bodies]
         else:
@@ -73,7 +72,7 @@ def rich_probed_model(
         for body, V, h in zip(model.bodies, bases, height, strict=True):
             small = project(replace(body, F=None), V)
             bodies.append(replace(small, E=np.eye(small.n)))
-            heights.append(V.T @ h[:, :n_films])
+            heights.append(V.T @ h)
         return RichProbedModel(replace(model, bodies=tuple(bodies)), places, tuple(heights))
 
     return cached("probed", __name__, (machine_hash(machine), mesh.name), make)

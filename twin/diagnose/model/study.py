@@ -18,6 +18,7 @@ from twin.diagnose.model.probed_model import ProbedModel, ProbedRun
 from twin.diagnose.model.slots import Slots, first_slots, no_slots
 from twin.errors import TwinError
 from twin.rom.contact_matrix import ContactPlaces
+from twin.rom.model import MachineModel
 from twin.run.replay import at_rest
 from twin.run.system import Layout
 
@@ -72,8 +73,7 @@ class Study:
     @property
     def fitted_runs(self) -> list[tuple[str, float]]:
         """Name and step [s] of each fitted run."""
-        runs = [self.runs[k].run for k in self.fitted]
-        return [(run.name, float(run.drive.time[1] - run.drive.time[0])) for run in runs]
+        return [(run.name, run.step) for run in (self.runs[k].run for k in self.fitted)]
 
     @property
     def rows(self) -> list[slice]:
@@ -104,28 +104,24 @@ class Study:
 
     def outputs(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """(size,) of run k at x (n,) in prior standard deviations, with hypotheses of amplitudes a."""
-        own = self._acting(k, slots, a)
-        layout, contacts, *rest = self._fixed(k, own)
-        return np.asarray(outputs(layout, contacts, False, *rest, *self._arguments(k, own), self._v(x, a)))
+        (layout, contacts, *rest), arguments = self._given(k, slots, a)
+        return np.asarray(outputs(layout, contacts, False, *rest, *arguments, self._v(x, a)))
 
     def jacobian(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """(size, n + len(a)) derivatives by x and the amplitudes."""
-        own = self._acting(k, slots, a)
-        J = jacobian(*self._fixed(k, own), *self._arguments(k, own), self._v(x, a))
+        fixed, arguments = self._given(k, slots, a)
+        J = jacobian(*fixed, *arguments, self._v(x, a))
         return np.asarray(J) * np.concatenate([self.scale, np.ones(len(a))])
 
     def by_amplitudes(self, k: int, x: np.ndarray, slots: Slots, a: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Outputs (size,) of run k and their derivatives (size, len(a)) by the amplitudes of the first len(a) slots."""
-        own = self._acting(k, slots, a)
-        arguments = self._arguments(k, own)
-        D, y = by_amplitudes(*self._fixed(k, own), *arguments, self._v(x, ()), np.array(a, dtype=float))
+        fixed, arguments = self._given(k, slots, a)
+        D, y = by_amplitudes(*fixed, *arguments, self._v(x, ()), np.array(a, dtype=float))
         return np.asarray(y), np.asarray(D)
 
     def states(self, k: int, x: np.ndarray, slots: Slots | None = None, a: Sequence[float] = ()) -> np.ndarray:
         """z (n + 1, r) of run k."""
-        own = self._acting(k, slots, a)
-        layout, contacts, still, _ = self._fixed(k, own)
-        machine, effects, loads, _, _, _, z0 = self._arguments(k, own)
+        (layout, contacts, still, _), (machine, effects, loads, own, _, _, z0) = self._given(k, slots, a)
         return np.asarray(states_of(layout, contacts, False, still, machine, effects, loads, own, z0, self._v(x, a)))
 
     def read(self, k: int, states: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -140,21 +136,16 @@ class Study:
     def _v(self, x: np.ndarray, a: Sequence[float]) -> np.ndarray:
         return np.concatenate([np.asarray(x) * self.scale, np.asarray(a, dtype=float)])
 
-    def _acting(self, k: int, slots: Slots | None, a: Sequence[float]) -> Slots:
-        """As many slots as there are amplitudes: every other one costs a step what a film does."""
-        return first_slots(self.slots(k) if slots is None else slots, len(a))
-
-    def _fixed(self, k: int, slots: Slots) -> tuple[Layout, ContactPlaces, bool, bool]:
-        """What the integration of run k is compiled for."""
-        probed, planned = self.probed, self.runs[k]
-        still = stands_still(probed.layout, planned.run.loads, slots)
-        return probed.layout, probed.contacts, still, planned.measured.from_first
-
-    def _arguments(self, k: int, slots: Slots) -> tuple:
-        planned = self.runs[k]
-        m = planned.measured
-        return (self.probed.ports_first, self.effects, planned.run.loads, slots, planned.rows, (m.mean_of, m.column),
-                planned.z0)  # fmt: skip
+    def _given(
+        self, k: int, slots: Slots | None, a: Sequence[float]
+    ) -> tuple[tuple[Layout, ContactPlaces, bool, bool], tuple]:
+        """What the integration of run k is compiled for, and what it takes: as many slots as there are amplitudes, for
+        every other one costs a step what a film does."""
+        probed, planned, m = self.probed, self.runs[k], self.runs[k].measured
+        loads, own = planned.run.loads, first_slots(self.slots(k) if slots is None else slots, len(a))
+        fixed = probed.layout, probed.contacts, stands_still(probed.layout, loads, own), m.from_first
+        bins = m.mean_of, m.column
+        return fixed, (probed.ports_first, self.effects, loads, own, planned.rows, bins, planned.z0)
 
 
 def own_place(study: Study, source: int) -> int | None:
@@ -190,11 +181,15 @@ def make_study(probed: ProbedModel, measured: Sequence[Measured], fitted: Sequen
     for run, m in zip(probed.runs, measured, strict=True):
         members = np.asarray(effects.G).reshape(-1, n_poses, 3, body.n)
         rows = Rows(m.tcp_step, m.tcp_share, np.tensordot(m.pose, G, 1), np.einsum("kp,epcr->ekcr", m.pose, members))
-        z0 = (run.start - probed.base.reference_temperature) * body.one
-        if run.rested:
-            z0 = at_rest(probed.base, run.drive, run.start)
-        planned.append(Planned(run, m, rows, z0))
+        planned.append(Planned(run, m, rows, start_of(probed.base, run)))
     return Study(probed, effects, tuple(planned), tuple(fitted))
+
+
+def start_of(model: MachineModel, run: ProbedRun) -> np.ndarray:
+    """State (N,) in which a run of a model begins, in the model's own coordinates."""
+    if run.rested:
+        return at_rest(model, run.drive, run.start)
+    return np.concatenate([(run.start - model.reference_temperature) * b.one for b in model.bodies])
 
 
 def with_measured(study: Study, measured: Sequence[Measured]) -> Study:

@@ -186,7 +186,7 @@ def motion(detector: Detector, x: np.ndarray | None) -> Motion:
 
 def curved_change(detector: Detector, h: Hypothesis, size: float, states: Motion) -> np.ndarray:
     """(m,) change of what is measured by what is curved."""
-    return fault_of(h).change(detector.study, detector.nominal, states, h.name, size)
+    return fault_of(h).change(detector.study, states, h.name, size)
 
 
 def curved_slope(detector: Detector, h: Hypothesis, size: float, states: Motion) -> np.ndarray:

@@ -52,7 +52,7 @@ def _read(found: Search, k: int) -> np.ndarray:
     for a in wanted:
         fault, h = fault_of(a.hypothesis), a.hypothesis
         known = {p: columns[:, c] for (kind, p, when), c in index.items() if (kind, when) == (fault.kind, "always")}
-        result += fault.read_in(one, [nominal], h.name, float(a.amplitude[0]), known)
+        result += fault.read_in(one, z, h.name, float(a.amplitude[0]), known)
     return result
 
 
