@@ -161,8 +161,8 @@ def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
 
 
 def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(m,) white change by a cause at its amplitude (q,), of what acts in the machine to first order; x (n,): parameters
-    of the motion that is read otherwise."""
+    """(m,) white change by a cause at its amplitude (q,), by what acts in the machine to first order; x (n,):
+    parameters of the motion that is read otherwise."""
     if fault_of(h).exchanges:  # `exchanged` has left nothing of it
         return np.zeros(detector.columns.raw.shape[0])
     if fault_of(h).curved:

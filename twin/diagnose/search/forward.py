@@ -22,10 +22,10 @@ from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, settled, strong
 from twin.diagnose.search.contest import judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
-from twin.diagnose.search.exact import beginning, excess, misfit, misfit_of_each, unexplained
+from twin.diagnose.search.exact import beginning, excess, misfit, unexplained
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Search, Step, cosines, distinct, look
+from twin.diagnose.search.look import Search, Step, distinct, look, with_cosines
 from twin.diagnose.search.loose import loose_ones
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
@@ -109,7 +109,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     return Search(
         detector, start.x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance,
-        misfit_of_each(detector, fitted), unexplained(detector, fitted), loose,
+        unexplained(detector, fitted), loose,
     )  # fmt: skip
 
 
@@ -274,5 +274,4 @@ def _rivals(
     near = max(detector.policy.rival, detector.policy.misfit * chosen.statistic)
     likely = [h for h in ranked if h.statistic > max(chosen.statistic - near, 0.5 * detector.thresholds[h.family])]
     others = distinct([chosen, *sorted(likely, key=lambda h: -h.statistic)])[1:9]
-    cosine = cosines(detector, fitted, [chosen, *others])
-    return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(others))
+    return with_cosines(detector, fitted, chosen, others)

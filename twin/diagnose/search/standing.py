@@ -11,7 +11,7 @@ from twin.calibrate.fit.measured import Measured
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import Accepted, settled
-from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
+from twin.diagnose.search.exact import beginning, unexplained
 from twin.diagnose.search.forward import stands
 from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.refit import refit
@@ -67,8 +67,7 @@ def without(found: Search, y: np.ndarray, one: Accepted) -> Search:
     x, covariance = settled(detector, y, accepted)
     return replace(
         found, x=x, accepted=tuple(accepted), steps=(*found.steps, step), residual=fitted.residual, g=seen.g,
-        heat=seen.heat, covariance=covariance, left=misfit_of_each(detector, fitted),
-        unexplained=unexplained(detector, fitted),
+        heat=seen.heat, covariance=covariance, unexplained=unexplained(detector, fitted),
     )  # fmt: skip
 
 

@@ -19,8 +19,8 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, misfit_of_each, unbent, unexplained
-from twin.diagnose.search.look import Search, Step, cosines, look
+from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, unbent, unexplained
+from twin.diagnose.search.look import Search, Step, look, with_cosines
 from twin.diagnose.search.loose import Freed, factors_of, variance_of
 from twin.diagnose.search.refit import refit
 
@@ -76,7 +76,7 @@ def closed(
         h for h in family
         if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
     ]  # fmt: skip
-    rivals += tuple((h, float(cosines(detector, before, [one.hypothesis, h])[0, 1])) for h in near)
+    rivals += tuple(pair for h in near for pair in with_cosines(detector, before, one.hypothesis, [h]))
     amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
     one = replace(
         one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals,
@@ -85,7 +85,7 @@ def closed(
     x, covariance = settled(detector, y, (one,))
     return Search(
         detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
-        misfit_of_each(detector, fitted), unexplained(detector, fitted), loose,
+        unexplained(detector, fitted), loose,
     )  # fmt: skip
 
 
@@ -180,16 +180,10 @@ def strained(
     left = [misfit(detector, fit) for fit, _ in freed_ones]
     near = [made for made, own in zip(freed_ones, left, strict=True) if own < min(left) + policy.close]
     (fit, one), *others = sorted(near, key=lambda made: -strain[freed(detector.study, made[1].hypothesis)[0]])
-    return fit, replace(one, rivals=_as_rivals(detector, fitted, one, [other for _, other in others]))
-
-
-def _as_rivals(
-    detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[Accepted]
-) -> tuple[tuple[Hypothesis, float], ...]:
-    """Freed numbers as rivals of one of them, of their own size and its statistic: either explains the same."""
-    rivals = [replace(o.hypothesis, amplitude=tuple(o.amplitude.tolist()), statistic=one.statistic) for o in others]
-    cosine = cosines(detector, fitted, [one.hypothesis, *rivals])
-    return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(rivals))
+    rivals = [  # of their own size and its statistic: either explains the same
+        replace(own.hypothesis, amplitude=tuple(own.amplitude.tolist()), statistic=one.statistic) for _, own in others
+    ]
+    return fit, replace(one, rivals=with_cosines(detector, fitted, one.hypothesis, rivals))
 
 
 def _scored(detector: Detector, fitted: Fitted, seen: Sight, h: Hypothesis) -> float:
