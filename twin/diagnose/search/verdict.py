@@ -205,12 +205,10 @@ def unknown_of(found: Search) -> Unknown | None:
     study = detector.study
     histories = {}
     blocks = detector.elements.histories.blocks
-    for k in study.fitted:
-        run = study.runs[k].run
-        dt = float(run.drive.time[1] - run.drive.time[0])
+    for k, (name, dt) in zip(study.fitted, study.fitted_runs, strict=True):
         own = [b for b, (i, _, _) in enumerate(blocks) if i == k]
         when = tuple((blocks[b][1] + blocks[b][2]) / 2 * dt for b in own)
-        histories[run.name] = (when, tuple(map(float, heat[own])), tuple(map(float, sigma[own])))
+        histories[name] = (when, tuple(map(float, heat[own])), tuple(map(float, sigma[own])))
     correlated = []
     for signal in study.runs[0].run.signals:
         means = []
