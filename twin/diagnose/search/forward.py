@@ -92,7 +92,8 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         standing = _covering(detector, standing, step.parts)
         if not standing:
             break
-        accepted.append(_chosen(detector, fitted, standing[0], [*standing, *others, *ranked]))
+        one, rivals = standing[0], _rivals(detector, fitted, standing[0], [*standing, *others, *ranked])
+        accepted.append(replace(as_scored(detector.study, one, detector.thresholds[one.family]), rivals=rivals))
         fitted, accepted = refit(detector, y, beginning(fitted.x, policy), accepted)
         while weak := [a for a in accepted if not stands(detector, a)]:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
@@ -161,12 +162,6 @@ def _covering(detector: Detector, standing: Sequence[Hypothesis], parts: dict[st
             and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
         )
     ]  # fmt: skip
-
-
-def _chosen(detector: Detector, fitted: Fitted, h: Hypothesis, ranked: Sequence[Hypothesis]) -> Accepted:
-    """A hypothesis as a cause, before it is refitted beside the others; ranked: among which its rivals are."""
-    one = as_scored(detector.study, h, detector.thresholds[h.family])
-    return replace(one, rivals=_rivals(detector, fitted, h, ranked))
 
 
 def _without(
