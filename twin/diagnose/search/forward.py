@@ -56,11 +56,8 @@ def search_again(described: Detector, y: np.ndarray, start: Start, first: Search
 
 def _one_number(start: Start, y: np.ndarray) -> Search | None:
     """The search that ends with one declared number out of its tolerance, if it does."""
-    detector, fitted = start.detector, start.fitted
-    relaxed = strained(detector, y, fitted, start.loose, start.scored, start.freed)
-    if relaxed is None:
-        return None
-    return closed(detector, y, fitted, start.declared, start.glance, relaxed, start.x0, start.loose)
+    relaxed = strained(start, y)
+    return None if relaxed is None else closed(start, y, relaxed)
 
 
 def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
