@@ -65,7 +65,7 @@ def _better(
 
 def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Likewise with the model that has the corrected signal, and also those that explain nothing: the best factor of
-    each of the SIGNALS most promising; where that explains half of what a signal must, CLOSELY of them."""
+    each of the most promising `signals`; where that explains half of what a signal must, `closely` of them."""
     before, found = misfit(detector, fitted), list[Hypothesis]()
     factors = dict[str, list[Hypothesis]]()
     for h, _ in _promising(detector, y, lambda fault: fault.corrects):

@@ -197,7 +197,7 @@ def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:
 
 
 def _restless(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
-    """Causes that switch more than FEW times and leave heat anywhere: a history that no name tells."""
+    """Causes that switch more than `few` times and leave heat anywhere: a history that no name tells."""
     left = max(parts.values(), default=0.0)
     return [
         a for a in accepted
