@@ -14,7 +14,7 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import RIDGE, History, Hypothesis, prepared, score
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.edges import named
+from twin.diagnose.search.edges import in_windows
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.machine.effects.effect import Window
 
@@ -41,9 +41,8 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy 
         union = _likeliest(h, unions, g, block)
         if union.statistic < current.statistic + max(policy.growth, policy.growth_share * current.statistic):
             break
-        windows = tuple(sorted(union.when.windows, key=lambda w: (w.run, w.start)))
-        when = replace(union.when, name=named(windows, spans), windows=windows)
-        current = refined_edges(replace(union, when=when), g, block, policy)
+        windows = sorted(union.when.windows, key=lambda w: (w.run, w.start))
+        current = refined_edges(in_windows(union, windows, spans), g, block, policy)
     return current
 
 
@@ -79,7 +78,7 @@ def refined_edges(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: Searc
         found = _likeliest(h, tried, g, block)
         if found.statistic < current.statistic + policy.less:
             break
-        current = replace(found, when=replace(found.when, name=named(found.when.windows, spans)))
+        current = in_windows(found, found.when.windows, spans)
     return current
 
 
