@@ -17,13 +17,13 @@ from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.accepted import Accepted, as_scored, settled
+from twin.diagnose.search.accepted import Accepted, as_scored
 from twin.diagnose.search.contest import bent
-from twin.diagnose.search.declared import declared_candidates
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import _leaking, _restless, refit, search
-from twin.diagnose.search.look import Search, look
+from twin.diagnose.search.look import Search
 from twin.diagnose.search.loose import Freed, loose_ones, untied
+from twin.diagnose.search.start import begun
 from twin.diagnose.search.strained import _weak, closed, strained
 from twin.diagnose.search.verdict import verdict_of
 
@@ -136,22 +136,19 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
     """Also where that is too weak to be named beside another cause."""
     detector = small_case.made_detector()
     _, y = small_case.source_off(4.5)
-    fitted = detector.fitter(y)
-    x0, _ = settled(detector, y, ())
-    declared = declared_candidates(detector, y, fitted)
-    seen, ranked, step = look(detector, fitted, declared)
-    loose = loose_ones(detector, y, fitted, x0, Freed())
-    relaxed = strained(detector, y, fitted, loose, look(detector, fitted), Freed())
+    start = begun(detector, y)
+    seen, ranked, step = start.glance
+    relaxed = strained(start, y)
     assert relaxed is not None
     module = sys.modules[closed.__module__]
     monkeypatch.setattr(module, "misfit", lambda *_: 0.0)  # the number itself removes nothing of what was left
     monkeypatch.setattr(module, "_stays", lambda *_: stays)
     other = next(h for h in ranked if h.family not in ("loss_law", "signal"))
     alarm = replace(other, statistic=1.3 * detector.thresholds[other.family])
-    ended = closed(detector, y, fitted, declared, (seen, [alarm], step), relaxed, x0, loose)
+    ended = closed(replace(start, glance=(seen, [alarm], step)), y, relaxed)
     assert (ended is not None) == stays
     quiet = replace(other, statistic=0.5 * detector.thresholds[other.family])
-    assert closed(detector, y, fitted, declared, (seen, [quiet], step), relaxed, x0, loose) is not None
+    assert closed(replace(start, glance=(seen, [quiet], step)), y, relaxed) is not None
 
 
 def relaxed_source() -> tuple[Detector, list[Hypothesis], Callable[[list[Hypothesis]], Search | None]]:
@@ -159,13 +156,11 @@ def relaxed_source() -> tuple[Detector, list[Hypothesis], Callable[[list[Hypothe
     given."""
     detector = small_case.made_detector()
     _, y = small_case.source_off(4.5)
-    fitted = detector.fitter(y)
-    x0, _ = settled(detector, y, ())
-    loose = loose_ones(detector, y, fitted, x0, Freed())
-    seen, ranked, step = look(detector, fitted)
-    relaxed = strained(detector, y, fitted, loose, (seen, ranked, step), Freed())
+    start = replace(begun(detector, y), declared=[])
+    seen, ranked, step = start.scored
+    relaxed = strained(start, y)
     assert relaxed is not None
-    return detector, ranked, lambda some: closed(detector, y, fitted, (), (seen, some, step), relaxed, x0, loose)
+    return detector, ranked, lambda some: closed(replace(start, glance=(seen, some, step)), y, relaxed)
 
 
 def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
@@ -239,11 +234,11 @@ def test_of_two_that_leave_as_much_the_one_farther_out_counts(less, first, monke
     """Six likelihood-ratio units decide nothing, and what synthetic measurements show does; the other is its rival."""
     detector = small_case.made_detector()
     _, y = small_case.source_off(4.5)
-    fitted = detector.fitter(y)
+    start = begun(detector, y)
     paths = [p.path for p in detector.study.probed.parameters]
     loose = [Loose(paths.index(f"sources.{n}.gain"), 3.0, 0.3, strain) for n, strain in (("front", 1.5), ("rear", 1.2))]
     left = {"sources.front": 100.0, "sources.rear": 100.0 - less}
-    fits = {name: replace(fitted, reachable=value) for name, value in left.items()}
+    fits = {name: replace(start.fitted, reachable=value) for name, value in left.items()}
     module = sys.modules[strained.__module__]
     monkeypatch.setattr(module, "misfit", lambda _, of: of.reachable)
     monkeypatch.setattr(
@@ -252,7 +247,7 @@ def test_of_two_that_leave_as_much_the_one_farther_out_counts(less, first, monke
         lambda _d, _y, _f, h, _k: (fits[h.name], as_scored(detector.study, replace(h, statistic=50.0))),
     )
     monkeypatch.setattr(module, "_scored", lambda *_: 1e6)
-    fit, one = strained(detector, y, fitted, loose, look(detector, fitted), Freed())
+    fit, one = strained(replace(start, loose=loose), y)
     assert (one.hypothesis.name, fit.reachable) == (first, left[first])
     assert [h.name for h, _ in one.rivals] == (["sources.rear"] if less < 6.0 else [])
     assert all(h.statistic == one.statistic for h, _ in one.rivals)

@@ -18,9 +18,9 @@ from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, parameter_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.limits import limits_at, limits_of, over_histories
-from twin.diagnose.search.look import look
-from twin.diagnose.search.loose import Freed, loose_ones
+from twin.diagnose.search.loose import Freed
 from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.start import begun
 from twin.diagnose.search.strained import strained
 from twin.diagnose.search.verdict import CALIBRATED, _more_alike, cause_of, rival_of, strained_of, verdict_of
 
@@ -164,8 +164,8 @@ def test_films_without_a_declared_gain_are_not_asked_for_it():
     assert parameter_of(other.study, film) is None
     n, films = len(told), [i for i, p in enumerate(told) if p.kind == "film"]
     y = np.concatenate([detector.study.outputs(k, np.zeros(n)) for k in detector.study.fitted])
-    fitted = detector.fitter(y)
-    assert strained(other, y, fitted, (Loose(films[0], 2.0, 0.1, 5.0),), look(detector, fitted), Freed()) is None
+    start = replace(begun(detector, y), detector=other, loose=(Loose(films[0], 2.0, 0.1, 5.0),))
+    assert strained(start, y) is None
 
 
 def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch):
@@ -175,24 +175,23 @@ def test_a_number_that_runs_to_where_it_changes_nothing_is_not_told(monkeypatch)
     x = np.zeros(len(study.probed.parameters))
     x[j] = 4.5
     y = np.concatenate([study.outputs(k, x) for k in study.fitted])
-    fitted = detector.fitter(y)
-    loose = loose_ones(detector, y, fitted, x, Freed())
-    glance = look(detector, fitted)
-    freed = strained(detector, y, fitted, loose, glance, Freed())
+    start = begun(detector, y)
+    freed = strained(start, y)
     assert freed is not None
     module = sys.modules[strained.__module__]
     monkeypatch.setattr(module, "_scored", lambda *_: 0.0)  # by its derivative, as of a film many times as large
 
     def beside(share: float) -> bool:
         """Whether it is told where something else explains this share of what it does."""
-        sure = replace(glance[1][0], statistic=share * freed[1].statistic)
-        return strained(detector, y, fitted, loose, (glance[0], [sure], glance[2]), Freed()) is not None
+        seen, ranked, step = start.scored
+        sure = replace(ranked[0], statistic=share * freed[1].statistic)
+        return strained(replace(start, scored=(seen, [sure], step)), y) is not None
 
     assert beside(0.02)  # its own discrepancy may leave that
     assert not beside(0.5)
-    gone = lambda *a: (fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
+    gone = lambda *a: (start.fitted, [replace(a[3][0], covariance=np.zeros((1, 1)))])  # noqa: E731
     monkeypatch.setattr(module, "refit", gone)
-    assert strained(detector, y, fitted, loose, glance, Freed()) is None
+    assert strained(replace(start, freed=Freed()), y) is None
 
 
 def test_contacts_that_calibration_strains_are_told_with_what_they_became():

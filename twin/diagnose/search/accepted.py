@@ -165,8 +165,8 @@ def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
 
 
 def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(m,) white change by what acts on what is read, at its amplitude (q,); x (n,): parameters of the
-    motion that it reads otherwise."""
+    """(m,) white change by a cause at its amplitude (q,), by what acts in the machine to first order; x (n,):
+    parameters of the motion that is read otherwise."""
     if fault_of(h).exchanges:  # `exchanged` has left nothing of it
         return np.zeros(detector.columns.raw.shape[0])
     if fault_of(h).curved:
@@ -218,17 +218,13 @@ def exchanged(study: Study, y: np.ndarray, accepted: Sequence[Accepted]) -> np.n
     return y
 
 
-def stepped(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
-    """(size,) outputs of run k with the causes that act in the machine; x (n,) already shifted."""
-    return detector.study.outputs(k, x, *_acting(detector, accepted, k))
+def outputs_with(detector: Detector, accepted: Sequence[Accepted], x: np.ndarray) -> np.ndarray:
+    """(m,) of all fitted runs with the causes that act in the machine; x (n,) already shifted."""
+    study = detector.study
+    return np.concatenate(over_runs(lambda k: study.outputs(k, x, *acting(detector, accepted, k)), study.fitted))
 
 
-def states_with(detector: Detector, accepted: Sequence[Accepted], k: int, x: np.ndarray) -> np.ndarray:
-    """(n + 1, r) states of run k with the causes that act in the machine; x (n,) already shifted."""
-    return detector.study.states(k, x, *_acting(detector, accepted, k))
-
-
-def _acting(detector: Detector, accepted: Sequence[Accepted], k: int) -> tuple[Slots | None, Sequence[float]]:
+def acting(detector: Detector, accepted: Sequence[Accepted], k: int) -> tuple[Slots | None, Sequence[float]]:
     """What acts in the machine in run k, with its amplitudes; None where no cause does."""
     units = [u for a in accepted for u in a.units]
     if not units:
@@ -257,7 +253,6 @@ def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> 
         read = np.zeros(len(y))
         for a in reading:
             read += read_change(detector, a.hypothesis, a.amplitude, there)
-        exact = np.concatenate(over_runs(lambda k: stepped(detector, accepted, k, there), study.fitted))
-        return detector.whiten(y - exact) - read
+        return detector.whiten(y - outputs_with(detector, accepted, there)) - read
 
     return settle(detector.fitter, outputs, left)

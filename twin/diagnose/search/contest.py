@@ -54,11 +54,10 @@ def judged(
     score; it is the worthiest that they end at.
     """
     worthy = partial(worth, policy=detector.policy)
-    starts = {id(first): (first, *more) for first, *more in candidates}
-    waiting = sorted((c[0] for c in candidates), key=worthy, reverse=True)
     done, left, scores = list[Hypothesis](), list[Hypothesis](), dict[int, float]()
     lead, leads_by, count = -np.inf, -np.inf, Counter[str]()
-    for h in waiting:
+    for starts in sorted(candidates, key=lambda starts: worthy(starts[0]), reverse=True):
+        h = starts[0]
         led = worthy(h) < (1.0 - _behind(h, detector.policy)) * leads_by
         bends = bent(detector, h)
         told_badly = fault_of(h).curved or _saturated(detector, h)
@@ -66,7 +65,7 @@ def judged(
             left.append(h)
             continue
         count[h.batch.kind] += bends
-        now = _refitted(detector, y, fitted, starts[id(h)], lead) if bends else h
+        now = _refitted(detector, y, fitted, starts, lead) if bends else h
         if worthy(now) > lead:
             lead = worthy(now)
             leads_by = min(lead, max(worthy(h), (1.0 - detector.policy.saturates) * lead))

@@ -17,14 +17,12 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted, bounds
-from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.fault import Fault
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.integration import loads_for
-from twin.diagnose.model.over_runs import over_runs
 from twin.diagnose.model.study import Planned, Study
 from twin.diagnose.model.surrogate import jacobian_of
-from twin.diagnose.search.accepted import Accepted, exchanged, parameter_of
+from twin.diagnose.search.accepted import as_scored, exchanged, outputs_with, parameter_of
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.exact import misfit
 from twin.rom.drive import Drive, evaluate
@@ -37,16 +35,10 @@ def declared_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> li
 
 def misplaced_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """The same of sources all of whose heat is elsewhere, with what they do there beside the described machine."""
-    study, x = detector.study, np.zeros(len(fitted.x))
 
     def left(h: Hypothesis, _: np.ndarray) -> float:
-        units = units_of(study, h)
-
-        def of_run(k: int) -> np.ndarray:
-            return study.outputs(k, x, slots_with(study, detector.elements, units, k), h.amplitude)
-
-        there = over_runs(of_run, study.fitted)
-        return _fitted_with(detector, y, detector.whiten(np.concatenate(there) - detector.fitter.surrogate.y0))
+        there = outputs_with(detector, [as_scored(detector.study, h)], np.zeros(len(fitted.x)))
+        return _fitted_with(detector, y, detector.whiten(there - detector.fitter.surrogate.y0))
 
     return _better(detector, y, fitted, lambda fault: fault.elsewhere, left)
 
@@ -55,7 +47,7 @@ def swapped_candidates(detector: Detector, y: np.ndarray, fitted: Fitted) -> lis
     """The same of two channels with each other's name, with their readings put back."""
 
     def left(h: Hypothesis, _: np.ndarray) -> float:
-        back = exchanged(detector.study, y, [Accepted(h, (), np.ones(1), np.eye(1), 0.0, 0.0, ())])
+        back = exchanged(detector.study, y, [as_scored(detector.study, h)])
         return _fitted_with(detector, back, np.zeros(len(y)))
 
     return _better(detector, y, fitted, lambda fault: fault.exchanges, left)
@@ -73,7 +65,7 @@ def _better(
 
 def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[Hypothesis]:
     """Likewise with the model that has the corrected signal, and also those that explain nothing: the best factor of
-    each of the SIGNALS most promising; where that explains half of what a signal must, CLOSELY of them."""
+    each of the most promising `signals`; where that explains half of what a signal must, `closely` of them."""
     before, found = misfit(detector, fitted), list[Hypothesis]()
     factors = dict[str, list[Hypothesis]]()
     for h, _ in _promising(detector, y, lambda fault: fault.corrects):

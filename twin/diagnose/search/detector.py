@@ -137,9 +137,7 @@ def _fitted_null(shared: _Nulls, seed: int) -> Fitted:
 def _null_residual(shared: _Nulls, seed: int) -> np.ndarray:
     """What a calibration leaves of a null (m,)."""
     fitter, fitted = shared[0], _fitted_null(shared, seed)
-    white = fitter.whiten(fitted.residual)
-    explained = fitted.projector.outputs(fitted.projector.most_likely(white))
-    return fitter.whiten.colour(white - explained)
+    return fitter.whiten.colour(fitted.projector(fitter.whiten(fitted.residual)))
 
 
 @dataclass(frozen=True)

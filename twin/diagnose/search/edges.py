@@ -86,7 +86,7 @@ def moved(study: Study, elements: Elements, h: Hypothesis, shifts: Sequence[tupl
             ends[edge.window] = replace(w, end=float(np.clip(w.end + shift, w.start + SHORTEST, spans[w.run])))
         else:
             ends[edge.window] = replace(w, start=float(np.clip(w.start + shift, 0.0, w.end - SHORTEST)))
-    return replace(h, when=replace(h.when, name=named(ends, spans), windows=tuple(ends)))
+    return in_windows(h, ends, spans)
 
 
 def longer(study: Study, elements: Elements, h: Hypothesis) -> Hypothesis:
@@ -105,16 +105,17 @@ def without_one(study: Study, h: Hypothesis) -> list[Hypothesis]:
     """The hypothesis without each of its windows in turn; none where it has a single one."""
     windows, spans = h.when.windows, _spans(study)
     fewer = [(*windows[:i], *windows[i + 1 :]) for i in range(len(windows) if len(windows) > 1 else 0)]
-    return [replace(h, when=replace(h.when, name=named(left, spans), windows=left)) for left in fewer]
+    return [in_windows(h, left, spans) for left in fewer]
 
 
-def named(windows: Sequence[Window], spans: dict[str, float]) -> str:
-    """Windows in words; spans: when every run ends [s]."""
+def in_windows(h: Hypothesis, windows: Sequence[Window], spans: dict[str, float]) -> Hypothesis:
+    """The hypothesis in other windows, which its name tells; spans: when every run ends [s]."""
     first, runs = windows[0], [w.run for w in windows]
     lasting = all(w.end >= spans[w.run] - 1.0 for w in windows) and len(set(runs)) == len(runs)
+    name = "from " + " and ".join(f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" for w in windows)
     if lasting and len(windows) > 1 and all(w.start == 0.0 for w in windows[1:]):
-        return f"from {first.start / 3600:.1f} h of {first.run} on"
-    return "from " + " and ".join(f"{w.start / 3600:.1f} h to {w.end / 3600:.1f} h of {w.run}" for w in windows)
+        name = f"from {first.start / 3600:.1f} h of {first.run} on"
+    return replace(h, when=replace(h.when, name=name, windows=tuple(windows)))
 
 
 def with_pulses(

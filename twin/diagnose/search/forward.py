@@ -22,10 +22,10 @@ from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, settled, strong
 from twin.diagnose.search.contest import judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
-from twin.diagnose.search.exact import beginning, misfit, misfit_of_each, unexplained
+from twin.diagnose.search.exact import beginning, misfit, unexplained
 from twin.diagnose.search.growth import chilled, grown
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Search, Step, cosines, distinct, look
+from twin.diagnose.search.look import Search, Step, distinct, look, with_cosines
 from twin.diagnose.search.loose import loose_ones
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
@@ -56,11 +56,8 @@ def search_again(described: Detector, y: np.ndarray, start: Start, first: Search
 
 def _one_number(start: Start, y: np.ndarray) -> Search | None:
     """The search that ends with one declared number out of its tolerance, if it does."""
-    detector, fitted = start.detector, start.fitted
-    relaxed = strained(detector, y, fitted, start.loose, start.scored, start.freed)
-    if relaxed is None:
-        return None
-    return closed(detector, y, fitted, start.declared, start.glance, relaxed, start.x0, start.loose)
+    relaxed = strained(start, y)
+    return None if relaxed is None else closed(start, y, relaxed)
 
 
 def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
@@ -92,7 +89,8 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         standing = _covering(detector, standing, step.parts)
         if not standing:
             break
-        accepted.append(_chosen(detector, fitted, standing[0], [*standing, *others, *ranked]))
+        one, rivals = standing[0], _rivals(detector, fitted, standing[0], [*standing, *others, *ranked])
+        accepted.append(replace(as_scored(detector.study, one, detector.thresholds[one.family]), rivals=rivals))
         fitted, accepted = refit(detector, y, beginning(fitted.x, policy), accepted)
         while weak := [a for a in accepted if not stands(detector, a)]:
             refused.update((a.hypothesis.family, a.hypothesis.name) for a in weak)
@@ -109,7 +107,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     return Search(
         detector, start.x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance,
-        misfit_of_each(detector, fitted), unexplained(detector, fitted), loose,
+        unexplained(detector, fitted), loose,
     )  # fmt: skip
 
 
@@ -163,12 +161,6 @@ def _covering(detector: Detector, standing: Sequence[Hypothesis], parts: dict[st
     ]  # fmt: skip
 
 
-def _chosen(detector: Detector, fitted: Fitted, h: Hypothesis, ranked: Sequence[Hypothesis]) -> Accepted:
-    """A hypothesis as a cause, before it is refitted beside the others; ranked: among which its rivals are."""
-    one = as_scored(detector.study, h, detector.thresholds[h.family])
-    return replace(one, rivals=_rivals(detector, fitted, h, ranked))
-
-
 def _without(
     detector: Detector, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], dropped: Sequence[Accepted]
 ) -> tuple[Fitted, list[Accepted]]:
@@ -205,7 +197,7 @@ def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:
 
 
 def _restless(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
-    """Causes that switch more than FEW times and leave heat anywhere: a history that no name tells."""
+    """Causes that switch more than `few` times and leave heat anywhere: a history that no name tells."""
     left = max(parts.values(), default=0.0)
     return [
         a for a in accepted
@@ -274,5 +266,4 @@ def _rivals(
     near = max(detector.policy.rival, detector.policy.misfit * chosen.statistic)
     likely = [h for h in ranked if h.statistic > max(chosen.statistic - near, 0.5 * detector.thresholds[h.family])]
     others = distinct([chosen, *sorted(likely, key=lambda h: -h.statistic)])[1:9]
-    cosine = cosines(detector, fitted, [chosen, *others])
-    return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(others))
+    return with_cosines(detector, fitted, chosen, others)

@@ -12,7 +12,7 @@ from twin.diagnose.faults.readings import readings_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Gain
-from twin.diagnose.search.accepted import in_place, states_with, stepped, with_shifts
+from twin.diagnose.search.accepted import acting, in_place, with_shifts
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import SearchPolicy
 
@@ -33,7 +33,8 @@ def predicted(found: Search, k: int) -> Predicted:
     recalibrated = study.outputs(k, found.x0)
     if not found.accepted:
         return Predicted(delivered, recalibrated, study.outputs(k, found.x))
-    extended = stepped(detector, found.accepted, k, with_shifts(study, found.accepted, found.x))
+    there = with_shifts(study, found.accepted, found.x)
+    extended = study.outputs(k, there, *acting(detector, found.accepted, k))
     return Predicted(delivered, recalibrated, extended + _read(found, k))
 
 
@@ -45,7 +46,8 @@ def _read(found: Search, k: int) -> np.ndarray:
     if not wanted:
         return result
     one = replace(study, runs=(study.runs[k],), fitted=(0,))
-    z = states_with(found.detector, found.accepted, k, with_shifts(study, found.accepted, found.x))
+    there = with_shifts(study, found.accepted, found.x)
+    z = study.states(k, there, *acting(found.detector, found.accepted, k))
     nominal = replace(found.detector.nominal[k], states=z)
     y = study.outputs(k, np.zeros(len(found.x)))
     columns, index = readings_of(one, [nominal], [y], [np.zeros((len(y), len(found.x)))])

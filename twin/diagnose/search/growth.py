@@ -14,7 +14,7 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import RIDGE, History, Hypothesis, prepared, score
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.edges import named
+from twin.diagnose.search.edges import in_windows
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.machine.effects.effect import Window
 
@@ -28,7 +28,6 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy 
         return _elsewhere(h, g, block, policy)
     if len(h.when.windows) == 0 or h.batch.fixed or not fault_of(h).grows:
         return h
-    alone = replace(h.batch, places=(h.name,), columns=h.batch.columns[h.place : h.place + 1])
     others = [w for w in h.batch.histories if w.windows]
     W = np.stack([w.weights for w in others])  # (h, q, L)
     spans = _spans(_blocks(h.batch.histories))
@@ -38,19 +37,25 @@ def grown(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy 
         free = np.flatnonzero((np.abs(W) * np.abs(now)).sum(axis=(1, 2)) == 0.0)
         if not len(free):
             break
-        unions = tuple(History("", now + W[k]) for k in free)
-        ready = prepared(replace(alone, histories=unions), block[None])
-        scores = score(ready, g)
-        k = int(np.argmax(scores.statistic))
-        statistic = float(scores.statistic[0, k])
-        if statistic < current.statistic + max(policy.growth, policy.growth_share * current.statistic):
+        unions = [History("", now + W[k], windows=(*current.when.windows, *others[k].windows)) for k in free]
+        union = _likeliest(h, unions, g, block)
+        if union.statistic < current.statistic + max(policy.growth, policy.growth_share * current.statistic):
             break
-        more = others[int(free[k])]
-        windows = tuple(sorted((*current.when.windows, *more.windows), key=lambda w: (w.run, w.start)))
-        when, a = replace(unions[k], name=named(windows, spans), windows=windows), scores.amplitude[0, k]
-        more_of = Hypothesis(h.batch, h.place, when, statistic, tuple(map(float, a)), float(ready.information[0, k]))
-        current = refined_edges(more_of, g, block, policy)
+        windows = sorted(union.when.windows, key=lambda w: (w.run, w.start))
+        current = refined_edges(in_windows(union, windows, spans), g, block, policy)
     return current
+
+
+def _likeliest(h: Hypothesis, histories: Sequence[History], g: np.ndarray, block: np.ndarray) -> Hypothesis:
+    """The hypothesis with the one of some histories that the data like best; block as of `grown`."""
+    columns = h.batch.columns[h.place : h.place + 1]
+    ready = prepared(replace(h.batch, places=(h.name,), columns=columns, histories=tuple(histories)), block[None])
+    scores = score(ready, g)
+    k = int(np.argmax(scores.statistic))
+    return replace(
+        h, when=histories[k], statistic=float(scores.statistic[0, k]),
+        amplitude=tuple(map(float, scores.amplitude[0, k])), information=float(ready.information[0, k]),
+    )  # fmt: skip
 
 
 def refined_edges(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis:
@@ -64,23 +69,16 @@ def refined_edges(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: Searc
     parts = _blocks(h.batch.histories)
     if fault_of(h).wets or not parts or not np.allclose(_acting(parts, h.when.windows), h.when.weights):
         return h
-    spans = _spans(parts)
-    alone = replace(h.batch, places=(h.name,), columns=h.batch.columns[h.place : h.place + 1])
-    current = h
+    spans, current = _spans(parts), h
     for _ in range(policy.edge_moves):
-        tried = [(w, _acting(parts, w)) for w in _shifted(parts, current.when.windows)]
+        shifted = _shifted(parts, current.when.windows)
+        tried = [replace(current.when, weights=_acting(parts, w), windows=w) for w in shifted]
         if not tried:
             break
-        ready = prepared(replace(alone, histories=tuple(History("", W) for _, W in tried)), block[None])
-        scores = score(ready, g)
-        k = int(np.argmax(scores.statistic))
-        statistic = float(scores.statistic[0, k])
-        if statistic < current.statistic + policy.less:
+        found = _likeliest(h, tried, g, block)
+        if found.statistic < current.statistic + policy.less:
             break
-        windows, weights = tried[k]
-        name, a = named(windows, spans), scores.amplitude[0, k]
-        when = replace(current.when, name=name, weights=weights, windows=windows)
-        current = Hypothesis(h.batch, h.place, when, statistic, tuple(map(float, a)), float(ready.information[0, k]))
+        current = in_windows(found, found.when.windows, spans)
     return current
 
 
@@ -178,7 +176,6 @@ def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:
 
 def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy) -> Hypothesis:
     """A bell with its best hour in every run: runs may start at other hours of the day. Greedy, run by run."""
-    alone = replace(h.batch, places=(h.name,), columns=h.batch.columns[h.place : h.place + 1])
     current = h
     for i in range(2 * h.batch.q):
         run, bell = i % h.batch.q, current.when.bell
@@ -190,10 +187,7 @@ def _elsewhere(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPo
                 weights[run] = other.weights[run]
                 centres = tuple(other.bell.centres[run] if r == run else c for r, c in enumerate(bell.centres))
                 others.append(replace(current.when, weights=weights, bell=replace(bell, centres=centres)))
-        ready = prepared(replace(alone, histories=tuple(others)), block[None])
-        scores = score(ready, g)
-        k = int(np.argmax(scores.statistic))
-        statistic, a = float(scores.statistic[0, k]), scores.amplitude[0, k]
-        if statistic > current.statistic + policy.growth:
-            current = replace(h, when=others[k], statistic=statistic, amplitude=tuple(map(float, a)))
+        found = _likeliest(h, others, g, block)
+        if found.statistic > current.statistic + policy.growth:
+            current = found
     return current

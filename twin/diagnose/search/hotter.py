@@ -15,7 +15,7 @@ from twin.diagnose.search.detector import Detector
 
 
 def hotter(detector: Detector, x: np.ndarray) -> Detector:
-    """The detector at parameters x (n,) in prior standard deviations; itself where no channel is MUCH hotter."""
+    """The detector at parameters x (n,) in prior standard deviations; itself where no channel is much `hotter`."""
     surrogate = detector.fitter.surrogate
     least = detector.policy.rise_temperature, detector.policy.rise_displacement
     times = _rise(detector.study, surrogate.at(x)[0], least) / _rise(detector.study, surrogate.y0, least)

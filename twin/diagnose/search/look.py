@@ -43,9 +43,13 @@ class Search:
     g: np.ndarray  # (n_columns,) after the accepted ones
     heat: Heat  # likewise
     covariance: np.ndarray  # (n, n) of x
-    left: np.ndarray  # (m,) of the last fit: what each number has in the sum of squares, in units of all discrepancy
-    unexplained: np.ndarray  # (m,) of it: the white residual less what everything explains
+    unexplained: np.ndarray  # (m,) of the last fit: the white residual less what everything explains
     loose: tuple[Loose, ...] = ()  # declared numbers out of their tolerance, the farthest first
+
+    @property
+    def left(self) -> np.ndarray:
+        """(m,) what each number has in the last fit's sum of squares, in units of all discrepancy."""
+        return self.detector.whiten(self.residual) * self.unexplained
 
     @property
     def poor(self) -> bool:
@@ -81,6 +85,14 @@ def look(
     return seen, ranked, Step(tuple(top), cosines(detector, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
 
 
+def with_cosines(
+    detector: Detector, fitted: Fitted, chosen: Hypothesis, others: Sequence[Hypothesis]
+) -> tuple[tuple[Hypothesis, float], ...]:
+    """Others, with the cosine of each to the chosen one."""
+    cosine = cosines(detector, fitted, [chosen, *others])
+    return tuple((h, float(cosine[0, i])) for i, h in enumerate(others, start=1))
+
+
 def distinct(ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The first of every family, place and kind."""
     first = dict[tuple[str, str, str], Hypothesis]()
@@ -105,9 +117,8 @@ def sized_candidates(detector: Detector, projector: Projector, white: np.ndarray
     tried = [
         Hypothesis(batch, i, batch.histories[0], 0.0, (size,), 0.0)
         for batch in detector.columns.batches
-        for sizes in [fault_of(batch).sizes]
-        for i in range(len(batch.places) if sizes else 0)
-        for size in sizes
+        for i in range(len(batch.places))
+        for size in fault_of(batch).sizes
     ]
     if not tried:
         return []

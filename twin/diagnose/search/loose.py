@@ -117,8 +117,8 @@ def factors_of(detector: Detector, j: int) -> Iterator[tuple[Hypothesis, float, 
     own = detector.whiten(detector.fitter.linear(np.zeros(len(detector.study.scale)))[1][:, j])
     own = own / detector.study.scale[j]
     size = float(own @ own)
-    for batch in detector.columns.batches:
-        for i, _ in enumerate(batch.places if fault_of(batch).corrects else ()):
+    for batch in (b for b in detector.columns.batches if fault_of(b).corrects):
+        for i in range(len(batch.places)):
             signal = detector.columns.raw[:, batch.columns[i, 0]].astype(float)
             along = float(signal @ own)
             cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))

@@ -20,6 +20,7 @@ from twin.calibrate.members.select import SURE, Joined
 from twin.diagnose.faults.missing_member import FAMILY
 from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Cause, Gain
+from twin.diagnose.result.numbers import rms
 from twin.diagnose.search.gain import Channel, gain_of, predicted
 from twin.diagnose.search.look import Search
 from twin.errors import TwinError
@@ -51,9 +52,8 @@ def missing_members(
     except TwinError:  # nothing was logged that a body could follow
         return None
     selected, axes = members.selected, list(members.axes)
-    explained = np.array([_rms(m, _left(found, k, m), axes) for k, m in enumerate(plans[: len(runs)])])
-    left = np.sqrt(np.mean(left_by(members, artefact, runs) ** 2, axis=0))
-    usual = np.sqrt(np.nanmean(explained**2, axis=0))
+    explained = np.array([rms(_left(found, k, m)[:, axes]) for k, m in enumerate(plans[: len(runs)])])
+    left, usual = rms(left_by(members, artefact, runs)), rms(explained)
     policy = found.detector.policy
     if not selected.named or _mean_ratio(left, usual) > policy.halves:
         return None
@@ -101,10 +101,6 @@ def _left(found: Search, k: int, m: Measured, extended: bool = True) -> np.ndarr
     """(k, 3) m that the recalibrated model leaves of run k, with the causes that were found or without."""
     own = predicted(found, k)
     return m.tcp - found.detector.study.runs[k].split(own.extended if extended else own.recalibrated)[1]
-
-
-def _rms(m: Measured, error: np.ndarray, axes: Sequence[int]) -> np.ndarray:
-    return np.sqrt(np.nanmean(error[:, axes] ** 2, axis=0)) if len(m.tcp) else np.full(len(axes), np.nan)
 
 
 def _mean_ratio(after: np.ndarray, before: np.ndarray) -> float:

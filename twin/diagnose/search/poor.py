@@ -5,34 +5,17 @@ follows one logged column with one lag resembles most what is left there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
 from twin.calibrate.members.driver import drivers_of
-from twin.calibrate.members.responses import Candidate, candidates, responses
+from twin.calibrate.members.responses import candidates, responses
+from twin.diagnose.result.numbers import rms
 from twin.diagnose.search.dispersion import Dispersion
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.look import Search
 from twin.logs.run import Run
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A sensor where the model fits badly, and what would help."""
-
-    sensor: str
-    rms: float  # K, of what is left in all fitted runs
-    run: str  # with the worst hour
-    hour: float  # h, where that begins
-    by: Candidate | None  # None where nothing was logged
-    share: float  # of the mean square that is left, which a body that follows it would explain
-
-    @property
-    def words(self) -> str:
-        help_ = "" if self.by is None else f": a body that {self.by.words} would explain {self.share:.0%} of it"
-        return f"{self.sensor} {self.rms:.2g} K (worst from {self.hour:.0f} h of {self.run}){help_}"
 
 
 def poor_note(
@@ -55,15 +38,14 @@ def poor_note(
     for k, m in enumerate(plans[: len(runs)]):
         flat = predicted(found, k).extended
         errors.append(m.temperature - found.detector.study.runs[k].split(flat)[0])
-    rms = np.nan_to_num(np.sqrt(np.nanmean(np.concatenate(errors) ** 2, axis=0)))  # K, of sensors over all runs
-    worst = [int(i) for i in np.argsort(-rms)[: policy.worst] if rms[i] > sigma]
-    pieces = [_piece(sensors[i], i, float(rms[i]), errors, plans, runs).words for i in worst]
-    return f"{told}; fits worst: {'; '.join(pieces)}" if pieces else told
+    left = np.nan_to_num(rms(np.concatenate(errors)))  # K, of sensors over all runs
+    worst = [int(i) for i in np.argsort(-left)[: policy.worst] if left[i] > sigma]
+    words = [f"{sensors[i]} {left[i]:.2g} K {_at_worst(i, errors, plans, runs)}" for i in worst]
+    return f"{told}; fits worst: {'; '.join(words)}" if words else told
 
 
-def _piece(
-    sensor: str, column: int, rms: float, errors: Sequence[np.ndarray], plans: Sequence[Measured], runs: Sequence[Run]
-) -> Piece:
+def _at_worst(column: int, errors: Sequence[np.ndarray], plans: Sequence[Measured], runs: Sequence[Run]) -> str:
+    """The worst hour of a sensor, from errors (b, s) [K] of every run, and what would help there, in words."""
     worst, at, hour = 0.0, 0, 0.0
     for k, (error, m) in enumerate(zip(errors, plans, strict=False)):
         hours = ((m.bin_time - m.bin_time[:1]) // 3600.0).astype(int)
@@ -72,12 +54,13 @@ def _piece(
             square = float(np.nanmean(own**2)) if np.isfinite(own).any() else 0.0
             if square > worst:
                 worst, at, hour = square, k, float(h)
-    tried = [c for c in candidates(drivers_of(runs)) if c.driver.column != sensor]
+    when = f"(worst from {hour:.0f} h of {plans[at].name})"
+    tried = [c for c in candidates(drivers_of(runs)) if c.driver.column != plans[0].sensors[column]]
     if not tried:
-        return Piece(sensor, rms, plans[at].name, hour, None, 0.0)
+        return when
     F = np.concatenate([responses(run, tried, m.bin_time) for run, m in zip(runs, plans, strict=False)])
     y = np.concatenate([e[:, column] for e in errors])
     good = np.isfinite(y)
     share = (F[good].T @ y[good]) ** 2 / np.maximum((F[good] ** 2).sum(axis=0) * float(y[good] @ y[good]), 1e-30)
     best = int(np.argmax(share))
-    return Piece(sensor, rms, plans[at].name, hour, tried[best], float(share[best]))
+    return f"{when}: a body that {tried[best].words} would explain {share[best]:.0%} of it"

@@ -149,7 +149,7 @@ def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], ampli
 
 
 def _limited(found: np.ndarray, before: np.ndarray, accepted: Sequence[Accepted], policy: SearchPolicy) -> np.ndarray:
-    """Amplitudes after a step; factors move by their logarithms, of which a step is no longer than LONGEST."""
+    """Amplitudes after a step; factors move by their logarithms, of which a step is no longer than `longest`."""
     result = found.copy()
     for a, own in zip(accepted, spans(accepted), strict=True):
         first = own.start

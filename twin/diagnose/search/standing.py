@@ -11,7 +11,7 @@ from twin.calibrate.fit.measured import Measured
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import Accepted, settled
-from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
+from twin.diagnose.search.exact import beginning, unexplained
 from twin.diagnose.search.forward import stands
 from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.refit import refit
@@ -28,29 +28,26 @@ def standing(
     Where these refute several causes in the machine together, the weakest goes and the others are fitted and judged
     again. If they are refuted down to the last one, so is all that was found.
     """
-    whole = _held_against(found, y, families, faults, opened, seed)
+
+    def held_against(now: Search) -> Judged:
+        verdict, causes = verdict_of(now, families)
+        if verdict == "unknown":  # judged is the calibration beside faulty channels then, not what was tried
+            now = beside_sensors(now, y, families)
+        return judged(now, y, *with_faults(verdict, causes, faults), families, opened, seed)
+
+    whole = held_against(found)
     now, told, gone = found, whole, list[Accepted]()
     while told.refuted and (weakest := _weakest(now, families)):
         gone.append(weakest)
         now = without(now, y, weakest)
         if not all(stands(now.detector, a) for a in now.accepted):
             return found, whole
-        told = _held_against(now, y, families, faults, opened, seed)
+        told = held_against(now)
     if told.refuted or not gone or told.verdict == "unknown":
         return found, whole
     names = " and ".join(f"{a.hypothesis.family.replace('_', ' ')} at {a.hypothesis.name}" for a in gone)
     less = f"withdrawn: {names}, with which the other causes predict the sealed run worse beyond chance"
     return now, replace(told, less=less)
-
-
-def _held_against(
-    found: Search, y: np.ndarray, families: Sequence[Family], faults: Sequence[Cause], opened: Sequence[Measured],
-    seed: int,
-) -> Judged:  # fmt: skip
-    verdict, causes = verdict_of(found, families)
-    if verdict == "unknown":  # judged is the calibration beside faulty channels then, not what was tried
-        found = beside_sensors(found, y, families)
-    return judged(found, y, *with_faults(verdict, causes, faults), families, opened, seed)
 
 
 def _weakest(found: Search, families: Sequence[Family]) -> Accepted | None:
@@ -67,8 +64,7 @@ def without(found: Search, y: np.ndarray, one: Accepted) -> Search:
     x, covariance = settled(detector, y, accepted)
     return replace(
         found, x=x, accepted=tuple(accepted), steps=(*found.steps, step), residual=fitted.residual, g=seen.g,
-        heat=seen.heat, covariance=covariance, left=misfit_of_each(detector, fitted),
-        unexplained=unexplained(detector, fitted),
+        heat=seen.heat, covariance=covariance, unexplained=unexplained(detector, fitted),
     )  # fmt: skip
 
 

@@ -19,21 +19,20 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, misfit_of_each, unbent, unexplained
-from twin.diagnose.search.look import Search, Step, cosines, look
+from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, unbent, unexplained
+from twin.diagnose.search.look import Search, look, with_cosines
 from twin.diagnose.search.loose import Freed, factors_of, variance_of
 from twin.diagnose.search.refit import refit
+from twin.diagnose.search.start import Start
 
 
-def closed(
-    detector: Detector, y: np.ndarray, before: Fitted, declared: Sequence[Hypothesis],
-    glance: tuple[Sight, list[Hypothesis], Step], relaxed: tuple[Fitted, Accepted], x0: np.ndarray,
-    loose: tuple[Loose, ...],
-) -> Search | None:  # fmt: skip
-    """The search that ends with one declared number out of its tolerance; None where that leaves something, or where
-    something else that was seen before (glance) explains more. What explains nearly as much is its rival."""
+def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Search | None:
+    """The search of measurements y (m,) that ends with one declared number out of its tolerance, relaxed as by
+    `strained`; None where that leaves something, or where something else that was seen before (`Start.glance`) explains
+    more. What explains nearly as much is its rival."""
+    detector, before, declared, loose = start.detector, start.fitted, start.declared, start.loose
     fitted, one = relaxed
-    _, ranked, first = glance
+    _, ranked, first = start.glance
     seen, left, last = look(detector, fitted)
     misfits = (1.0 - detector.policy.covers) * one.statistic  # that it may leave
     room = max(detector.thresholds["unknown"], misfits)
@@ -76,7 +75,7 @@ def closed(
         h for h in family
         if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
     ]  # fmt: skip
-    rivals += tuple((h, float(cosines(detector, before, [one.hypothesis, h])[0, 1])) for h in near)
+    rivals += tuple(pair for h in near for pair in with_cosines(detector, before, one.hypothesis, [h]))
     amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
     one = replace(
         one, hypothesis=replace(one.hypothesis, statistic=one.statistic), rivals=rivals,
@@ -84,8 +83,8 @@ def closed(
     )  # fmt: skip
     x, covariance = settled(detector, y, (one,))
     return Search(
-        detector, x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
-        misfit_of_each(detector, fitted), unexplained(detector, fitted), loose,
+        detector, start.x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
+        unexplained(detector, fitted), loose,
     )  # fmt: skip
 
 
@@ -141,16 +140,13 @@ def _weak(detector: Detector, ranked: Sequence[Hypothesis], misfits: float) -> b
     return all(h.statistic < max(detector.policy.later * detector.thresholds[h.family], misfits) for h in ranked)
 
 
-def strained(
-    detector: Detector, y: np.ndarray, fitted: Fitted, loose: Sequence[Loose],
-    glance: tuple[Sight, list[Hypothesis], Step], known: Freed,
-) -> tuple[Fitted, Accepted] | None:  # fmt: skip
+def strained(start: Start, y: np.ndarray) -> tuple[Fitted, Accepted] | None:
     """Of the declared numbers out of their tolerance the one that leaves least, freed of it, and as its rivals those
-    that leave as much but for chance; None if there is none, or what was seen at a glance explains so much more that it
-    would be left. Of those the first is the one farthest beyond what synthetic measurements show: a loss that a fit has
+    that leave as much but for chance; None if there is none, or what was scored explains so much more that it would be
+    left. Of those the first is the one farthest beyond what synthetic measurements show: a loss that a fit has
     reached within its tolerance, however surely, leaves no less once it is freed, and discrepancy at a joint does."""
-    policy = detector.policy
-    strain = {own.index: own.strain for own in loose}
+    detector, fitted, policy = start.detector, start.fitted, start.detector.policy
+    strain = {own.index: own.strain for own in start.loose}
     found = []
     for batch in detector.columns.batches:
         fault = fault_of(batch)
@@ -161,7 +157,7 @@ def strained(
             size, _ = fault.amplitude(float(fitted.x[j] * detector.study.scale[j]))
             likelihood = float((policy.pulled * strain[j]) ** 2)
             found.append(Hypothesis(batch, i, always, likelihood, (size,), float(detector.study.scale[j] ** -2.0)))
-    seen, ranked, _ = glance
+    seen, ranked, _ = start.scored
     most = ranked[0].statistic if ranked else 0.0
     freed_ones, before = [], misfit(detector, fitted)
     for h in sorted(found, key=lambda h: -h.statistic):
@@ -170,7 +166,7 @@ def strained(
         likely = fault_of(h).faint or _scored(detector, fitted, seen, h) > policy.faint * most
         if not likely and policy.roughly * (1.0 - policy.covers) * _told_alone(detector, fitted, h) < most:
             continue
-        made = _freed(detector, y, fitted, h, known)
+        made = _freed(detector, y, fitted, h, start.freed)
         if made and (
             likely or ((1.0 - policy.covers) * made[1].statistic > most and misfit(detector, made[0]) < before)
         ):
@@ -180,16 +176,10 @@ def strained(
     left = [misfit(detector, fit) for fit, _ in freed_ones]
     near = [made for made, own in zip(freed_ones, left, strict=True) if own < min(left) + policy.close]
     (fit, one), *others = sorted(near, key=lambda made: -strain[freed(detector.study, made[1].hypothesis)[0]])
-    return fit, replace(one, rivals=_as_rivals(detector, fitted, one, [other for _, other in others]))
-
-
-def _as_rivals(
-    detector: Detector, fitted: Fitted, one: Accepted, others: Sequence[Accepted]
-) -> tuple[tuple[Hypothesis, float], ...]:
-    """Freed numbers as rivals of one of them, of their own size and its statistic: either explains the same."""
-    rivals = [replace(o.hypothesis, amplitude=tuple(o.amplitude.tolist()), statistic=one.statistic) for o in others]
-    cosine = cosines(detector, fitted, [one.hypothesis, *rivals])
-    return tuple((h, float(cosine[0, i + 1])) for i, h in enumerate(rivals))
+    rivals = [  # of their own size and its statistic: either explains the same
+        replace(own.hypothesis, amplitude=tuple(own.amplitude.tolist()), statistic=one.statistic) for _, own in others
+    ]
+    return fit, replace(one, rivals=with_cosines(detector, fitted, one.hypothesis, rivals))
 
 
 def _scored(detector: Detector, fitted: Fitted, seen: Sight, h: Hypothesis) -> float:

@@ -10,8 +10,7 @@ import numpy as np
 
 from twin.diagnose.model.study import COMPONENTS, Study
 from twin.diagnose.result.place import Support
-from twin.diagnose.search.accepted import Accepted, jacobian, read_change, readings_columns
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.accepted import jacobian, read_change, readings_columns
 from twin.diagnose.search.look import Search
 
 
@@ -24,15 +23,8 @@ def support_of(found: Search) -> Support | None:
     J = jacobian(detector, np.clip(found.x, -3.0, 3.0), sizes, closely=True)
     beside = [readings_columns(detector, a.hypothesis) for a in others]
     projector = detector.fitter.projector(J, np.hstack(beside) if beside else None)
-    explained = _change(detector, first, found.x)
-    return _shared(found.detector.study, explained * projector(detector.whiten(found.residual)))
-
-
-def _change(detector: Detector, a: Accepted, x: np.ndarray) -> np.ndarray:
-    """(m,) white response to a cause."""
-    if a.units:
-        return np.asarray(readings_columns(detector, a.hypothesis) @ a.amplitude)
-    return read_change(detector, a.hypothesis, a.amplitude, x)
+    explained = read_change(detector, first.hypothesis, first.amplitude, found.x)
+    return _shared(detector.study, explained * projector(detector.whiten(found.residual)))
 
 
 def _shared(study: Study, rows: np.ndarray) -> Support | None:

@@ -110,8 +110,7 @@ def _reading(h: Hypothesis) -> str:
 
 def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tuple[Cause, ...]]:
     """The verdict, and the causes it rests on."""
-    entries = {f.name: f for f in families}
-    groups = {f.name: f.group for f in families}
+    entries, sensors = {f.name: f for f in families}, {f.name for f in families if f.group == "sensor"}
     thresholds, policy = found.detector.thresholds, found.detector.policy
     left = max(found.steps[-1].parts.values(), default=0.0)
     relaxed = any(freed(found.detector.study, a.hypothesis) for a in found.accepted)
@@ -122,7 +121,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
     much = left > thresholds["unknown"] and (not causes or left > policy.remainder * before)
     if much and not _more_alike(found, left):
         # a declaration is not corrected while something else is at work; a sensor is not part of the machine
-        return "unknown", tuple(c for c in causes if groups.get(c.family) == "sensor")
+        return "unknown", tuple(c for c in causes if c.family in sensors)
     if not causes:
         if found.poor:  # whose parameters go wherever they hide its form
             return "too_poor", ()
@@ -141,15 +140,16 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         if not same and (unproved or passes):
             return "ambiguous", causes
     # a sensor at fault does not keep what is beside it out of the description
-    others = [c for c in causes if groups.get(c.family) != "sensor"]
+    others = [c for c in causes if c.family not in sensors]
     if not others:
         return "sensor", causes
-    first = others[0]
-    if groups.get(first.family) == "signal":
+    first, entry = others[0], entries.get(others[0].family)
+    if entry is None:
+        return "named", causes
+    if entry.group == "signal":
         return "signal", causes
-    declared = first.family in entries and entries[first.family].declared and not first.windows and not first.signal
-    whole = Spot.read(first.place).declared
-    return ("out_of_tolerance" if declared and whole else "named"), causes
+    whole = entry.declared and not first.windows and not first.signal and Spot.read(first.place).declared
+    return ("out_of_tolerance" if whole else "named"), causes
 
 
 def _more_alike(found: Search, left: float) -> bool:
@@ -205,12 +205,10 @@ def unknown_of(found: Search) -> Unknown | None:
     study = detector.study
     histories = {}
     blocks = detector.elements.histories.blocks
-    for k in study.fitted:
-        run = study.runs[k].run
-        dt = float(run.drive.time[1] - run.drive.time[0])
+    for k, (name, dt) in zip(study.fitted, study.fitted_runs, strict=True):
         own = [b for b, (i, _, _) in enumerate(blocks) if i == k]
         when = tuple((blocks[b][1] + blocks[b][2]) / 2 * dt for b in own)
-        histories[run.name] = (when, tuple(map(float, heat[own])), tuple(map(float, sigma[own])))
+        histories[name] = (when, tuple(map(float, heat[own])), tuple(map(float, sigma[own])))
     correlated = []
     for signal in study.runs[0].run.signals:
         means = []

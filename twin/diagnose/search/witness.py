@@ -175,11 +175,9 @@ def _with_readings(detector: Detector, plans: Sequence[Measured], runs: Sequence
 
 def _column(study: Study, f: Finding) -> np.ndarray:
     """(m,) K that one of a finding's size adds to the outputs of the fitted runs."""
-    parts = []
-    for number, k in enumerate(study.fitted):
-        m = study.runs[k].measured
-        reads, tcp = np.zeros(m.temperature.shape), np.zeros(m.tcp.shape)
+    column = study.joined(lambda _: (0.0, 0.0))
+    for number, (planned, T, _) in enumerate(study.split(column)):
+        m = planned.measured
         if f.channels[0] in m.sensors:
-            reads[:, m.sensors.index(f.channels[0])] = _of_run(m.bin_time, f, number)
-        parts += [reads.ravel(), tcp.ravel()]
-    return np.concatenate(parts)
+            T[:, m.sensors.index(f.channels[0])] = _of_run(m.bin_time, f, number)
+    return column
