@@ -66,8 +66,8 @@ def jacobian(
     whose place a cause takes is empty. closely: with what parameters do to the response to strong ones.
 
     Causes that take a parameter's place are put there, for a film of nine times its size changes what every other
-    parameter does. Conductances beyond their bounds, corrected signals and strong causes get derivatives made anew, for
-    no surrogate knows of them; unless this diagnosis has made some nearer than `anew`, from which the surrogate goes on.
+    parameter does. Conductances beyond their bounds, corrected signals and strong causes get derivatives made anew, as
+    no surrogate knows of them, unless this diagnosis has made some nearer than `anew`: the surrogate goes on from these.
     """
     study = detector.study
     low, high = bounds(study)
