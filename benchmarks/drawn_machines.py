@@ -221,8 +221,7 @@ def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
 def detector_of(drawn: DrawnMachine, machine: Machine, runs: Sequence[Run]) -> tuple[Detector, float]:
     """What all trials of a machine are diagnosed with, and the mean power of all its sources [W]."""
     settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
-    nothing: Any = None
-    detector = prepare(nothing, machine, runs[:2], runs[2:], settings)[2]
+    detector, _ = prepare(machine, runs[:2], runs[2:], settings)
     return detector, float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
 
 

@@ -114,7 +114,8 @@ def rows_of(path: Path, days: Sequence[str], faults: int, rng: np.random.Generat
     machine = machine_of(artefact, path)
     runs = [read_run(OUT / "runs" / day) for day in days]
     usable, set_aside = checked(runs, artefact.model.sensors)
-    _, study, detector, plans = prepare(artefact, machine, usable, (), Settings(form=FORM, nulls=NULLS))
+    detector, plans = prepare(machine, usable, (), Settings(form=FORM, nulls=NULLS))
+    study = detector.study
     made, limited = _row(detector, plans, set_aside, days, None)
     rows = [made]
     plain = [simulate_run(machine, run)[0] for run in runs]

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -114,11 +113,10 @@ def noisy(runs: Sequence[Run], seed: int, logged: Sequence[Run]) -> list[Run]:
 
 def detector_of(shipped: Shipped) -> Detector:
     """That of the description on the loads of the machine."""
-    nothing: Any = None  # an artefact: only its notes are made from it
     real = shipped.reduced(0)  # any measurements: a detector is made from their plan
     runs = noisy(real.measured(shipped.loads, {}, {}, TCP_EVERY), 0, shipped.loads)
     settings = Settings(temperature_sigma=NOISE[0], tcp_sigma=NOISE[1], nulls=SYNTHETIC[1], form=SYNTHETIC[0])
-    return prepare(nothing, shipped.machine, runs[:2], runs[2:], settings)[2]
+    return prepare(shipped.machine, runs[:2], runs[2:], settings)[0]
 
 
 def trials(shipped: Shipped, study: Study, seed: int) -> Iterator[tuple[str, str, str]]:

@@ -369,7 +369,7 @@ def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
     told = channels_of(found, 2, study.runs[2].measured, (np.ones(3), np.ones(3)))
     assert {g.run for g in told} == {study.runs[2].run.name}
     result = Result(replace(d, series=()), found, causes)
-    write_extension(result, lumped_case.artefact(), small_case.machine(), (), tmp_path, build=False)
+    write_extension(result, lumped_case.artefact(), small_case.machine(), (), tmp_path)
     written = tomllib.loads((tmp_path / "machine.toml").read_text("utf-8"))
     assert written["sources"][path.split(".")[1]]["gain"] == pytest.approx(pull.value, rel=1e-4)
 
