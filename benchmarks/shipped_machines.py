@@ -9,17 +9,17 @@ again. `NAME certify` compares that model with the full one.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.drawn_machines import IN_MACHINE, SHARE, VISIBLE, Row, counted, moved, places, said
+from benchmarks.drawn_machines import IN_MACHINE, SHARE, moved, places, said, told
+from benchmarks.rows import VISIBLE, Row, of_seeds
 from benchmarks.shipped_truth import Reduced, reduced
 from twin.build.remesh import remesh
 from twin.build.simulate import simulate_run
@@ -261,14 +261,7 @@ def judged(name: str, seed: int) -> list[Row]:
 
 
 def main(name: str, first: int, count: int) -> None:
-    OUT.mkdir(parents=True, exist_ok=True)
-    rows: list[Row] = []
-    for seed in range(first, first + count):
-        path = OUT / f"{name}_{seed}.jsonl"
-        if not path.exists():
-            path.write_text("".join(json.dumps(row) + "\n" for row in judged(name, seed)), encoding="utf-8")
-        rows += [json.loads(line) | {"seed": seed} for line in path.read_text("utf-8").splitlines()]
-    counted(rows)
+    told(of_seeds(OUT, name, range(first, first + count), partial(judged, name)))
 
 
 if __name__ == "__main__":
