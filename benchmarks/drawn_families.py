@@ -15,7 +15,18 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.drawn_machines import OUT, SHARE, drawn_of, hidden_in_logs, logs_of, moved, said, set_up, simulated
+from benchmarks.drawn_machines import (
+    OUT,
+    SHARE,
+    drawn_of,
+    hidden_in_logs,
+    logs_of,
+    moved,
+    power_of,
+    said,
+    set_up,
+    simulated,
+)
 from benchmarks.rows import Row, counted, of_seeds, visible, worth
 from twin.cli.main import run as command
 from twin.diagnose.faults.sun import SOLAR
@@ -126,10 +137,10 @@ def judged(seed: int) -> list[Row]:
 
 
 def _judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
-    machine, healthy, detector, power = set_up(drawn, folder)
+    machine, healthy, detector = set_up(drawn, folder)
     sound = [[read_run(p) for p in runs] for runs in healthy]
     rows = []
-    for i, hidden in enumerate(effects(drawn, machine, power)):
+    for i, hidden in enumerate(effects(drawn, machine, power_of(detector.study))):
         if made := measured(drawn, folder, healthy[1], folder / f"effect_{i}", hidden, 40 + i):
             own = [read_run(p) for p in made]
             row = said(detector, (hidden.family, hidden.place, hidden.size, *hidden.options), own)

@@ -22,6 +22,7 @@ import numpy as np
 from benchmarks.rows import Row, counted, of_seeds, worth
 from twin.cli.main import run as command
 from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.model.study import Study
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.report.recalibration import large
 from twin.diagnose.report.text import alike
@@ -163,9 +164,9 @@ def judged(kind: str, seed: int) -> list[Row]:
 
 
 def _judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
-    machine, healthy, detector, power = set_up(drawn, folder)
+    machine, healthy, detector = set_up(drawn, folder)
     measured_runs = [(("nothing", "", ""), runs) for runs in healthy]
-    for i, hidden in enumerate(trials(drawn, machine, power)):
+    for i, hidden in enumerate(trials(drawn, machine, power_of(detector.study))):
         out = folder / f"trial_{i}"
         if hidden[0] in IN_MACHINE:
             made = _in_machine(drawn, folder, out, hidden, 20 + i)
@@ -185,11 +186,11 @@ def _judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
     return rows
 
 
-def set_up(drawn: DrawnMachine, folder: Path) -> tuple[Machine, list[list[Path]], Detector, float]:
+def set_up(drawn: DrawnMachine, folder: Path) -> tuple[Machine, list[list[Path]], Detector]:
     """Write the description and the loads of a drawn machine (folder/m), and real machines (real_0, ...) with runs in
     which nothing is hidden.
 
-    Returns the description, these runs, what all trials are diagnosed with, and the mean power of all sources [W].
+    Returns the description, these runs, and what all trials are diagnosed with.
     """
     drawn.write(folder / "m")
     machine, healthy = drawn.machine(folder / "m"), []
@@ -198,7 +199,8 @@ def set_up(drawn: DrawnMachine, folder: Path) -> tuple[Machine, list[list[Path]]
         real.mkdir()
         (real / "machine.toml").write_text(other(drawn.text, 1000 * drawn.seed + k, folder / "m"), encoding="utf-8")
         healthy.append(simulated(real, logs_of(folder), folder / f"null_{k}", drawn, 10 + k))
-    return machine, healthy, *detector_of(drawn, machine, [read_run(p) for p in healthy[0]])
+    detector = detector_of(machine, [read_run(p) for p in healthy[0]], drawn.noise)
+    return machine, healthy, detector
 
 
 def logs_of(folder: Path) -> list[Path]:
@@ -206,11 +208,15 @@ def logs_of(folder: Path) -> list[Path]:
     return [folder / "m" / "runs" / name for name in RUNS]
 
 
-def detector_of(drawn: DrawnMachine, machine: Machine, runs: Sequence[Run]) -> tuple[Detector, float]:
-    """What all trials of a machine are diagnosed with, and the mean power of all its sources [W]."""
-    settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
-    detector, _ = prepare(machine, runs[:2], runs[2:], settings)
-    return detector, float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
+def detector_of(machine: Machine, runs: Sequence[Run], noise: tuple[float, float]) -> Detector:
+    """What all trials of a machine are diagnosed with: made from the plan of any measurements, with noise [K, m]."""
+    settings = Settings(temperature_sigma=noise[0], tcp_sigma=noise[1], nulls=100, form=32)
+    return prepare(machine, runs[:2], runs[2:], settings)[0]
+
+
+def power_of(study: Study) -> float:
+    """W: of all sources in the mean of the first run."""
+    return float(study.runs[0].run.drive.power.sum(axis=1).mean())
 
 
 def same_place(machine: Machine, place: str) -> list[str]:

@@ -18,13 +18,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.drawn_machines import IN_MACHINE, SHARE, moved, places, said, told
+from benchmarks.drawn_machines import IN_LOG, IN_MACHINE, SHARE, detector_of, moved, places, power_of, said, told
 from benchmarks.rows import VISIBLE, Row, of_seeds
 from benchmarks.shipped_truth import Reduced, reduced
 from twin.build.remesh import remesh
 from twin.build.simulate import simulate_run
 from twin.diagnose.model.study import Study
-from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.search.detector import Detector
 from twin.inject.hide import hide
 from twin.inject.machines.drawn import RUNS
@@ -55,8 +54,6 @@ FACTORS = {"loss_law": 1.6, "joint": 0.3, "film_gain": 2.0, "expansion": 1.15}
 PARAMETERS = {"loss_law": "gain", "joint": "conductance", "film_gain": "gain", "expansion": "expansion"}
 TIMES = 2.0  # of what is just visible: hidden heat
 TRIED = 6  # parts of which one is to move the TCP
-MISREAD = "1.4142135623730951"  # of an rms logged as a peak
-SYNTHETIC = 32, 100  # measurements of the detector: for discrepancy, for thresholds
 NULLS = 2  # draws of noise with nothing hidden
 
 
@@ -111,21 +108,13 @@ def noisy(runs: Sequence[Run], seed: int, logged: Sequence[Run]) -> list[Run]:
     return made
 
 
-def detector_of(shipped: Shipped) -> Detector:
-    """That of the description on the loads of the machine."""
-    real = shipped.reduced(0)  # any measurements: a detector is made from their plan
-    runs = noisy(real.measured(shipped.loads, {}, {}, TCP_EVERY), 0, shipped.loads)
-    settings = Settings(temperature_sigma=NOISE[0], tcp_sigma=NOISE[1], nulls=SYNTHETIC[1], form=SYNTHETIC[0])
-    return prepare(shipped.machine, runs[:2], runs[2:], settings)[0]
-
-
 def trials(shipped: Shipped, study: Study, seed: int) -> Iterator[tuple[str, str, str]]:
     """(family or kind, place, size) of what is hidden, at a place where it is visible; of an expansion TRIED places."""
     rng = np.random.default_rng([seed, 77])
     known = {p.path: p for p in study.probed.parameters}
     flat = np.zeros(len(known))
     nominal = [study.outputs(k, flat) for k in range(len(study.runs))]
-    power = float(study.runs[0].run.drive.power.sum(axis=1).mean())
+    power = power_of(study)
     for family, names in places(shipped.machine).items():
         order = [names[i] for i in rng.permutation(len(names))]
         if family == "heat_source":
@@ -144,8 +133,7 @@ def trials(shipped: Shipped, study: Study, seed: int) -> Iterator[tuple[str, str
                     yield family, place, f"{FACTORS[family]:g}"
                     break
         elif order:
-            size = {"offset": "1 K", "drift": "2 K", "swapped": order[-1], "factor": MISREAD}[family]
-            yield family, order[0], size
+            yield family, order[0], order[-1] if family == "swapped" else IN_LOG[family]
 
 
 def _visible(study: Study, nominal: Sequence[np.ndarray], p: Parameter, factor: float) -> float:
@@ -246,7 +234,8 @@ def certify(name: str) -> None:
 @cache
 def _ready(name: str) -> tuple[Shipped, Detector]:
     shipped = Shipped(name)
-    return shipped, detector_of(shipped)
+    runs = noisy(shipped.reduced(0).measured(shipped.loads, {}, {}, TCP_EVERY), 0, shipped.loads)
+    return shipped, detector_of(shipped.machine, runs, NOISE)
 
 
 def judged(name: str, seed: int) -> list[Row]:
