@@ -53,7 +53,7 @@ def channels_told(d: Diagnosis) -> str:
     empty where no channel's share is known."""
     rows = []
     for k, (name, share) in enumerate(d.support.shares[:CHANNELS] if d.support else ()):
-        before, after = ([np.zeros(0)], [np.zeros(0)])
+        before, after = [np.zeros(0)], [np.zeros(0)]
         for s in (s for s in d.series if not s.sealed):
             of_tcp = name in COMPONENTS and name not in s.sensors
             if of_tcp or name in s.sensors:

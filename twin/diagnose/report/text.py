@@ -230,8 +230,8 @@ def _ambiguous_words(d: Diagnosis) -> str:
 
 def remedies(d: Diagnosis) -> list[str]:
     """What to measure so that rivals come apart, each once."""
-    found = [r.remedy for c in d.causes for r in c.rivals if r.remedy] + [r.remedy for r in d.ranked if r.remedy]
-    return list(dict.fromkeys(found))
+    others = [*(r for c in d.causes for r in c.rivals), *d.ranked]
+    return list(dict.fromkeys(r.remedy for r in others if r.remedy))
 
 
 def chance(nulls: np.ndarray | None, threshold: float) -> str:
