@@ -163,17 +163,21 @@ def diagnose(
     Raises LogError and TwinError for runs and descriptions that cannot be used.
     """
     names = run_names([*runs, *sealed])
+    fitted = names[: len(runs)]
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     logged = {n for run in runs if run.temperatures is not None for n in run.temperatures.columns}
     judgement = judge(runs, logged - set(settings.exclude), artefact.model.all_sensors)
-    usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
-    detector, plans = prepare(machine, usable, sealed, settings, progress)
+
+    def sound(judgement: Judgement) -> tuple[list[Run], list[Cause], Detector, list[Measured]]:
+        usable, faults = channels_at_fault(runs, judgement, sensors, fitted)
+        return usable, faults, *prepare(machine, usable, sealed, settings, progress)
+
+    usable, faults, detector, plans = sound(judgement)
     told, judgement = judgement, upheld(detector, plans, runs, judgement)
     if len(judgement.findings) < len(told.findings):
-        usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
-        detector, plans = prepare(machine, usable, sealed, settings, progress)
+        usable, faults, detector, plans = sound(judgement)
     asked = named(settings.plan, detector) if settings.plan else []
     study, y = detector.study, measured_of(detector.study)
     found, dispersion = searched(detector, y)
@@ -241,7 +245,7 @@ def diagnose(
         provenance={
             "twin": __version__,
             "machine_hash": machine_hash(machine),
-            "runs": names[: len(runs)],
+            "runs": fitted,
             "sealed": names[len(runs) :],
             "nulls": settings.nulls,
             "window_states": study.probed.base.n,
@@ -252,7 +256,7 @@ def diagnose(
         scene=_scene(machine, study.probed, beside or causes, heat),
         plan=planned,
         traces=traces,
-        channels=tuple(channel_rows(traces, judgement, names[: len(runs)])),
+        channels=tuple(channel_rows(traces, judgement, fitted)),
     )
     return Result(diagnosis, found, extension, settings.families, described)
 
