@@ -209,7 +209,7 @@ def _hidden(run: Run, family: str, place: str, size: str, folder: Path, kind: st
     return read_run(folder / run.folder.name)
 
 
-def _columns(run: Run) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def _columns(run: Run) -> tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray]]:
     """Temperatures [degC] and TCP components [m] by name."""
     assert run.temperatures is not None
     assert run.tcp is not None

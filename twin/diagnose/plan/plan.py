@@ -131,11 +131,11 @@ def _foresight(
 ) -> Foresight:
     """stated: its limit today. What is read and not in proportion to its size has another one than by its derivative,
     which counts for what experiments bring."""
-    threshold = detector.thresholds[s.family]
-    told = fault_of(s.batches(detector)[0][1]).curve.told
+    batches = s.batches(detector)
+    told = fault_of(batches[0][1]).curve.told
     today = np.inf
     best = np.full(len(made), np.inf)
-    for k, batch, p in s.batches(detector):
+    for k, batch, p in batches:
         chosen = s.histories(batch)
         information = now.ready[k].information[p, chosen]
         today = min(today, _limit(detector, batch, p, information, chosen))
@@ -152,10 +152,10 @@ def _foresight(
     ]
     proposals.sort(key=lambda one: -one.gain)
     again = next(p.limit for p in proposals if p.experiment == AGAIN)
-    largest = [told(batch.largest[p]) for _, batch, p in s.batches(detector) if batch.largest]
+    largest = [told(batch.largest[p]) for _, batch, p in batches if batch.largest]
     return Foresight(
-        s.family, s.place, s.unit, told(float(today)), again, max(largest, default=None), threshold, s.windowed,
-        tuple(_listed(proposals)),
+        s.family, s.place, s.unit, told(float(today)), again, max(largest, default=None),
+        detector.thresholds[s.family], s.windowed, tuple(_listed(proposals)),
     )  # fmt: skip
 
 
