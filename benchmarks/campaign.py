@@ -10,11 +10,11 @@ from dataclasses import asdict, dataclass
 from functools import cache, lru_cache
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.five_axis import EXPERIMENT, machine
+from benchmarks.rows import Row, read
 from twin.atomic import atomic_path
 from twin.build.spread import spread
 from twin.calibrate.fit.measured import Measured, measured
@@ -48,11 +48,8 @@ KNOWN = known_of(EXPERIMENT, CATALOGUE, [f.name for f in FAMILIES if f.group in 
 @cache
 def made_detector() -> Detector:
     """The nominal machine's, on the loads of the three runs, as `twin diagnose` makes it."""
-    from twin.rom.artefact import Artefact
-
     trial = draw(EXPERIMENT, "null", 1.0, 0)
-    nothing: Any = Artefact
-    return prepare(nothing, machine(), trial.runs[:2], trial.runs[2:], SETTINGS)[2]
+    return prepare(machine(), trial.runs[:2], trial.runs[2:], SETTINGS)[0]
 
 
 @cache
@@ -69,7 +66,7 @@ def limit(hidden: Hidden) -> float | None:
     return next((size for size in at if size is not None), None)
 
 
-def judged(detector: Detector, trial: Trial) -> dict[str, Any]:
+def judged(detector: Detector, trial: Trial) -> Row:
     """One trial: what was hidden, what was said, and what it was worth on the sealed run (of a null nothing)."""
     began = time.perf_counter()
     own, plans, y, faults = other_measurements(detector, trial.runs)
@@ -144,7 +141,7 @@ def _variance(detector: Detector, flat: np.ndarray, temperature: np.ndarray, tcp
     return float(np.nanmean(np.concatenate(parts) ** 2))
 
 
-def _several(deadline: float, trials: Sequence[Item]) -> list[dict[str, Any]]:
+def _several(deadline: float, trials: Sequence[Item]) -> list[Row]:
     """A row per trial. deadline: as `time.time` counts; what comes later is left for the next time."""
     rows = []
     for family, factor, seed in trials:
@@ -158,28 +155,32 @@ def _several(deadline: float, trials: Sequence[Item]) -> list[dict[str, Any]]:
     return rows
 
 
-def _kept(rows: Sequence[dict[str, Any]]) -> None:
+def _kept(rows: Sequence[Row]) -> None:
     OUT.mkdir(parents=True, exist_ok=True)
     with (OUT / f"trials-{os.getpid()}.jsonl").open("a", encoding="utf-8") as f:
         f.writelines(json.dumps(row) + "\n" for row in rows)
 
 
-def results(first: int = FIRST) -> list[dict[str, Any]]:
+def _item(row: Row) -> Item:
+    return row["family"], row["factor"], row["seed"]
+
+
+def results(first: int = FIRST) -> list[Row]:
     """The trials from this seed on that were made; of one that is in several files, the last file's by name."""
-    lines = [line for path in sorted(OUT.glob("trials-*.jsonl")) for line in path.read_text("utf-8").splitlines()]
-    found = {(r["family"], r["factor"], r["seed"]): r for r in map(json.loads, lines)}
+    rows = [row for path in sorted(OUT.glob("trials-*.jsonl")) for row in read(path)]
+    found = {_item(r): r for r in rows}
     return [found[item] for item in items(EXPERIMENT, CATALOGUE, first) if item in found]
 
 
 def main(minutes: float = float("inf"), first: int = FIRST) -> None:
     detector = made_detector()
-    done = {(r["family"], r["factor"], r["seed"]) for r in results(first)}
-    todo = [i for i in items(EXPERIMENT, CATALOGUE, first) if i not in done]
+    made = set(map(_item, results(first)))
+    todo = [i for i in items(EXPERIMENT, CATALOGUE, first) if i not in made]
     deadline = time.time() + 60.0 * minutes
     pieces = [list(sizes) for _, sizes in groupby(todo, key=lambda item: (item[0], item[2]))]
     with bar("campaign", len(pieces)) as advance:
 
-        def done(piece: list[Item], rows: list[dict[str, Any]]) -> None:
+        def done(piece: list[Item], rows: list[Row]) -> None:
             _kept(rows)
             advance(f"{piece[0][0]} of seed {piece[0][2]}")
 

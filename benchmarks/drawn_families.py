@@ -8,28 +8,26 @@ acts on one reading. A row per trial goes to out/drawn/families_SEED.jsonl, and 
 from __future__ import annotations
 
 import sys
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from benchmarks.drawn_machines import (
-    RUNS,
+    OUT,
     SHARE,
-    TRUTHS,
-    VISIBLE,
-    Row,
-    detector_of,
     drawn_of,
-    healthy_runs,
-    kept,
+    hidden_in_logs,
+    logs_of,
     moved,
+    power_of,
     said,
+    set_up,
     simulated,
 )
+from benchmarks.rows import Row, counted, of_seeds, visible, worth
 from twin.cli.main import run as command
 from twin.diagnose.faults.sun import SOLAR
 from twin.inject.machines.drawn import DrawnMachine
@@ -91,17 +89,15 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Hidden]
     return found
 
 
-def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Hidden, seed: int) -> list[Path]:
-    """Runs with an effect; none where it cannot be hidden there. A joint that is lost in the first run stays lost."""
-    logs = [folder / "m" / "runs" / name for name in RUNS]
+def measured(
+    drawn: DrawnMachine, folder: Path, healthy: Sequence[Path], out: Path, hidden: Hidden, seed: int
+) -> list[Path]:
+    """Runs with an effect, of a reading in the healthy ones; none where it cannot be hidden there. A joint that is lost
+    in the first run stays lost."""
+    given = logs = logs_of(folder)
     told = [hidden.family, hidden.place, hidden.size]
     if hidden.in_log:
-        runs = [folder / "null_1" / name for name in RUNS]
-        made = [out / run.name for run in runs]
-        for run, target in zip(runs, made, strict=True):
-            if command(["hide", *told, str(run), "-o", str(target), *hidden.options]):
-                return []
-        return made
+        return hidden_in_logs(told, healthy, out, hidden.options)
     timed = "--from" in hidden.options
     switched = [word for log in logs for word in ("--run", str(log))] if timed else []
     real = out / "real"
@@ -114,8 +110,7 @@ def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Hidden, seed:
     lost = out / "lost"
     if command(["hide", *told, str(folder / "real_0"), "-o", str(lost)]):
         return []
-    after = [folder / "m" / "runs" / name for name in RUNS[1:]]
-    return [*simulated(real, logs[:1], out, drawn, seed), *simulated(lost, after, out, drawn, seed + 1000)]
+    return [*simulated(real, logs[:1], out, drawn, seed), *simulated(lost, given[1:], out, drawn, seed + 1000)]
 
 
 def answer(row: Row) -> str:
@@ -125,42 +120,37 @@ def answer(row: Row) -> str:
     if row["verdict"] in ("nothing", "too_poor", "unknown"):
         return "missed" if row["verdict"] == "nothing" else row["verdict"]
     named = [(c[0], c[1]) for c in row["causes"]]
-    if named and named[0] == (family, place):
-        return "right"
-    told = [*named, *map(tuple, row["rivals"])]
-    return "among" if (family, place) in told else "place" if named and named[0][1] == place else "wrong"
+    found = worth(named, [(r[0], r[1]) for r in row["rivals"]], {(family, place)})
+    return "place" if found == "wrong" and named and named[0][1] == place else found
 
 
-def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
+def kind_of(row: Row) -> str:
+    """Family, and what of its options makes it another effect."""
+    option = next((o for o in row["hidden"][3:] if o in ("--from", "--signal", "lag", "detached")), "")
+    return f"{row['hidden'][0]} {option.strip('-')}"
+
+
+def judged(seed: int) -> list[Row]:
     """A row per effect of one machine."""
-    drawn.write(folder / "m")
-    machine = drawn.machine(folder / "m")
-    logs = [folder / "m" / "runs" / name for name in RUNS]
-    healthy = [[read_run(p) for p in healthy_runs(drawn, folder, logs, k)[1]] for k in range(TRUTHS)]
-    detector, power = detector_of(drawn, machine, healthy[0])
+    with TemporaryDirectory() as folder:
+        return _judged(drawn_of("lumped", seed), Path(folder))
+
+
+def _judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
+    machine, healthy, detector = set_up(drawn, folder)
+    sound = [[read_run(p) for p in runs] for runs in healthy]
     rows = []
-    for i, hidden in enumerate(effects(drawn, machine, power)):
-        if made := measured(drawn, folder, folder / f"effect_{i}", hidden, 40 + i):
+    for i, hidden in enumerate(effects(drawn, machine, power_of(detector.study))):
+        if made := measured(drawn, folder, healthy[1], folder / f"effect_{i}", hidden, 40 + i):
             own = [read_run(p) for p in made]
             row = said(detector, (hidden.family, hidden.place, hidden.size, *hidden.options), own)
-            rows.append(row | {"moved": moved(own, healthy[1 if hidden.in_log else 0])})
+            rows.append(row | {"moved": moved(own, sound[1 if hidden.in_log else 0])})
     return rows
 
 
 def main(first: int, count: int) -> None:
-    seeds = range(first, first + count)
-    rows = [row for seed in seeds for row in kept("families", seed, partial(judged, drawn_of("lumped", seed)))]
-    answers: dict[str, Counter[str]] = {}
-    for row in rows:
-        named = [c[:4] for c in row["causes"]]
-        seen = row["hidden"][0] in OF_TCP or any(m >= least for m, least in zip(row["moved"], VISIBLE, strict=True))
-        print(row["seed"], *row["hidden"], answer(row), row["verdict"], named, "" if seen else "(not visible)")
-        if seen:
-            kind = next((o for o in row["hidden"][3:] if o in ("--from", "--signal", "lag", "detached")), "")
-            answers.setdefault(f"{row['hidden'][0]} {kind.strip('-')}", Counter())[answer(row)] += 1
-    print("of those that are visible")
-    for what, counted in answers.items():
-        print(f"   {what:<22} {', '.join(f'{n} {told}' for told, n in counted.most_common())}")
+    rows = of_seeds(OUT, "families", range(first, first + count), judged)
+    counted(rows, answer, kind_of, lambda row: visible(row) or row["hidden"][0] in OF_TCP)
 
 
 if __name__ == "__main__":

@@ -11,20 +11,18 @@ trials and of those that are visible: faults in the machine that move any sensor
 
 from __future__ import annotations
 
-import json
 import sys
-import tempfile
 import time
-from collections import Counter
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from benchmarks.rows import Row, counted, of_seeds, worth
 from twin.cli.main import run as command
 from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.model.study import Study
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.report.recalibration import large
 from twin.diagnose.report.text import alike
@@ -50,11 +48,6 @@ TRUTHS = 2  # real machines with nothing hidden, per description
 IN_MACHINE = {"heat_source": "", "loss_law": "1.6", "joint": "0.3", "film_gain": "2", "expansion": "1.3"}
 IN_LOG = {"offset": "1 K", "drift": "2 K", "swapped": "", "factor": "1.4142135623730951"}
 SHARE = 0.25  # of the mean power of all sources: hidden heat
-# K, m: what a fault in the machine must do to be asked for, in means of an hour, or of three TCP rows
-VISIBLE = 0.5, 3e-6
-
-
-Row = dict[str, Any]
 
 
 def trials(drawn: DrawnMachine, machine: Machine, power: float) -> list[tuple[str, str, str]]:
@@ -110,12 +103,8 @@ def answer(row: Row) -> str:
     family = {"factor": "signal"}.get(kind, "sensor" if kind in IN_LOG else kind)
     sought = {_pair(f"{place}<>{size.removeprefix('sensors.')}")} if kind == "swapped" else {place}
     named = [(c[0], _pair(c[1]) if "<>" in c[1] else c[1]) for c in row["causes"]]
-    right = {(family, p) for p in sought | set(row.get("same", ()))}
-    if named and named[0] in right:
-        return "right"
     told = row["rivals"] if row["verdict"] == "ambiguous" else row.get("alike", [])  # of the headline
-    rivals = [tuple(r) for r in told]
-    return "among" if right & {*named, *rivals} else "wrong"
+    return worth(named, [(r[0], r[1]) for r in told], {(family, p) for p in sought | set(row.get("same", ()))})
 
 
 def headlined(row: Row) -> bool:
@@ -142,37 +131,17 @@ def simulated(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachin
     return made
 
 
+def told(rows: Sequence[Row]) -> None:
+    """Print the answers and their counts, those in the headline for themselves."""
+
+    def said(row: Row) -> str:
+        return "missed by the verdict, in the headline" if headlined(row) else answer(row)
+
+    counted(rows, said, lambda row: str(row["hidden"][0]))
+
+
 def main(first: int, count: int, kind: str = "") -> None:
-    seeds = range(first, first + count)
-    counted([row for seed in seeds for row in kept(kind or "any", seed, partial(judged, drawn_of(kind, seed)))])
-
-
-def kept(name: str, seed: int, ask: Callable[[Path], list[Row]]) -> list[Row]:
-    """The rows of a machine in out/drawn/NAME_SEED.jsonl; made in a temporary folder where there are none."""
-    OUT.mkdir(parents=True, exist_ok=True)
-    path = OUT / f"{name}_{seed}.jsonl"
-    if not path.exists():
-        with tempfile.TemporaryDirectory() as folder:
-            made = ask(Path(folder))
-        path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
-    return [json.loads(line) | {"seed": seed} for line in path.read_text(encoding="utf-8").splitlines()]
-
-
-def counted(rows: Sequence[Row]) -> None:
-    """Print the answers one by one, and how many there are of each."""
-    answers: dict[tuple[str, bool], Counter[str]] = {}
-    for row in rows:
-        visible = any(m >= least for m, least in zip(row.get("moved", VISIBLE), VISIBLE, strict=True))
-        for only in (False, True) if visible else (False,):
-            told = "missed by the verdict, in the headline" if headlined(row) else answer(row)
-            answers.setdefault((row["hidden"][0], only), Counter())[told] += 1
-        told = f"dispersion {row['dispersion']:.2f}, best {row['best']:.0f}, " if "dispersion" in row else ""
-        print(row["seed"], row["hidden"], answer(row), row["verdict"], row["causes"], f"{told}{row['seconds']:.0f} s")
-    for only in (False, True):
-        print("of those that are visible" if only else "of all")
-        for (hidden, seen), of_kind in answers.items():
-            if seen == only:
-                print(f"   {hidden:<12} {', '.join(f'{n} {told}' for told, n in of_kind.most_common())}")
+    told(of_seeds(OUT, kind or "any", range(first, first + count), lambda seed: judged(kind, seed)))
 
 
 def drawn_of(kind: str, seed: int) -> DrawnMachine:
@@ -188,42 +157,66 @@ def drawn_of(kind: str, seed: int) -> DrawnMachine:
     return DrawnMachine(seed, "lumped", text, runs, hours, sampling, noise, len(machine.sensors), len(machine.nodes))
 
 
-Measured = tuple[tuple[str, str, str], list[Path]]  # what was hidden, and the measured runs
-
-
-def judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
+def judged(kind: str, seed: int) -> list[Row]:
     """A row per trial of one machine."""
-    drawn.write(folder / "m")
-    machine = drawn.machine(folder / "m")
-    logs = [folder / "m" / "runs" / name for name in RUNS]
-    measured_runs: list[Measured] = [healthy_runs(drawn, folder, logs, k) for k in range(TRUTHS)]
-    detector, power = detector_of(drawn, machine, [read_run(p) for p in measured_runs[0][1]])
-    for i, hidden in enumerate(trials(drawn, machine, power)):
+    with TemporaryDirectory() as folder:
+        return _judged(drawn_of(kind, seed), Path(folder))
+
+
+def _judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
+    machine, healthy, detector = set_up(drawn, folder)
+    measured_runs = [(("nothing", "", ""), runs) for runs in healthy]
+    for i, hidden in enumerate(trials(drawn, machine, power_of(detector.study))):
         out = folder / f"trial_{i}"
         if hidden[0] in IN_MACHINE:
-            made = _in_machine(drawn, folder / "real_0", logs, out, hidden, 20 + i)
+            made = _in_machine(drawn, folder, out, hidden, 20 + i)
         elif hidden[0] == "factor":
-            made = _misread(drawn, folder / "real_1", logs, out, hidden, 20 + i)
+            made = _misread(drawn, folder, out, hidden, 20 + i)
         else:
-            made = _in_log(measured_runs[1][1], out, hidden)
+            made = hidden_in_logs(["sensor", *hidden[1:]], healthy[1], out, ("--history", hidden[0]))
         if made:
             measured_runs.append((hidden, made))
-    healthy = [[read_run(p) for p in made] for _, made in measured_runs[:TRUTHS]]
+    sound = [[read_run(p) for p in runs] for runs in healthy]
     rows = []
     for hidden, paths in measured_runs:
         own = [read_run(p) for p in paths]
-        beside = healthy[0] if hidden[0] in IN_MACHINE else healthy[1] if hidden[0] == "factor" else None
+        beside = sound[0] if hidden[0] in IN_MACHINE else sound[1] if hidden[0] == "factor" else None
         by = (np.inf, np.inf) if beside is None else moved(own, beside)
         rows.append(said(detector, hidden, own) | {"moved": by, "same": same_place(machine, hidden[1])})
     return rows
 
 
-def detector_of(drawn: DrawnMachine, machine: Machine, runs: Sequence[Run]) -> tuple[Detector, float]:
-    """What all trials of a machine are diagnosed with, and the mean power of all its sources [W]."""
-    settings = Settings(temperature_sigma=drawn.noise[0], tcp_sigma=drawn.noise[1], nulls=100, form=32)
-    nothing: Any = None
-    detector = prepare(nothing, machine, runs[:2], runs[2:], settings)[2]
-    return detector, float(detector.study.runs[0].run.drive.power.sum(axis=1).mean())
+def set_up(drawn: DrawnMachine, folder: Path) -> tuple[Machine, list[list[Path]], Detector]:
+    """Write the description and the loads of a drawn machine (folder/m), and real machines (real_0, ...) with runs in
+    which nothing is hidden.
+
+    Returns the description, these runs, and what all trials are diagnosed with.
+    """
+    drawn.write(folder / "m")
+    machine, healthy = drawn.machine(folder / "m"), []
+    for k in range(TRUTHS):
+        real = folder / f"real_{k}"
+        real.mkdir()
+        (real / "machine.toml").write_text(other(drawn.text, 1000 * drawn.seed + k, folder / "m"), encoding="utf-8")
+        healthy.append(simulated(real, logs_of(folder), folder / f"null_{k}", drawn, 10 + k))
+    detector = detector_of(machine, [read_run(p) for p in healthy[0]], drawn.noise)
+    return machine, healthy, detector
+
+
+def logs_of(folder: Path) -> list[Path]:
+    """The runs of a drawn machine, loads alone."""
+    return [folder / "m" / "runs" / name for name in RUNS]
+
+
+def detector_of(machine: Machine, runs: Sequence[Run], noise: tuple[float, float]) -> Detector:
+    """What all trials of a machine are diagnosed with: made from the plan of any measurements, with noise [K, m]."""
+    settings = Settings(temperature_sigma=noise[0], tcp_sigma=noise[1], nulls=100, form=32)
+    return prepare(machine, runs[:2], runs[2:], settings)[0]
+
+
+def power_of(study: Study) -> float:
+    """W: of all sources in the mean of the first run."""
+    return float(study.runs[0].run.drive.power.sum(axis=1).mean())
 
 
 def same_place(machine: Machine, place: str) -> list[str]:
@@ -259,45 +252,29 @@ def _largest(values: np.ndarray, rows: int) -> float:
     return float(np.abs(values[:n].reshape(-1, rows).mean(axis=1)).max(initial=0.0))
 
 
-def healthy_runs(drawn: DrawnMachine, folder: Path, logs: Sequence[Path], k: int) -> Measured:
-    """A real machine with nothing hidden, and its runs."""
-    real = folder / f"real_{k}"
-    real.mkdir()
-    (real / "machine.toml").write_text(other(drawn.text, 1000 * drawn.seed + k, folder / "m"), encoding="utf-8")
-    return ("nothing", "", ""), simulated(real, logs, folder / f"null_{k}", drawn, 10 + k)
-
-
-def _in_machine(
-    drawn: DrawnMachine, real: Path, logs: Sequence[Path], out: Path, hidden: tuple[str, str, str], seed: int
-) -> list[Path]:
+def _in_machine(drawn: DrawnMachine, folder: Path, out: Path, hidden: tuple[str, str, str], seed: int) -> list[Path]:
     """Runs of a real machine with a fault; none where it cannot be hidden there."""
-    if command(["hide", *hidden, str(real), "-o", str(out / "real")]):
+    if command(["hide", *hidden, str(folder / "real_0"), "-o", str(out / "real")]):
         return []
-    return simulated(out / "real", logs, out, drawn, seed)
+    return simulated(out / "real", logs_of(folder), out, drawn, seed)
 
 
-def _misread(
-    drawn: DrawnMachine, real: Path, logs: Sequence[Path], out: Path, hidden: tuple[str, str, str], seed: int
-) -> list[Path]:
+def _misread(drawn: DrawnMachine, folder: Path, out: Path, hidden: tuple[str, str, str], seed: int) -> list[Path]:
     """Runs of a real machine whose logs say a factor too much: as `said` reads the given logs, it saw less."""
-    saw = [out / "saw" / log.name for log in logs]
-    for log, where in zip(logs, saw, strict=True):
-        if command(["hide", "signal", hidden[1], f"{1.0 / float(hidden[2]):.12g}", str(log), "-o", str(where)]):
-            return []
-    return simulated(real, saw, out, drawn, seed)
+    saw = hidden_in_logs(["signal", hidden[1], f"{1.0 / float(hidden[2]):.12g}"], logs_of(folder), out / "saw")
+    return simulated(folder / "real_1", saw, out, drawn, seed)
 
 
-def _in_log(healthy: Sequence[Path], out: Path, hidden: tuple[str, str, str]) -> list[Path]:
-    """Healthy runs with a fault in their logs; none where it cannot be hidden there."""
-    kind, place, size = hidden
-    made = [out / run.name for run in healthy]
-    for run, where in zip(healthy, made, strict=True):
-        if command(["hide", "sensor", place, size, str(run), "-o", str(where), "--history", kind]):
+def hidden_in_logs(told: Sequence[str], runs: Sequence[Path], out: Path, options: Sequence[str] = ()) -> list[Path]:
+    """Runs with a fault in their logs, told as `twin hide` takes it; none where it cannot be hidden there."""
+    made = [out / run.name for run in runs]
+    for run, where in zip(runs, made, strict=True):
+        if command(["hide", *told, str(run), "-o", str(where), *options]):
             return []
     return made
 
 
-def said(detector: Any, hidden: tuple[str, ...], runs: list[Any]) -> Row:
+def said(detector: Detector, hidden: tuple[str, ...], runs: Sequence[Run]) -> Row:
     began = time.perf_counter()
     own, plans, y, faults = other_measurements(detector, runs)
     found, left = searched(own, y)

@@ -91,11 +91,8 @@ def of_full(case: Case, values: dict[str, float]) -> tuple[np.ndarray, np.ndarra
     logged = evaluate(bare, run.loads.time, signal_values(run, bare.signals), STEP)
     own = case.loads(case.run, rescaled(logged, bare, wanted))
     drive = with_acting(own, there.load_model, case.acting(case.run, own))
-    structure = full.structure
-    made = simulate(
-        replace(full, thermal=there, structure=structure), drive, known.tcp_time[case.run], known.positions[case.run],
-        START, SUBSTEPS,
-    )  # fmt: skip
+    faulty = replace(full, thermal=there)
+    made = simulate(faulty, drive, known.tcp_time[case.run], known.positions[case.run], START, SUBSTEPS)
     return made.temperatures[:, : len(there.sensors)], made.tcp
 
 

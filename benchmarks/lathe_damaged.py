@@ -13,21 +13,21 @@ not made again.
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import twin
 from benchmarks.lathe_channels import ALWAYS, KINDS, RIGHT, Trial
+from benchmarks.lathe_diagnosis import DAYS, pairs_of, the_twin
 from benchmarks.lathe_diagnosis import OUT as TWIN
-from benchmarks.lathe_diagnosis import pairs_of, the_twin
+from benchmarks.rows import Row, kept
 from models.measured import VARIABLE, measured_data
 from twin.diagnose.pipeline import Settings, diagnose, machine_of
 from twin.diagnose.result.diagnosis import Cause
@@ -44,7 +44,6 @@ DAMAGES = {name: draw for name, draw in KINDS.items() if name != ALWAYS}
 SAID = {"noise": ("noise",), "rail": ("rail",), "leap": ("leap", "a leap"), "offset": ("an offset",),
         "drift": ("a drift",), "stuck": ("stuck",), "swapped": ("names",)}  # fmt: skip
 
-Row = dict[str, Any]
 FIGURES = ("sensor", "channel", "kind", "size", "alone", "unmoved")
 MOVED = 1.0  # posterior standard deviations
 
@@ -57,27 +56,25 @@ def main() -> None:
     given = [int(a) for a in sys.argv if a.isdigit()]
     pairs = given[1] if len(given) > 1 else PAIRS
     path = the_twin(data)
-    OUT.mkdir(parents=True, exist_ok=True)
     for half in given[:1] or [0, 1]:
         rows = [row for k, days in enumerate(pairs_of(half, pairs)) for row in _rows(path, half, k, days)]
-        print(f"   days {('1, 3, 5 ...', '2, 4, 6 ...')[half]}: {len(rows)} trials")
+        print(f"   days {DAYS[half]}: {len(rows)} trials")
         told(rows)
 
 
 def _rows(path: Path, half: int, pair: int, days: Sequence[str]) -> list[Row]:
     """The six trials of a pair of days; those that were made are read."""
     runs = [read_run(TWIN / "runs" / day) for day in days]
-    clean: dict[str, tuple[float, float]] = {}
-    rows = []
-    for number, (name, draw) in enumerate(DAMAGES.items()):
-        file = OUT / f"{half}_{pair}_{number}.json"
-        if not file.exists():
-            clean = clean or fitted(runs)
-            trial = _drawn(np.random.default_rng([half, pair, number]), runs, draw)
-            row = {"kind": name, **_made(path, trial, days, clean)}
-            file.write_text(json.dumps(row) + "\n", encoding="utf-8")
-        rows.append(json.loads(file.read_text(encoding="utf-8")))
-    return rows
+    clean = cache(lambda: fitted(runs))
+
+    def made(number: int, name: str) -> list[Row]:
+        trial = _drawn(np.random.default_rng([half, pair, number]), runs, DAMAGES[name])
+        return [{"kind": name, **_made(path, trial, days, clean())}]
+
+    return [
+        row for number, name in enumerate(DAMAGES)
+        for row in kept(OUT / f"{half}_{pair}_{number}.json", partial(made, number, name))
+    ]  # fmt: skip
 
 
 def _drawn(

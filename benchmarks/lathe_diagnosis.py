@@ -15,17 +15,17 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from benchmarks.rows import Row, counts, kept, worth
 from models.measured import VARIABLE, measured_data
 from models.recordings import lathe_days
 from models.scripts import load_script
@@ -61,8 +61,7 @@ FORM, NULLS = 32, 60  # synthetic measurements: what the twin leaves decides any
 # of linear size, writable, and not the same as another: a warm zone at one node is heat
 FAMILIES = {"heat_source": "W"}
 TWICE = 2.0
-
-Row = dict[str, Any]
+DAYS = "1, 3, 5 ...", "2, 4, 6 ..."  # of the halves
 
 
 def main() -> None:
@@ -77,12 +76,9 @@ def main() -> None:
     for half in halves:
         rows: list[Row] = []
         for k, chosen in enumerate(pairs_of(half, pairs)):
-            path = OUT / f"{half}_{k}.jsonl"
-            if not path.exists():
-                made = rows_of(artefact, chosen, faults, np.random.default_rng([half, k]))
-                path.write_text("".join(json.dumps(row) + "\n" for row in made), encoding="utf-8")
-            rows += [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-        print(f"   days {('1, 3, 5 ...', '2, 4, 6 ...')[half]}")
+            make = partial(rows_of, artefact, chosen, faults, np.random.default_rng([half, k]))
+            rows += kept(OUT / f"{half}_{k}.jsonl", make)
+        print(f"   days {DAYS[half]}")
         told(rows)
 
 
@@ -114,7 +110,8 @@ def rows_of(path: Path, days: Sequence[str], faults: int, rng: np.random.Generat
     machine = machine_of(artefact, path)
     runs = [read_run(OUT / "runs" / day) for day in days]
     usable, set_aside = checked(runs, artefact.model.sensors)
-    _, study, detector, plans = prepare(artefact, machine, usable, (), Settings(form=FORM, nulls=NULLS))
+    detector, plans = prepare(machine, usable, (), Settings(form=FORM, nulls=NULLS))
+    study = detector.study
     made, limited = _row(detector, plans, set_aside, days, None)
     rows = [made]
     plain = [simulate_run(machine, run)[0] for run in runs]
@@ -199,19 +196,14 @@ def _row(
 
 
 def answer(row: Row) -> str:
-    """What a row is worth: as `benchmarks.drawn_machines`, "part" where the family or the place alone is right."""
+    """What a row is worth: its verdict where nothing is named, else as `benchmarks.rows.worth`."""
     if row["hidden"] is None:
         return "nothing" if row["verdict"] in ("nothing", "too_poor") else "false alarm"
     if row["verdict"] in ("nothing", "too_poor", "unknown") or not row["causes"]:  # then channels alone are named
         return row["verdict"].replace("_", " ")
     family, place = row["hidden"][:2]
-    named = [tuple(c[:2]) for c in row["causes"]]
-    if named[:1] == [(family, place)]:
-        return "right"
-    others = {*named, *((tuple(r) for r in row["rivals"]) if row["verdict"] == "ambiguous" else ())}
-    if (family, place) in others:
-        return "among"
-    return "wrong"
+    rivals = row["rivals"] if row["verdict"] == "ambiguous" else []
+    return worth([(c[0], c[1]) for c in row["causes"]], [(r[0], r[1]) for r in rivals], {(family, place)})
 
 
 def told(rows: Sequence[Row]) -> None:
@@ -223,8 +215,7 @@ def told(rows: Sequence[Row]) -> None:
             hidden = "" if clean else " {} {} {:.3g} {}".format(*r["hidden"])
             told = f"dispersion {r['dispersion']:.1f}, " if "dispersion" in r else ""
             print(f"      {' '.join(r['days'])}{hidden}: {a}, {r['verdict']} {r['causes']} {told}{r['seconds']} s")
-        counts = ", ".join(f"{answers.count(a)} {a}" for a in dict.fromkeys(answers))
-        print(f"   {'as measured' if clean else 'a fault at twice its limit'}: {len(own)} diagnoses: {counts}")
+        print(f"   {'as measured' if clean else 'a fault at twice its limit'}: {len(own)} diagnoses: {counts(answers)}")
 
 
 if __name__ == "__main__":

@@ -10,17 +10,15 @@ scheduler (twin.build.spread).
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from benchmarks import drawn_machines, shipped_machines
-from benchmarks.drawn_machines import VISIBLE, Row, answer, headlined
-from twin.atomic import atomic_path
+from benchmarks.drawn_machines import answer, headlined
+from benchmarks.rows import Row, read, visible, written
 from twin.build.spread import spread
 from twin.inject.judge.figures import Share
 from twin.progress import bar
@@ -37,10 +35,8 @@ def rows_of(deadline: float, piece: Piece) -> list[Row]:
     if time.time() > deadline:
         return []
     kind, seed = piece
-    if kind in shipped_machines.TOGETHER:
-        return shipped_machines.judged(kind, seed)
-    with TemporaryDirectory() as folder:
-        return drawn_machines.judged(drawn_machines.drawn_of(kind, seed), Path(folder))
+    judged = shipped_machines.judged if kind in shipped_machines.TOGETHER else drawn_machines.judged
+    return judged(kind, seed)
 
 
 def pieces(first: int, kinds: Sequence[str]) -> list[Piece]:
@@ -55,13 +51,7 @@ def results(known: Iterable[Piece]) -> Iterator[tuple[str, Row]]:
     """Kind and row of every trial that was made."""
     for piece in known:
         if path_of(piece).exists():
-            for line in path_of(piece).read_text(encoding="utf-8").splitlines():
-                yield piece[0], json.loads(line)
-
-
-def seen(row: Row) -> bool:
-    """Whether what is hidden moves a sensor or the TCP by VISIBLE; faults of sensors always do."""
-    return any(m >= least for m, least in zip(row["moved"], VISIBLE, strict=True))
+            yield from ((piece[0], row) for row in read(path_of(piece)))
 
 
 def table(rows: Sequence[tuple[str, Row]]) -> str:
@@ -74,7 +64,7 @@ def table(rows: Sequence[tuple[str, Row]]) -> str:
     for kind in [*dict.fromkeys(k for k, _ in rows), ""]:
         own = [row for k, row in rows if kind in (k, "")]
         nulls = [answer(r) for r in own if r["hidden"][0] == "nothing"]
-        told = [answer(r) for r in own if r["hidden"][0] != "nothing" and seen(r)]
+        told = [answer(r) for r in own if r["hidden"][0] != "nothing" and visible(r)]
         alarms = Share(nulls.count("false alarm"), len(nulls))
         found = Share(len(told) - told.count("missed"), len(told))
         right = Share(told.count("right"), found.k)
@@ -87,7 +77,7 @@ def table(rows: Sequence[tuple[str, Row]]) -> str:
         7 * "|---" + "|",
     ]
     for family in dict.fromkeys(r["hidden"][0] for _, r in rows if r["hidden"][0] != "nothing"):
-        own = [r for _, r in rows if r["hidden"][0] == family and seen(r)]
+        own = [r for _, r in rows if r["hidden"][0] == family and visible(r)]
         said = Counter(map(answer, own)) + Counter({"headline": sum(map(headlined, own))})
         shown = (str(said[name]) for name in ("right", "among", "unknown", "wrong", "missed", "headline"))
         lines.append(f"| {family} | {' | '.join(shown)} |")
@@ -97,13 +87,11 @@ def table(rows: Sequence[tuple[str, Row]]) -> str:
 def main(minutes: float = float("inf"), first: int = FIRST, kinds: Sequence[str] = tuple(COUNTS)) -> None:
     every = pieces(first, kinds)
     todo = [p for p in every if not path_of(p).exists()]
-    OUT.mkdir(parents=True, exist_ok=True)
     with bar("machines", len(todo)) as advance:
 
         def done(piece: Piece, rows: list[Row]) -> None:
             if rows:
-                with atomic_path(path_of(piece)) as temporary:
-                    temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+                written(path_of(piece), rows)
             advance(f"{piece[0]} of seed {piece[1]}")
 
         spread(rows_of, time.time() + 60.0 * minutes, todo, done)

@@ -54,7 +54,7 @@ def moved(name: str) -> Iterator[tuple[float, SearchPolicy]]:
 def detector() -> Detector:
     """Of the described machine on the loads of the trials."""
     runs = trial_of(EXPERIMENT, table(EXPERIMENT)["null_0"], TRUTHS).runs
-    return prepare(None, load_machine(FOLDER), runs[:2], runs[2:], SETTINGS)[2]  # type: ignore[arg-type]
+    return prepare(load_machine(FOLDER), runs[:2], runs[2:], SETTINGS)[0]
 
 
 def said(trial: str, policies: list[SearchPolicy]) -> list[Said]:

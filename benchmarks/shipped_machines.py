@@ -9,23 +9,21 @@ again. `NAME certify` compares that model with the full one.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
-from benchmarks.drawn_machines import IN_MACHINE, SHARE, VISIBLE, Row, counted, moved, places, said
+from benchmarks.drawn_machines import IN_LOG, IN_MACHINE, SHARE, detector_of, moved, places, power_of, said, told
+from benchmarks.rows import VISIBLE, Row, of_seeds
 from benchmarks.shipped_truth import Reduced, reduced
 from twin.build.remesh import remesh
 from twin.build.simulate import simulate_run
 from twin.diagnose.model.study import Study
-from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.search.detector import Detector
 from twin.inject.hide import hide
 from twin.inject.machines.drawn import RUNS
@@ -56,8 +54,6 @@ FACTORS = {"loss_law": 1.6, "joint": 0.3, "film_gain": 2.0, "expansion": 1.15}
 PARAMETERS = {"loss_law": "gain", "joint": "conductance", "film_gain": "gain", "expansion": "expansion"}
 TIMES = 2.0  # of what is just visible: hidden heat
 TRIED = 6  # parts of which one is to move the TCP
-MISREAD = "1.4142135623730951"  # of an rms logged as a peak
-SYNTHETIC = 32, 100  # measurements of the detector: for discrepancy, for thresholds
 NULLS = 2  # draws of noise with nothing hidden
 
 
@@ -112,22 +108,13 @@ def noisy(runs: Sequence[Run], seed: int, logged: Sequence[Run]) -> list[Run]:
     return made
 
 
-def detector_of(shipped: Shipped) -> Detector:
-    """That of the description on the loads of the machine."""
-    nothing: Any = None  # an artefact: only its notes are made from it
-    real = shipped.reduced(0)  # any measurements: a detector is made from their plan
-    runs = noisy(real.measured(shipped.loads, {}, {}, TCP_EVERY), 0, shipped.loads)
-    settings = Settings(temperature_sigma=NOISE[0], tcp_sigma=NOISE[1], nulls=SYNTHETIC[1], form=SYNTHETIC[0])
-    return prepare(nothing, shipped.machine, runs[:2], runs[2:], settings)[2]
-
-
 def trials(shipped: Shipped, study: Study, seed: int) -> Iterator[tuple[str, str, str]]:
     """(family or kind, place, size) of what is hidden, at a place where it is visible; of an expansion TRIED places."""
     rng = np.random.default_rng([seed, 77])
     known = {p.path: p for p in study.probed.parameters}
     flat = np.zeros(len(known))
     nominal = [study.outputs(k, flat) for k in range(len(study.runs))]
-    power = float(study.runs[0].run.drive.power.sum(axis=1).mean())
+    power = power_of(study)
     for family, names in places(shipped.machine).items():
         order = [names[i] for i in rng.permutation(len(names))]
         if family == "heat_source":
@@ -146,8 +133,7 @@ def trials(shipped: Shipped, study: Study, seed: int) -> Iterator[tuple[str, str
                     yield family, place, f"{FACTORS[family]:g}"
                     break
         elif order:
-            size = {"offset": "1 K", "drift": "2 K", "swapped": order[-1], "factor": MISREAD}[family]
-            yield family, order[0], size
+            yield family, order[0], order[-1] if family == "swapped" else IN_LOG[family]
 
 
 def _visible(study: Study, nominal: Sequence[np.ndarray], p: Parameter, factor: float) -> float:
@@ -223,7 +209,7 @@ def _hidden(run: Run, family: str, place: str, size: str, folder: Path, kind: st
     return read_run(folder / run.folder.name)
 
 
-def _columns(run: Run) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def _columns(run: Run) -> tuple[Mapping[str, np.ndarray], Mapping[str, np.ndarray]]:
     """Temperatures [degC] and TCP components [m] by name."""
     assert run.temperatures is not None
     assert run.tcp is not None
@@ -248,7 +234,8 @@ def certify(name: str) -> None:
 @cache
 def _ready(name: str) -> tuple[Shipped, Detector]:
     shipped = Shipped(name)
-    return shipped, detector_of(shipped)
+    runs = noisy(shipped.reduced(0).measured(shipped.loads, {}, {}, TCP_EVERY), 0, shipped.loads)
+    return shipped, detector_of(shipped.machine, runs, NOISE)
 
 
 def judged(name: str, seed: int) -> list[Row]:
@@ -263,14 +250,7 @@ def judged(name: str, seed: int) -> list[Row]:
 
 
 def main(name: str, first: int, count: int) -> None:
-    OUT.mkdir(parents=True, exist_ok=True)
-    rows: list[Row] = []
-    for seed in range(first, first + count):
-        path = OUT / f"{name}_{seed}.jsonl"
-        if not path.exists():
-            path.write_text("".join(json.dumps(row) + "\n" for row in judged(name, seed)), encoding="utf-8")
-        rows += [json.loads(line) | {"seed": seed} for line in path.read_text("utf-8").splitlines()]
-    counted(rows)
+    told(of_seeds(OUT, name, range(first, first + count), partial(judged, name)))
 
 
 if __name__ == "__main__":

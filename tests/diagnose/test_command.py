@@ -146,7 +146,7 @@ def test_meshes_that_changed_since_the_build(tmp_path):
 def test_a_stuck_sensor_that_is_left_out_is_not_looked_at(exclude, monkeypatch):
     seen = []
 
-    def prepare(artefact, machine, runs, *more):
+    def prepare(machine, runs, *more):
         seen.append(runs[0].temperatures.columns["front"])
         raise InterruptedError
 

@@ -81,7 +81,7 @@ def test_what_switches_is_seen_in_the_hours_that_the_new_run_has_of_it():
 def test_an_hour_of_the_new_run_is_one_in_however_many_runs_something_acts():
     first, other = ("heat", "bed", 0), ("heat", "bed", 60)
     basis = Basis((4, 5, 6, 7), (first, other, first, None))
-    spread = basis.spread(np.array([[1.0, 0.0, 2.0, 3.0], [0.0, 5.0, 1.0, 0.0]]))
+    spread = basis.spread(np.arange(4, 8), np.array([[1.0, 0.0, 2.0, 3.0], [0.0, 5.0, 1.0, 0.0]]))
     assert spread[:, :4].tolist() == [[1.0, 0.0, 2.0, 3.0], [0.0, 5.0, 1.0, 0.0]]
     assert spread[0, 4:].tolist() == [0.0, 0.0, 2.0, 0.0]  # the stronger one; what goes on has no hour
     assert spread[1, 4:].tolist() == [0.0, 5.0, 0.0, 0.0]  # that hour is the first amplitude's

@@ -44,7 +44,7 @@ def test_a_detector_belongs_to_the_coordinates_it_was_made_in(keys, monkeypatch)
         if other is not None:
             monkeypatch.setattr(diagnose, "make_probed_model", lambda *given: turned(make(*given)))
         with pytest.raises(InterruptedError):
-            diagnose.prepare(None, small_case.machine(), runs[:2], runs[2:], diagnose.Settings())
+            diagnose.prepare(small_case.machine(), runs[:2], runs[2:], diagnose.Settings())
     first, again, apart = keys
     assert first == again != apart
 

@@ -46,14 +46,14 @@ def made_detector(settings: Settings = SETTINGS) -> Detector:
     folder().mkdir(parents=True, exist_ok=True)
     with (folder() / "detector.lock").open("w") as lock:  # one process makes it, the others wait
         fcntl.flock(lock, fcntl.LOCK_EX)
-        return prepare(None, machine, runs[:2], runs[2:], settings)[2]
+        return prepare(machine, runs[:2], runs[2:], settings)[0]
 
 
 def said(settings: Settings, name: str) -> Said:
     """The diagnosis of a trial."""
     runs = trial(name).runs
     if name in OWN:
-        detector = prepare(None, load_machine(MODEL), runs[:2], runs[2:], settings)[2]
+        detector = prepare(load_machine(MODEL), runs[:2], runs[2:], settings)[0]
     else:
         detector = made_detector(settings)
     study = detector.study

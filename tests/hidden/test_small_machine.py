@@ -52,7 +52,7 @@ def healthy(folder: Path) -> list[Path]:
 @pytest.fixture(scope="module")
 def detector(folder: Path, healthy: list[Path]) -> Detector:
     runs = [read_run(path) for path in healthy]
-    return prepare(None, load_machine(folder / "described"), runs, (), SETTINGS)[2]
+    return prepare(load_machine(folder / "described"), runs, (), SETTINGS)[0]
 
 
 def said(detector: Detector, runs: list[Path]) -> tuple[Verdict, tuple[Cause, ...]]:

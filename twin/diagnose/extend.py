@@ -76,11 +76,10 @@ def _remove(target: Path, files: Sequence[str]) -> None:
 
 
 def write_extension(
-    result: Result, artefact: Artefact, machine: Machine, runs: Sequence[Run], target: Path, build: bool = True,
-    progress: Progress = silent,
-) -> tuple[Diagnosis, list[str]]:  # fmt: skip
-    """Write the report into `target`, and machine.toml, the loads of added switches and extended.h5 where there is a
-    cause to add. What a former diagnosis left there goes.
+    result: Result, artefact: Artefact, machine: Machine, runs: Sequence[Run], target: Path
+) -> tuple[Diagnosis, list[str]]:
+    """Write the report into `target`, and machine.toml and the loads of added switches where there is a cause to add.
+    `build_extension` adds extended.h5, which is listed already. What a former diagnosis left there goes.
 
     Returns the diagnosis with the parameters that its causes have there, and what was done, in words. A cause that the
     description cannot say is told, not raised.
@@ -102,8 +101,6 @@ def write_extension(
         for name in files:
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(new / name, target / name)
-    if build and files:
-        said.append(build_extension(target, progress))
     return diagnosis, said
 
 

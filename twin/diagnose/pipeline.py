@@ -25,7 +25,7 @@ from twin.diagnose.faults.coarse_model import too_coarse
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import FAMILIES
 from twin.diagnose.model.probed_model import ProbedModel, drive_arrays, make_probed_model
-from twin.diagnose.model.study import Study, make_study
+from twin.diagnose.model.study import make_study
 from twin.diagnose.model.surrogate import Surrogate
 from twin.diagnose.plan.plan import make_plan
 from twin.diagnose.plan.suspicion import known_family, named, pairs_of, suspicions_in, worst_of_machine
@@ -102,10 +102,10 @@ def machine_of(artefact: Artefact, path: Path, machine: Path | None = None) -> M
 
 
 def prepare(
-    artefact: Artefact, machine: Machine, runs: Sequence[Run], sealed: Sequence[Run], settings: Settings,
-    progress: Progress = silent,
-) -> tuple[ProbedModel, Study, Detector, list[Measured]]:  # fmt: skip
-    """Probed model, study and detector, the expensive parts from the cache; sealed runs enter by their loads only.
+    machine: Machine, runs: Sequence[Run], sealed: Sequence[Run], settings: Settings, progress: Progress = silent
+) -> tuple[Detector, list[Measured]]:
+    """The detector, from the cache where it is there, and the plan of every run; sealed runs enter it by their loads
+    only.
 
     Raises LogError for runs that hold nothing to compare, or too little.
     """
@@ -146,7 +146,7 @@ def prepare(
         "detector", make_detector.__module__, inputs,
         lambda: stored(make_detector(study, families, instruments, policy, form, counts, progress, differ)),
     )  # fmt: skip
-    return study.probed, study, detector.of(study, policy), plans
+    return detector.of(study, policy), plans
 
 
 def _closed(m: Measured) -> Measured:
@@ -163,17 +163,21 @@ def diagnose(
     Raises LogError and TwinError for runs and descriptions that cannot be used.
     """
     names = run_names([*runs, *sealed])
+    fitted = names[: len(runs)]
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     logged = {n for run in runs if run.temperatures is not None for n in run.temperatures.columns}
     judgement = judge(runs, logged - set(settings.exclude), artefact.model.all_sensors)
-    usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
-    _, _, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
+
+    def sound(judgement: Judgement) -> tuple[list[Run], list[Cause], Detector, list[Measured]]:
+        usable, faults = channels_at_fault(runs, judgement, sensors, fitted)
+        return usable, faults, *prepare(machine, usable, sealed, settings, progress)
+
+    usable, faults, detector, plans = sound(judgement)
     told, judgement = judgement, upheld(detector, plans, runs, judgement)
     if len(judgement.findings) < len(told.findings):
-        usable, faults = channels_at_fault(runs, judgement, sensors, names[: len(runs)])
-        _, _, detector, plans = prepare(artefact, machine, usable, sealed, settings, progress)
+        usable, faults, detector, plans = sound(judgement)
     asked = named(settings.plan, detector) if settings.plan else []
     study, y = detector.study, measured_of(detector.study)
     found, dispersion = searched(detector, y)
@@ -241,7 +245,7 @@ def diagnose(
         provenance={
             "twin": __version__,
             "machine_hash": machine_hash(machine),
-            "runs": names[: len(runs)],
+            "runs": fitted,
             "sealed": names[len(runs) :],
             "nulls": settings.nulls,
             "window_states": study.probed.base.n,
@@ -252,7 +256,7 @@ def diagnose(
         scene=_scene(machine, study.probed, beside or causes, heat),
         plan=planned,
         traces=traces,
-        channels=tuple(channel_rows(traces, judgement, names[: len(runs)])),
+        channels=tuple(channel_rows(traces, judgement, fitted)),
     )
     return Result(diagnosis, found, extension, settings.families, described)
 

@@ -126,7 +126,7 @@ class Diagnosis:
 
         target = Path(folder)
         _refuse(target, self.model, self.machine, self.runs)
-        findings, said = write_extension(self.result, self.model.artefact, self.machine, self.runs, target, build=False)
+        findings, said = write_extension(self.result, self.model.artefact, self.machine, self.runs, target)
         report = Report(target, findings, tuple(said))
         if report.files and build:
             build_extension(target, reporter(progress))

@@ -3,7 +3,7 @@
 The window model of today's runs does not know the loads of an experiment, so one is made for all of them; sensors that
 are not there yet read the mean temperature of their surface or node. Then, as in the detector, but for its modes of
 model discrepancy: these are learned from what simulations leave, and to simulate and calibrate hundreds of them for
-each experiment would take hours. `plan_limits` assumes that they weaken the next run as they weaken today's.
+each experiment would take hours. `plan` assumes that they weaken the next run as they weaken today's.
 
 Of white columns M = [D N] (causes, nuisances) M^T M is a sum over rows, hence over runs and sensors: each sensor that
 one might add costs a product of its own rows, and F = D^T Pi D = M_DD - M_DN (1 + M_NN)^-1 M_ND.
@@ -70,16 +70,17 @@ def foreseen(
     runs: as the detector's study was fitted to; asked: keys of the detector's columns (u,) whose information is wanted;
     noise [K] of a reading, where no sensor of today tells that of a mean.
     """
-    today = detector.study
+    today, form = detector.study, form_of(machine)
     n = len(runs)
     described = [p for p in today.probed.parameters if p.kind not in OF_LAWS]
-    probed = make_probed_model(machine, described, [*runs, *(e.run for e in experiments)], progress)
+    every = [*runs, *(e.run for e in experiments)]
+    probed = make_probed_model(machine, described, every, progress)
     probed = _with_sensors(probed, list(dict.fromkeys(p for e in experiments for p in e.places)))
     plans = [
         measured(probed.base, run, own.drive, own.name, exclude=_left_out(today, run))
-        for run, own in zip([*runs, *(e.run for e in experiments)], probed.runs, strict=True)
+        for run, own in zip(every, probed.runs, strict=True)
     ]
-    study = with_film_laws(make_study(probed, plans, range(len(plans))), form_of(machine))
+    study = with_film_laws(make_study(probed, plans, range(len(plans))), form)
     known = [_at_nominal(study, k) for k in range(n)]
     channels = [_channels(detector, study.runs[k], k, noise) for k in range(n)]
     of_new = longest_of(runs)
@@ -89,7 +90,7 @@ def foreseen(
             both = replace(study, runs=(*study.runs[:n], own), fitted=tuple(range(n + 1)))
             each = [*known, _at_nominal(study, n + e)]
             whiten = Whitener(both, (*channels, _channels(detector, own, of_new, noise)))
-            yield from _compared(both, whiten, each, experiment, asked, detector.elements.histories, form_of(machine))
+            yield from _compared(both, whiten, each, experiment, asked, detector.elements.histories, form)
             advance(experiment.name)
 
 
@@ -180,13 +181,17 @@ def _columns(
         _, exponent, was = today.unit[history]
         _, _, now = elements.histories.unit[history]
         factor = (now / was) ** exponent
-    new = None
-    if history.startswith("block "):
+    new, start = None, begins(elements.histories, history)
+    if start is not None:
         blocks = elements.histories.blocks
-        start = blocks[int(history.removeprefix("block "))][1]
         same = next((b for b, (i, first, _) in enumerate(blocks) if i == blocks[-1][0] and first == start), None)
         new = None if same is None else elements.index[kind, name, f"block {same}"]
     return elements.index[key], new, False, factor
+
+
+def begins(histories: Histories, history: str) -> int | None:
+    """The first step, in its run, of a history that is a block; None of others."""
+    return histories.blocks[int(history.removeprefix("block "))][1] if history.startswith("block ") else None
 
 
 def _narrowed(elements: Elements, chosen: Sequence[int]) -> Elements:

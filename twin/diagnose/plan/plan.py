@@ -20,7 +20,7 @@ from twin.diagnose.faults.elements import Key
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.plan.actuators import actuators_of
 from twin.diagnose.plan.experiments import AGAIN, experiments_of, longest_of
-from twin.diagnose.plan.foreseen import AT, Foreseen, foreseen
+from twin.diagnose.plan.foreseen import AT, Foreseen, begins, foreseen
 from twin.diagnose.plan.suspicion import Suspicion, known_suspicions
 from twin.diagnose.result.plan import Apart, Foresight, Plan, Proposal, Separation
 from twin.diagnose.result.spot import Spot
@@ -51,25 +51,28 @@ class Basis:
     columns: tuple[int, ...]
     hours: tuple[tuple[str, str, int] | None, ...]  # kind, place and first step in its run of what acts in a block
 
-    def spread(self, rows: np.ndarray) -> np.ndarray:
-        """(q, 2 u) of weights (q, u): what acts in today's runs, then in the new one.
+    def spread(self, own: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """(q, 2 u) of weights (q, L) of columns own (L,): what acts in today's runs, then in the new one.
 
         An hour of the new run is one, in however many runs of today something acts then: of equal hours the strongest
         counts, and belongs to the first amplitude that has one.
         """
-        q, u = rows.shape
-        result = np.hstack([rows, np.zeros((q, u))])
+        q, u = len(weights), len(self.columns)
+        place = {c: i for i, c in enumerate(self.columns)}
+        result = np.zeros((q, 2 * u))
+        for c in np.flatnonzero(np.any(weights, axis=0)):
+            result[:, place[int(own[c])]] += weights[:, c]
         taken: dict[tuple[str, str, int], tuple[int, int]] = {}
-        for row in range(q):
-            for c in np.flatnonzero(rows[row]):
+        for row, today in enumerate(result[:, :u]):
+            for c in np.flatnonzero(today):
                 hour = self.hours[c]
                 if hour is None:
                     continue
                 first, other = taken.get(hour, (row, -1))
-                if first == row and (other < 0 or abs(rows[row, c]) > abs(rows[row, other])):
+                if first == row and (other < 0 or abs(today[c]) > abs(today[other])):
                     if other >= 0:
                         result[row, u + other] = 0.0
-                    result[row, u + c] = rows[row, c]
+                    result[row, u + c] = today[c]
                     taken[hour] = (row, int(c))
         return result
 
@@ -91,7 +94,7 @@ def make_plan(
     experiments = experiments_of(load, runs[longest], sensors, actuators, places)
     columns = _needed(detector, suspicions, pairs)
     key_of = {c: key for key, c in detector.index.items()}
-    keys: tuple[Key, ...] = tuple(key_of[c] for c in columns)
+    keys = [key_of[c] for c in columns]
     made = list(foreseen(detector, machine, runs, experiments, keys, noise, progress))
     f, _, projector = detector.fitter.linear(np.zeros(len(study.probed.parameters)))
     now = sight(detector.columns, projector, np.zeros(len(f)))
@@ -110,9 +113,10 @@ def _needed(
         for _, batch, p in s.batches(detector):
             used = np.any([np.any(batch.histories[h].weights, axis=0) for h in s.histories(batch)], axis=0)
             found |= set(batch.columns[p][used].tolist())
-    for h in (h for pair in pairs for h in pair):
-        own, weights = h.combination()
-        found |= set(np.asarray(own)[np.any(weights, axis=0)].tolist())
+    for pair in pairs:
+        for h in pair:
+            own, weights = h.combination()
+            found |= set(own[np.any(weights, axis=0)].tolist())
     return sorted(found)
 
 
@@ -127,16 +131,15 @@ def _foresight(
 ) -> Foresight:
     """stated: its limit today. What is read and not in proportion to its size has another one than by its derivative,
     which counts for what experiments bring."""
-    threshold = detector.thresholds[s.family]
-    told = fault_of(s.batches(detector)[0][1]).curve.told
+    batches = s.batches(detector)
+    told = fault_of(batches[0][1]).curve.told
     today = np.inf
     best = np.full(len(made), np.inf)
-    for k, batch, p in s.batches(detector):
+    for k, batch, p in batches:
         chosen = s.histories(batch)
         information = now.ready[k].information[p, chosen]
         today = min(today, _limit(detector, batch, p, information, chosen))
-        rows = [_among(basis.columns, batch.columns[p], batch.histories[h].weights) for h in chosen]
-        W = np.stack([basis.spread(of_history) for of_history in rows])  # (h, q, 2 u)
+        W = np.stack([basis.spread(batch.columns[p], batch.histories[h].weights) for h in chosen])  # (h, q, 2 u)
         for e, f in enumerate(made):
             without, then = (_information(F, W) for F in (f.before, f.after))
             share = np.clip(information / np.maximum(without, 1e-30), LEAST, 1.0)
@@ -149,10 +152,10 @@ def _foresight(
     ]
     proposals.sort(key=lambda one: -one.gain)
     again = next(p.limit for p in proposals if p.experiment == AGAIN)
-    largest = [told(batch.largest[p]) for _, batch, p in s.batches(detector) if batch.largest]
+    largest = [told(batch.largest[p]) for _, batch, p in batches if batch.largest]
     return Foresight(
-        s.family, s.place, s.unit, told(float(today)), again, max(largest, default=None), threshold, s.windowed,
-        tuple(_listed(proposals)),
+        s.family, s.place, s.unit, told(float(today)), again, max(largest, default=None),
+        detector.thresholds[s.family], s.windowed, tuple(_listed(proposals)),
     )  # fmt: skip
 
 
@@ -165,18 +168,8 @@ def _limit(detector: Detector, batch: Batch, place: int, information: np.ndarray
 
 def _hour(detector: Detector, key: Key) -> tuple[str, str, int] | None:
     kind, place, history = key
-    if not history.startswith("block "):
-        return None
-    return kind, place, detector.elements.histories.blocks[int(history.removeprefix("block "))][1]
-
-
-def _among(columns: Sequence[int], own: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(q, u) weights (q, L) of columns own (L,), among columns (u,) of the detector."""
-    place = {c: i for i, c in enumerate(columns)}
-    result = np.zeros((len(weights), len(columns)))
-    for c in np.flatnonzero(np.any(weights, axis=0)):
-        result[:, place[int(own[c])]] += weights[:, c]
-    return result
+    first = begins(detector.elements.histories, history)
+    return None if first is None else (kind, place, first)
 
 
 def _information(F: np.ndarray, W: np.ndarray) -> np.ndarray:
@@ -192,7 +185,7 @@ def _apart(a: Hypothesis, b: Hypothesis, basis: Basis, made: Sequence[Foreseen],
 
     def fitted(h: Hypothesis) -> np.ndarray:
         own, weights = h.combination()
-        return basis.spread(_among(basis.columns, own, (np.asarray(h.amplitude) @ weights)[None]))[0]
+        return basis.spread(own, (np.asarray(h.amplitude) @ weights)[None])[0]
 
     one, two = fitted(a), fitted(b)
 

@@ -90,8 +90,8 @@ def worst_of_machine(detector: Detector, families: Sequence[Family]) -> list[Sus
     return worst({s: v for s, v in known_suspicions(detector).items() if groups.get(s.family) == "machine"})
 
 
-def pairs_of(found: Search, most: int = 2) -> list[tuple[Hypothesis, Hypothesis]]:
-    """The first cause of an ambiguous verdict with its rivals that these data do not separate, the likeliest first."""
+def pairs_of(found: Search) -> list[tuple[Hypothesis, Hypothesis]]:
+    """The first cause of an ambiguous verdict with the two likeliest rivals that these data do not separate from it."""
     if not found.accepted:
         return []
     first = found.accepted[0]
@@ -100,7 +100,7 @@ def pairs_of(found: Search, most: int = 2) -> list[tuple[Hypothesis, Hypothesis]
         other for other, cosine in first.rivals
         if min(chosen.statistic, other.statistic) * (1.0 - cosine**2) <= found.detector.policy.apart
     ]  # fmt: skip
-    return [(chosen, other) for other in near[:most]]
+    return [(chosen, other) for other in near[:2]]
 
 
 def suspicions_in(hypotheses: Sequence[Hypothesis], detector: Detector) -> list[Suspicion]:

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 
+from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.report.pictures import DELIVERED, EXTENDED, RECALIBRATED, Picture, drawing, short
 from twin.diagnose.report.tables import table
 from twin.diagnose.report.text import place_words
@@ -21,7 +22,6 @@ from twin.pictures.surface import SurfaceMesh
 WIDTH = 620  # pixels of the machine: as wide as its column of the page
 CHANNELS = 9  # in the table; their dots bear its numbers
 LEAST, NUMBERED, MOST = 18.0, 110.0, 420.0  # points^2 of a marker: no share, room for a number, all of the evidence
-COMPONENTS = ("dx", "dy", "dz")
 
 
 def place_html(d: Diagnosis) -> str:
@@ -53,7 +53,7 @@ def channels_told(d: Diagnosis) -> str:
     empty where no channel's share is known."""
     rows = []
     for k, (name, share) in enumerate(d.support.shares[:CHANNELS] if d.support else ()):
-        before, after = ([np.zeros(0)], [np.zeros(0)])
+        before, after = [np.zeros(0)], [np.zeros(0)]
         for s in (s for s in d.series if not s.sealed):
             of_tcp = name in COMPONENTS and name not in s.sensors
             if of_tcp or name in s.sensors:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Diagnosis, Pull
 from twin.diagnose.result.numbers import number, quantity, rms, size_words
 
@@ -23,7 +24,7 @@ def moved_words(d: Diagnosis) -> str:
         changes = s.recalibrated - s.delivered, s.tcp_recalibrated - s.tcp_delivered
         T, w = (np.nan_to_num(rms(change)).tolist() for change in changes)
         of_sensors += [(v, f"sensors.{name}", s.run) for v, name in zip(T, s.sensors, strict=True)]
-        of_tcp += [(v, f"d{axis}", s.run) for v, axis in zip(w, "xyz", strict=True)]
+        of_tcp += [(v, name, s.run) for v, name in zip(w, COMPONENTS, strict=True)]
     said = []
     for moved, least, factor, unit in ((of_sensors, KELVIN, 1.0, "K"), (of_tcp, METRES, 1e6, "um")):
         size, channel, run = max(moved, key=lambda m: m[0])

@@ -19,10 +19,10 @@ RUNS = 6  # runs with a map of their own at most, beside the sealed ones
 NAMES = 7.5  # points
 
 
-def loudest(series: Series, rows: int = ROWS) -> list[int]:
-    """Columns of the sensors with the largest residuals as delivered, those without a value last."""
+def loudest(series: Series) -> list[int]:
+    """Columns of the ROWS sensors with the largest residuals as delivered, those without a value last."""
     size = np.nan_to_num(rms(series.delivered), nan=-1.0)
-    return np.argsort(-size, kind="stable")[:rows].tolist()
+    return np.argsort(-size, kind="stable")[:ROWS].tolist()
 
 
 def drawn_runs(d: Diagnosis) -> list[Series]:

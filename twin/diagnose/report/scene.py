@@ -23,11 +23,10 @@ def scene_of(machine: Machine, probed: ProbedModel, place: str, surface: str = "
     vertical = "xyz".index(machine.machine.vertical)
     if machine.lumped:
         known = [m for m in marked if m in (*machine.nodes, *machine.bars)]
-        sensors = {n: s.part for n, s in machine.sensors.items() if s.part is not None}
-        on = {n: part.partition(".")[0] for n, part in sensors.items()}
-        return Scene(_network(machine), vertical, tuple(known), dict(on), place)
+        on = {n: s.part.partition(".")[0] for n, s in machine.sensors.items() if s.part is not None}
+        return Scene(_network(machine), vertical, tuple(known), on, place)
     where = {n: tuple(map(float, s.position)) for n, s in machine.sensors.items() if s.part and s.position}
-    return Scene(_shell(machine), vertical, tuple(marked), dict(where), place)  # type: ignore[arg-type]
+    return Scene(_shell(machine), vertical, tuple(marked), where, place)  # type: ignore[arg-type]
 
 
 def _located(machine: Machine, probed: ProbedModel, place: str) -> list[str]:
@@ -70,18 +69,16 @@ def _known(machine: Machine, name: str) -> str:
 
 def _shell(machine: Machine) -> Shell:
     points, triangles, parts, surfaces, names = [], [], [], [], list[str]()
-    first = n = 0
-    for body in load_body_meshes(machine):
-        for part in body.parts:
-            for name in part.surfaces:
-                own = facet_nodes(part, part.facets(name))[:, :3] + first
-                triangles.append(own)
-                parts.append(np.full(len(own), n))
-                surfaces.append(np.full(len(own), len(names)))
-                names.append(f"{part.name}.{name}")
-            points.append(part.nodes)
-            first += part.n
-            n += 1
+    first = 0
+    for n, part in enumerate(part for body in load_body_meshes(machine) for part in body.parts):
+        for name in part.surfaces:
+            own = facet_nodes(part, part.facets(name))[:, :3] + first
+            triangles.append(own)
+            parts.append(np.full(len(own), n))
+            surfaces.append(np.full(len(own), len(names)))
+            names.append(f"{part.name}.{name}")
+        points.append(part.nodes)
+        first += part.n
     return Shell(np.vstack(points), np.vstack(triangles), np.concatenate(parts), np.concatenate(surfaces), tuple(names))
 
 

@@ -22,16 +22,12 @@ figure { margin: .6rem 0 1.2rem; break-inside: avoid; }
 figcaption { color: var(--muted); }
 img { max-width: 100%; height: auto; }
 .place { display: flex; flex-wrap: wrap; gap: 1rem 2rem; align-items: center; }
-.place figure { flex: 1 1 26rem; min-width: 0; margin: 0; } .place .wide { flex: 1 1 22rem; }
+.place figure { flex: 1 1 26rem; min-width: 0; margin: 0; }
 summary { cursor: pointer; color: var(--blue); margin: .4rem 0; }
 body > details > summary { border-bottom: 1px solid var(--grid); }
 summary h2 { display: inline-block; margin: .3rem 0; color: var(--ink); }
 summary span { display: block; color: var(--ink); margin: 0 0 .3rem 1rem; }
-.wide { flex: 1 1 22rem; }
-details > summary { cursor: pointer; color: var(--blue); margin: .4rem 0; }
-details.part > summary { margin: 1.2rem 0 0; border-bottom: 1px solid var(--grid); }
-details.part > summary h2 { display: inline-block; margin: .4rem 0; border: none; color: var(--ink); }
-.wide { overflow-x: auto; }
+.wide { flex: 1 1 22rem; overflow-x: auto; }
 table { border-collapse: collapse; margin: .6rem 0 1.2rem; font-size: .88rem; }
 th, td { text-align: left; padding: .25rem .7rem .25rem 0; border-bottom: 1px solid var(--grid); vertical-align: top;
   overflow-wrap: break-word; max-width: 24rem; }

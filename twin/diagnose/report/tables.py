@@ -54,13 +54,9 @@ def rivals_table(rivals: Sequence[Rival], d: Diagnosis) -> str:
     """Candidates or rivals, each beside what its family needs."""
     rows = []
     for k, r in enumerate(rivals):
-        when = history_words(r.history) or "always"
-        row = [str(k + 1), what(r.family), place_words(r.place), when]
-        row += [
-            size_words(r.amplitude, r.ci95, r.unit) or "-",
-            number(r.statistic),
-            number(d.thresholds.get(r.family, math.nan)),
-        ]
+        row = [str(k + 1), what(r.family), place_words(r.place), history_words(r.history) or "always"]
+        row += [size_words(r.amplitude, r.ci95, r.unit) or "-", number(r.statistic)]
+        row += [number(d.thresholds.get(r.family, math.nan))]
         rows.append([*row, f"{r.cosine:.2f}" if math.isfinite(r.cosine) else "-"])
     head = ["", "what", "where", "when", "size", "statistic", "needed", "cosine"]
     return table(head, rows, range(4, len(head)))

@@ -20,7 +20,12 @@ from twin.diagnose.result.spot import Spot
 
 LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
 MEASURED = (("K", "temperature"), ("m", "TCP direction"))  # units of channels, and what these are
-SEEN = ("stuck", "leap", "noise", "rail")  # histories of sensors at fault that are seen before anything is fitted
+_SEEN = {  # before anything is fitted, by the history of a sensor at fault
+    "stuck": "Its reading stood still for {hours} h",
+    "leap": "Its reading leapt by {size} K at {at} h, faster than heat can",
+    "noise": "Its reading is noise of {size} K from {at} h on",
+    "rail": "Its reading rests at {size} °C from {at} h on",
+}
 # What follows from a verdict, for who acts on it
 _FOLLOWS = {
     "named": "The extended model whose gain is shown below holds this.",
@@ -230,8 +235,8 @@ def _ambiguous_words(d: Diagnosis) -> str:
 
 def remedies(d: Diagnosis) -> list[str]:
     """What to measure so that rivals come apart, each once."""
-    found = [r.remedy for c in d.causes for r in c.rivals if r.remedy] + [r.remedy for r in d.ranked if r.remedy]
-    return list(dict.fromkeys(found))
+    others = [*(r for c in d.causes for r in c.rivals), *d.ranked]
+    return list(dict.fromkeys(r.remedy for r in others if r.remedy))
 
 
 def chance(nulls: np.ndarray | None, threshold: float) -> str:
@@ -257,16 +262,11 @@ def evidence_sentence(d: Diagnosis, family: str, statistic: float, threshold: fl
 
 def cause_evidence(d: Diagnosis, c: Cause) -> str:
     """What speaks for a cause; a rate of chance only where it was judged by what synthetic measurements gave."""
-    if c.history in SEEN:  # before anything was fitted
+    if c.history in _SEEN:
         longest = max((w.end - w.start for w in c.windows), default=math.nan)
         at = min((w.start for w in c.windows), default=math.nan)
-        what = {
-            "stuck": f"Its reading stood still for {number(longest / 3600.0)} h",
-            "leap": f"Its reading leapt by {number(c.amplitude)} K at {number(at / 3600.0)} h, faster than heat can",
-            "noise": f"Its reading is noise of {number(c.amplitude)} K from {number(at / 3600.0)} h on",
-            "rail": f"Its reading rests at {number(c.amplitude)} °C from {number(at / 3600.0)} h on",
-        }[c.history]
-        return f"{what}; no statistic is needed to see that."
+        figures = {"hours": number(longest / 3600.0), "size": number(c.amplitude), "at": number(at / 3600.0)}
+        return f"{_SEEN[c.history].format(**figures)}; no statistic is needed to see that."
     entry = family_of(c.family)
     if entry and entry.weighed:
         gain, strong = number(c.statistic / 2.0), number(c.threshold / 2.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,7 @@ class Scene:
     machine: Shell | Network
     vertical: int  # the axis that points up
     marked: tuple[str, ...]  # surfaces or nodes of the place
-    sensors: dict[str, str | Point]  # on nodes, or where they are [m]
+    sensors: Mapping[str, str | Point]  # on nodes, or where they are [m]
     place: str  # as a cause tells it
 
 
