@@ -16,6 +16,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+import jax
+
 from benchmarks import drawn_machines, shipped_machines
 from benchmarks.drawn_machines import answer, headlined
 from benchmarks.rows import Row, read, visible, written
@@ -36,7 +38,9 @@ def rows_of(deadline: float, piece: Piece) -> list[Row]:
         return []
     kind, seed = piece
     judged = shipped_machines.judged if kind in shipped_machines.TOGETHER else drawn_machines.judged
-    return judged(kind, seed)
+    rows = judged(kind, seed)
+    jax.clear_caches()  # of this machine: after a dozen the system refuses LLVM more mapped memory
+    return rows
 
 
 def pieces(first: int, kinds: Sequence[str]) -> list[Piece]:

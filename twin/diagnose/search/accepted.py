@@ -67,7 +67,7 @@ def jacobian(
 
     Causes that take a parameter's place are put there, for a film of nine times its size changes what every other
     parameter does. Conductances beyond their bounds, corrected signals and strong causes get derivatives made anew, as
-    no surrogate knows of them, unless this diagnosis has made some nearer than `anew`: the surrogate goes on from these.
+    no surrogate knows of them, unless this diagnosis has made some nearer than `anew`: it goes on from these.
     """
     study = detector.study
     low, high = bounds(study)
