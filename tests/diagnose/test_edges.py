@@ -10,9 +10,10 @@ import pytest
 from tests.diagnose import small_case
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.evidence.bells import Bell, by_blocks, name
-from twin.diagnose.faults.acted import units_of
+from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.edges import Edge, edges_of, longer, moved, with_pulses
+from twin.diagnose.search.edges import Edge, edges_of, longer, moved, shape_errors, with_pulses
+from twin.diagnose.search.policy import POLICY
 
 HOUR = 3600.0
 
@@ -122,3 +123,28 @@ def test_longer_windows_end_where_the_next_one_begins_or_the_run_ends():
     assert ends == [1.75 * HOUR - 600.0, end, 3 * HOUR]
     whole = heat(Window(first, HOUR, end))
     assert longer(study, elements, whole) is whole
+
+
+def test_another_exponent_of_a_loss_leaves_open_the_change_by_its_exponent():
+    study, elements = small_case.study(linear=True), small_case.elements(linear=True)
+    place, name = next((p, n) for kind, p, n in elements.index if kind == "source" and n.endswith("^2.00"))
+    column = elements.index["source", place, name]
+    x, a = np.zeros(len(study.probed.parameters)), np.array([20.0])
+
+    def source(exponent: float) -> Hypothesis:
+        signal, _, reference = elements.histories.unit[name]
+        when = History(name, np.ones((1, 1)), signal=signal, exponent=exponent, reference=reference)
+        batch = Batch("loss_law", "source", "W", (place,), np.array([[column]]), (when,))
+        return Hypothesis(batch, 0, when, 0.0, tuple(a), 1.0)
+
+    def outputs(units):
+        return study.outputs(0, x, slots_with(study, elements, units, 0), [*a, 1.0][: len(units)])
+
+    h = source(2.0)
+    own = units_of(study, h)
+    (more,) = shape_errors(study, h, own, a, POLICY)
+    left_open = outputs([*own, more]) - outputs(own)
+    by = 1e-3
+    steeper = (outputs(units_of(study, source(2.0 + by))) - outputs(own)) / by * POLICY.exponent
+    assert np.abs(left_open).max() > 1e-2
+    np.testing.assert_allclose(left_open, steeper, atol=2e-3 * np.abs(steeper).max())

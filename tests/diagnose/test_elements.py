@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.calibrate.fit.measured import measured
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.context import Context
 from twin.diagnose.faults.readings import readings_of
+from twin.diagnose.model.study import make_study
 
 pytestmark = pytest.mark.long
 
@@ -38,6 +41,18 @@ def test_every_reading_has_one_name(read):
     assert sorted(index.values()) == list(range(columns.shape[1]))
     assert np.isfinite(columns).all()
     assert not set(index) & set(small_case.elements().index)
+
+
+def test_runs_with_and_without_tcp_rows_have_readings_together():
+    probed, runs = small_case.probed(), [small_case.runs()[0], replace(small_case.runs()[1], tcp=None)]
+    plans = [measured(probed.base, run, b.drive, b.name) for run, b in zip(runs, probed.runs[:2], strict=True)]
+    study = make_study(replace(probed, runs=probed.runs[:2]), plans, range(2))
+    x = np.zeros(len(study.probed.parameters))
+    outputs = [study.outputs(k, x) for k in study.fitted]
+    J = [study.jacobian(k, x)[:, : len(x)] for k in study.fitted]
+    columns, index = readings_of(study, small_case.nominal()[:2], outputs, J)
+    assert np.isfinite(columns).all()
+    assert {"drift", "slip", "step"} <= {kind for kind, _, _ in index}
 
 
 def test_histories_are_of_order_one_and_the_same_signal_once():

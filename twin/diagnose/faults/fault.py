@@ -189,10 +189,8 @@ class Fault:
         return tuple(Unit(self, self.bare(h.name), lead, shapes(i)) for i, lead in enumerate(leads))
 
     def fill(self, slot: Slot) -> None:
-        """By default with a forcing that the bank knows, the history of its column times its vector."""
-        history = slot.column.histories[slot.k]
-        if history is not None:
-            slot.force(slot.vector, history)
+        """By default with a forcing that the bank knows: the vector of its column, in the unit's own history."""
+        slot.force(slot.vector, slot.shape)
 
     # what exact refits know beforehand
     def prior(self, q: int) -> tuple[np.ndarray, np.ndarray]:

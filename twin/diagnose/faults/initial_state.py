@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
-from twin.diagnose.faults.context import Singly
-from twin.diagnose.faults.fault import Family, Fault
+from dataclasses import dataclass
 
-FAULTS = (Fault("initial_state", "start", "K", "runs.", 0, 0.2, 30.0, several=True),)
+from twin.diagnose.faults.context import Singly
+from twin.diagnose.faults.fault import Family, Fault, Slot
+
+
+@dataclass(frozen=True)
+class Start(Fault):
+    """Heat of the first step of one run, whatever a history says."""
+
+    def fill(self, slot: Slot) -> None:
+        history = slot.column.histories[slot.k]
+        if history is not None:
+            slot.force(slot.vector, history)
+
+
+FAULTS = (Start("initial_state", "start", "K", "runs.", 0, 0.2, 30.0, several=True),)
 
 FAMILY = Family(
     15, "initial_state", "The run starts from another state than stated",

@@ -254,13 +254,9 @@ def _sets(time: np.ndarray) -> np.ndarray:
 
 def _within_set(time: np.ndarray) -> np.ndarray:
     """0 for the first row of a measurement, 1 for its last."""
-    result = np.zeros(len(time))
-    starts = _sets(time)
-    for a, b in zip(starts, [*starts[1:], np.inf], strict=True):
-        own = np.flatnonzero((time >= a) & (time < b))
-        if len(own) > 1:
-            result[own] = np.arange(len(own)) / (len(own) - 1)
-    return result
+    number = np.searchsorted(_sets(time), time, side="right") - 1
+    _, first, count = np.unique(number, return_index=True, return_counts=True)
+    return np.asarray((np.arange(len(time)) - first[number]) / np.maximum(count[number] - 1, 1))
 
 
 def _play(plan: Planned, states: np.ndarray, c: int, width: float = WIDTH) -> np.ndarray:

@@ -25,14 +25,6 @@ class Air(Fault):
 
 
 @dataclass(frozen=True)
-class Zone(Fault):
-    """The air at one film."""
-
-    def fill(self, slot: Slot) -> None:
-        slot.force(slot.vector, slot.shape)
-
-
-@dataclass(frozen=True)
 class Gradient(Fault):
     """Warmer air above."""
 
@@ -44,7 +36,7 @@ class Gradient(Fault):
 
 SWITCHED = (
     Air("zone", "air", "K", "environment.", least=0.3, own=0.1, largest=WARMEST, everywhere=True),
-    Zone("zone", "zone", "K", "films.", least=0.5, own=0.1, largest=WARMEST),
+    Fault("zone", "zone", "K", "films.", least=0.5, own=0.1, largest=WARMEST),
 )
 GRADIENT = Gradient(
     "zone", "gradient", "K/m", "environment.", least=0.3, own=0.1, largest=10.0, everywhere=True
