@@ -147,7 +147,7 @@ def drawn(detector: Detector, rng: np.random.Generator) -> tuple[Cause, Effect] 
             size, when = TWICE * float(limit) * (batch.sign or 1), batch.histories[i]
             if batch.family in FAMILIES and batch.unit == FAMILIES[batch.family] and batch.possible(p, size):
                 of_place = known.setdefault(batch.family, {}).setdefault((batch.places[p], bool(when.windows)), [])
-                of_place.append(Hypothesis(batch, p, when, 0.0, (size,), 0.0))
+                of_place.append(Hypothesis(batch, p, when, 0.0, (size,)))
     if not known:
         return None
     places = known[str(rng.choice(sorted(known)))]

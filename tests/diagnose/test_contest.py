@@ -34,7 +34,7 @@ def hypothesis(places: int = 1, windows: int = 0, q: int = 1) -> Hypothesis:
     )
     names = tuple(f"p{i}" for i in range(places))
     batch = Batch("heat_source", "heat", "W", names, np.zeros((places, 4), dtype=int), (when,))
-    return Hypothesis(batch, 0, when, 100.0, (1.0,) * q, 1.0)
+    return Hypothesis(batch, 0, when, 100.0, (1.0,) * q)
 
 
 def test_freedom_has_its_price():
@@ -128,7 +128,7 @@ def test_a_surface_lacks_no_more_film_than_it_has():
     batch = next(b for b in detector.columns.batches if b.family == "film_gain" and b.kind == "film")
     films = [f.name for f in study.probed.base.load_model.films]
     place = next(p for p in study.probed.places if p.name == batch.places[0])
-    h = Hypothesis(batch, 0, batch.histories[0], 100.0, (-1.0,), 1.0)
+    h = Hypothesis(batch, 0, batch.histories[0], 100.0, (-1.0,))
     (floor,) = lowest(detector, h)
     own = [detector.nominal[k].total[:, films.index(place.film)] for k in study.fitted]
     assert floor == -max(f.max() for f in own) < 0.0
@@ -157,7 +157,7 @@ def test_a_reading_is_refitted_with_the_parameters_that_had_bent_to_it():
         parts += [T.ravel(), w.ravel()]
     y = np.concatenate(parts)
     fitted = detector.fitter(y)
-    found = exact(detector, y, fitted, Hypothesis(batch, place, when, 1.0, (0.5 * size,), 1.0))
+    found = exact(detector, y, fitted, Hypothesis(batch, place, when, 1.0, (0.5 * size,)))
     assert found.amplitude[0] == pytest.approx(size, rel=0.1)
     _, ranked, _ = look(detector, fitted)
     first = next(h for h in ranked if h.family == "sensor" and h.name == "sensors.front")
@@ -167,7 +167,7 @@ def test_a_reading_is_refitted_with_the_parameters_that_had_bent_to_it():
 def a_coolant(place: int, film: float, heat: float) -> Hypothesis:
     """On the small machine, in one window."""
     batch = next(b for b in small_case.made_detector().columns.batches if b.kind == "coolant")
-    return Hypothesis(batch, place, batch.histories[0], 100.0, (film, heat), 1.0)
+    return Hypothesis(batch, place, batch.histories[0], 100.0, (film, heat))
 
 
 def test_no_medium_is_frozen():

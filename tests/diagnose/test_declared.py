@@ -137,7 +137,7 @@ def test_the_source_that_reads_a_corrected_signal_has_no_other_loss_beside_it():
     h = declared_exactly(detector, y, detector.fitter(y))[0]
     accepted = [Accepted(h, (), np.ones(1), np.eye(1), h.statistic, 36.0, ())]
     batch = next(b for b in detector.columns.batches if b.kind == "gain")
-    losses = [Hypothesis(batch, i, batch.histories[0], 50.0, (0.1,), 1.0) for i in range(len(batch.places))]
+    losses = [Hypothesis(batch, i, batch.histories[0], 50.0, (0.1,)) for i in range(len(batch.places))]
     assert [h.name for h in losses if _reads(detector.study, h, accepted)] == ["sources.motor"]
     assert not any(_reads(detector.study, h, []) for h in losses)
 
@@ -230,7 +230,7 @@ def test_two_sensors_with_each_others_name_are_judged_by_putting_them_back():
     y = with_noise(study, outputs(study, x), np.random.default_rng(9))
     batch = next(b for b in detector.columns.batches if b.kind == "swapped")
     front = next(i for i, name in enumerate(batch.places) if "front" in name and "housing" in name)
-    h = Hypothesis(batch, front, batch.histories[0], 0.0, (1.0,), 1.0)
+    h = Hypothesis(batch, front, batch.histories[0], 0.0, (1.0,))
     wrong = exchanged(study, y, [Accepted(h, (), np.ones(1), np.eye(1), 0.0, 0.0, ())])
     fitted = detector.fitter(wrong)
     best = max(swapped_candidates(detector, wrong, fitted), key=lambda h: h.statistic)

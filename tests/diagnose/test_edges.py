@@ -24,7 +24,7 @@ def heat(*windows: Window, family: str = "heat_source") -> Hypothesis:
     columns = elements.block_of["heat", "housing"]
     weights = np.ones((1, len(columns)))
     batch = Batch(family, "heat", "W", ("housing",), columns[None], (History("", weights, windows=windows),))
-    return Hypothesis(batch, 0, batch.histories[0], 0.0, (100.0,), 1.0)
+    return Hypothesis(batch, 0, batch.histories[0], 0.0, (100.0,))
 
 
 def names() -> list[str]:
@@ -71,7 +71,7 @@ def sunny(*centres: float) -> Hypothesis:
     weights, windows = by_blocks(study.fitted_runs, elements.histories.blocks, bell)
     when = History(name(bell, study.fitted_runs), weights, windows=windows, bell=bell)
     batch = Batch("sun", "heat", "W", ("housing",), columns[None], (when,), 1)
-    return Hypothesis(batch, 0, when, 0.0, (100.0, 60.0), 1.0)
+    return Hypothesis(batch, 0, when, 0.0, (100.0, 60.0))
 
 
 @pytest.mark.long
@@ -135,7 +135,7 @@ def test_another_exponent_of_a_loss_leaves_open_the_change_by_its_exponent():
         signal, _, reference = elements.histories.unit[name]
         when = History(name, np.ones((1, 1)), signal=signal, exponent=exponent, reference=reference)
         batch = Batch("loss_law", "source", "W", (place,), np.array([[column]]), (when,))
-        return Hypothesis(batch, 0, when, 0.0, tuple(a), 1.0)
+        return Hypothesis(batch, 0, when, 0.0, tuple(a))
 
     def outputs(units):
         return study.outputs(0, x, slots_with(study, elements, units, 0), [*a, 1.0][: len(units)])

@@ -177,9 +177,7 @@ def test_every_reading_of_the_tcp_counts_from_the_first_row():
 def test_a_sealed_run_that_counts_from_its_first_row_does_so_in_what_is_predicted(kind, name):
     always = History("always", np.ones((1, 1)))
     batch = Batch("", kind, "", (name,), np.zeros((1, 1), dtype=int), (always,))
-    cause = SimpleNamespace(
-        hypothesis=Hypothesis(batch, 0, always, 1.0, (SIZE,), 1.0), amplitude=np.array([SIZE]), units=()
-    )
+    cause = SimpleNamespace(hypothesis=Hypothesis(batch, 0, always, 1.0, (SIZE,)), amplitude=np.array([SIZE]), units=())
     added = []
     for reference in ("first", "absolute"):
         study = read(reference)[0]

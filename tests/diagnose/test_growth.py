@@ -20,7 +20,7 @@ def hypothesis(g: np.ndarray) -> Hypothesis:
     windows = [History(f"hour {b}", np.eye(BLOCKS)[[b]], windows=(Window("a", 3600.0 * b, 3600.0 * (b + 1)),))
                for b in range(BLOCKS)]  # fmt: skip
     batch = Batch("heat_source", "heat", "W", ("p",), np.arange(BLOCKS)[None], tuple(windows), 1)
-    return Hypothesis(batch, 0, windows[0], float(g[0] ** 2), (float(g[0]),), 1.0)
+    return Hypothesis(batch, 0, windows[0], float(g[0] ** 2), (float(g[0]),))
 
 
 @pytest.mark.parametrize(("size", "more", "wanted"), [(10.0, 10.0, 2), (10.0, 0.5, 1), (6.0, 6.0, 2), (2.0, 2.0, 1)])
@@ -57,7 +57,7 @@ def test_a_bell_finds_its_hour_in_every_run():
     g = np.array([50.0, 30.0]) @ truth
     start = max(
         (Hypothesis(batch, 0, h, float((h.weights @ g) @ np.linalg.solve(h.weights @ h.weights.T, h.weights @ g)),
-                    (1.0, 1.0), 1.0) for h in histories),
+                    (1.0, 1.0)) for h in histories),
         key=lambda h: h.statistic,
     )  # fmt: skip
     found = grown(start, g, np.eye(16))
@@ -80,7 +80,7 @@ def test_a_coolant_begins_where_cold_does_most(first):
     """Cold of the first hour; a film that suits all hours."""
     batch, block = coolant()
     g = np.concatenate([[10.0, 10.0, 10.0, 10.0], [-9.0, -1.0, 1.0, -0.5]])
-    found = chilled(Hypothesis(batch, 0, batch.histories[first], 1.0, (10.0, -2.0), 1.0), g, block)
+    found = chilled(Hypothesis(batch, 0, batch.histories[first], 1.0, (10.0, -2.0)), g, block)
     if first == 0:
         assert found is None  # it has begun there already
     else:
@@ -95,7 +95,7 @@ def test_a_coolant_begins_in_all_hours_that_cold_asks_for():
     windows = [History(f"{b} h", np.kron(np.eye(2), np.eye(4)[[b]]), windows=(hour,)) for b, hour in enumerate(hours)]
     batch = Batch("coolant", "coolant", "W/(m^2*K)", ("p",), np.arange(8)[None], tuple(windows), 1, smallest=5.0)
     g = np.concatenate([np.full(4, 10.0), [-9.0, -9.0, 0.0, -9.0]])
-    found = chilled(Hypothesis(batch, 0, windows[2], 1.0, (10.0, -2.0), 1.0), g, np.eye(8))
+    found = chilled(Hypothesis(batch, 0, windows[2], 1.0, (10.0, -2.0)), g, np.eye(8))
     assert found is not None
     assert found.when.windows == (Window("a", 0.0, 7200.0), Window("a", 10800.0, 14400.0))
     np.testing.assert_array_equal(found.when.weights, np.kron(np.eye(2), [[1.0, 1.0, 0.0, 1.0]]))
@@ -107,7 +107,7 @@ def test_cold_may_be_as_good_as_heat_in_all_other_hours(cold, begins):
     """Parameters take what the two differ by: a coolant of the first hour is as good as heat of the others."""
     batch, block = coolant()
     g = np.concatenate([np.full(4, 10.0), [cold, 5.2, 5.2, 5.2]])
-    found = chilled(Hypothesis(batch, 0, batch.histories[2], 1.0, (10.0, 2.0), 1.0), g, block)
+    found = chilled(Hypothesis(batch, 0, batch.histories[2], 1.0, (10.0, 2.0)), g, block)
     assert (found is not None) == begins
     if found is not None:
         assert found.when.windows == batch.histories[0].windows
@@ -116,11 +116,11 @@ def test_cold_may_be_as_good_as_heat_in_all_other_hours(cold, begins):
 def test_no_cold_and_no_coolant_begin_nowhere_else():
     batch, block = coolant()
     warm = np.concatenate([np.zeros(4), [9.0, 1.0, 1.0, 1.0]])
-    assert chilled(Hypothesis(batch, 0, batch.histories[1], 1.0, (10.0, 2.0), 1.0), warm, block) is None
+    assert chilled(Hypothesis(batch, 0, batch.histories[1], 1.0, (10.0, 2.0)), warm, block) is None
     hot = np.concatenate([np.zeros(4), [9.0, -3.0, -3.0, -2.0]])  # more than cold of the last three hours
-    assert chilled(Hypothesis(batch, 0, batch.histories[2], 1.0, (10.0, 2.0), 1.0), hot, block) is None
+    assert chilled(Hypothesis(batch, 0, batch.histories[2], 1.0, (10.0, 2.0)), hot, block) is None
     heat, block = coolant("heat")
-    assert chilled(Hypothesis(heat, 0, heat.histories[1], 1.0, (10.0, 2.0), 1.0), -warm, block) is None
+    assert chilled(Hypothesis(heat, 0, heat.histories[1], 1.0, (10.0, 2.0)), -warm, block) is None
 
 
 def windows_of_heat(hours: int, step: float, decay: float) -> tuple[np.ndarray, Batch]:
@@ -141,9 +141,7 @@ def windows_of_heat(hours: int, step: float, decay: float) -> tuple[np.ndarray, 
 
 def of(batch: Batch, k: int, g: np.ndarray, F: np.ndarray) -> Hypothesis:
     w = batch.histories[k].weights[0]
-    return Hypothesis(
-        batch, 0, batch.histories[k], float((w @ g) ** 2 / (w @ F @ w)), (float(w @ g / (w @ F @ w)),), 1.0
-    )
+    return Hypothesis(batch, 0, batch.histories[k], float((w @ g) ** 2 / (w @ F @ w)), (float(w @ g / (w @ F @ w)),))
 
 
 def test_windows_begin_and_end_between_the_hours():

@@ -36,7 +36,7 @@ def in_windows(n: int) -> Accepted:
     batch = next(b for b in detector.columns.batches if b.kind == "heat" and b.family == "heat_source")
     at = next(k for k, when in enumerate(batch.histories) if when.windows)
     windows = tuple(Window("run_0", 3600.0 * k, 3600.0 * k + 1800.0) for k in range(n))
-    h = Hypothesis(batch, 0, replace(batch.histories[at], windows=windows), 100.0, (10.0,), 1.0)
+    h = Hypothesis(batch, 0, replace(batch.histories[at], windows=windows), 100.0, (10.0,))
     return Accepted(h, units_of(detector.study, h), np.array([10.0]), np.eye(1), 100.0, 36.0, ())
 
 

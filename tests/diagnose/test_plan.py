@@ -27,7 +27,7 @@ ASKED = ("heat_source bed", "heat_source slide", "joint contacts.screw_bearing",
 def hypothesis(place: str, amplitude: float) -> Hypothesis:
     """Heat at a place, always, as a search would have found it."""
     batch = next(b for b in made_detector().columns.batches if b.family == "heat_source")
-    return Hypothesis(batch, batch.places.index(place), batch.histories[0], 200.0, (amplitude,), 1.0)
+    return Hypothesis(batch, batch.places.index(place), batch.histories[0], 200.0, (amplitude,))
 
 
 @cache

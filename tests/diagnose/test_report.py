@@ -378,7 +378,7 @@ def test_a_pull_of_a_conductance_is_a_relative_change_and_may_lie_beyond_its_bou
     detector, _, found = search_of_a_strong_source()
     batch = next(b for b in detector.columns.batches if b.kind == "contact")
     contact = next(p for p in detector.study.probed.parameters if p.path.startswith(f"{batch.places[0]}."))
-    h = Hypothesis(batch, 0, next(w for w in batch.histories if not w.windows), 50.0, (-0.9,), 1.0)
+    h = Hypothesis(batch, 0, next(w for w in batch.histories if not w.windows), 50.0, (-0.9,))
     lost = Accepted(h, (), np.array([-0.9]), np.array([[1e-4]]), 50.0, 36.0, ())
     pull = next(p for p in pulls_of(replace(found, accepted=(lost,))) if p.path == contact.path)
     assert pull.value == pytest.approx(0.1 * contact.nominal)

@@ -129,7 +129,7 @@ def test_an_expansion_is_not_judged_by_temperatures():
     study = detector.study
     _, y = small_case.source_off(4.5)
     batch = next(b for b in detector.columns.batches if b.family == "expansion")
-    h = Hypothesis(batch, 0, batch.histories[0], 50.0, (0.3,), 1.0)
+    h = Hypothesis(batch, 0, batch.histories[0], 50.0, (0.3,))
     one = Accepted(h, units_of(study, h), np.array([0.3]), np.eye(1), 50.0, 36.0, ())
     found = replace(search(detector, y), accepted=(one,))
     m = study.runs[2].measured

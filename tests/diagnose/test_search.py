@@ -155,7 +155,7 @@ def test_limits_of_lags_hold_at_larger_sizes():
     for batch, sizes in limits_in(detector):
         needed = np.sqrt(detector.thresholds[batch.family]) + detector.policy.power
         for i, size in enumerate(sizes[:, 0] if (batch.family, batch.unit) == ("sensor", "s") else ()):
-            h = Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0)
+            h = Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,))
             for lag in size * np.array([1.0, 1.5, 3.0]) if np.isfinite(size) else ():
                 change = detector.whiten(curved_change(detector, h, lag, states))
                 assert change @ projector(change) > (0.95 * needed) ** 2, (batch.places[i], lag)

@@ -66,7 +66,7 @@ def test_a_score_beyond_no_conductance_at_all_is_held(monkeypatch):
     """A linear score may say that a joint has less than nothing."""
     detector = small_case.made_detector()
     batch = next(b for b in detector.columns.batches if b.family == "joint")
-    h = Hypothesis(batch, 0, batch.histories[0], 1e6, (-3.0,) * batch.q, 1.0)
+    h = Hypothesis(batch, 0, batch.histories[0], 1e6, (-3.0,) * batch.q)
     seen, ranked, step = look(detector, detector.fitter(detector.fitter.surrogate.y0))
     monkeypatch.setattr(sys.modules[searched.__module__], "look", lambda *_: (seen, [h, *ranked], step))
     y0 = detector.fitter.surrogate.y0

@@ -26,7 +26,7 @@ def always(place: str, power: float, statistic: float) -> Accepted:
     detector = small_case.made_detector()
     batch = next(b for b in detector.columns.batches if b.family == "heat_source")
     when = next(w for w in batch.histories if not w.windows and not w.signal and w.bell is None)
-    h = Hypothesis(batch, batch.places.index(place), when, statistic, (power,), 1.0)
+    h = Hypothesis(batch, batch.places.index(place), when, statistic, (power,))
     return Accepted(h, units_of(detector.study, h), np.array([power]), np.eye(1), statistic, 36.0, ())
 
 

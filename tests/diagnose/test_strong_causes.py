@@ -25,7 +25,7 @@ def heat(place: str, *windows: tuple[str, float, float], power: float) -> Hypoth
     p = batch.places.index(place)
     when = next(w for w in batch.histories if w.windows)
     shown = tuple(Window(run, 3600.0 * start, 3600.0 * end) for run, start, end in windows)
-    return Hypothesis(batch, p, replace(when, windows=shown), 1.0, (power,), 1.0)
+    return Hypothesis(batch, p, replace(when, windows=shown), 1.0, (power,))
 
 
 def outputs(h: Hypothesis, x: np.ndarray) -> np.ndarray:

@@ -50,7 +50,7 @@ def test_faces_of_a_part_have_one_owner_and_two_parts_do_not(one, other, same):
 )
 def test_candidates_and_causes_have_their_sizes_in_the_same_words(kind, wanted, low, high):
     batch = Batch("family", kind, "1", ("p",), np.zeros((1, 1), dtype=int), (History("always", np.ones((1, 1))),))
-    found = rival_of(Hypothesis(batch, 0, batch.histories[0], 25.0, (0.5,), 100.0), 1.0)
+    found = rival_of(Hypothesis(batch, 0, batch.histories[0], 25.0, (0.5,)), 1.0)
     assert (found.amplitude, found.ci95) == (pytest.approx(wanted), pytest.approx((low, high)))
 
 
@@ -59,9 +59,7 @@ def test_an_interval_ends_where_physics_does(sign, ends):
     always = (History("always", np.ones((1, 1))),)
     batch = Batch("heat_source", "heat", "W", ("housing",), np.zeros((1, 1), dtype=int), always, sign)
     size = np.array([0.5 * (sign or 1)])
-    one = Accepted(
-        Hypothesis(batch, 0, always[0], 9.0, (float(size[0]),), 1.0), (), size, 0.24 * np.eye(1), 9.0, 36.0, ()
-    )
+    one = Accepted(Hypothesis(batch, 0, always[0], 9.0, (float(size[0]),)), (), size, 0.24 * np.eye(1), 9.0, 36.0, ())
     found = cause_of(one, small_case.study())
     assert found.ci95 == pytest.approx(ends, abs=0.01)
 
@@ -73,7 +71,7 @@ def test_what_a_film_has_gained_is_known_by_a_factor_and_what_it_has_lost_by_a_s
     """Beside what the form of the model may have wrong, an eighth of either."""
     always = (History("always", np.ones((1, 1))),)
     batch = Batch("film_gain", "group", "1", ("films.air",), np.zeros((1, 1), dtype=int), always)
-    h = Hypothesis(batch, 0, always[0], 9.0, (amplitude,), 1.0)
+    h = Hypothesis(batch, 0, always[0], 9.0, (amplitude,))
     found = cause_of(Accepted(h, (), np.array([amplitude]), sigma**2 * np.eye(1), 9.0, 36.0, ()), small_case.study())
     assert found.amplitude == pytest.approx(1.0 + amplitude)
     assert found.ci95 == pytest.approx(ends, abs=0.01)
@@ -84,7 +82,7 @@ def test_an_exact_factor_is_told_as_a_factor_without_an_interval():
     batch = Batch(
         "signal", "signal", "1", ("signals.x_current*0.707",), np.zeros((1, 1), dtype=int), always, fixed=True
     )
-    found = rival_of(Hypothesis(batch, 0, batch.histories[0], 25.0, (1.0,), 100.0), 1.0)
+    found = rival_of(Hypothesis(batch, 0, batch.histories[0], 25.0, (1.0,)), 1.0)
     assert (found.place, found.amplitude) == ("signals.x_current", 0.707)
     assert np.isnan(found.ci95).all()
 
@@ -94,7 +92,7 @@ def test_factors_of_one_signal_that_explain_nearly_the_same_are_ambiguous(less, 
     always = (History("factor", np.ones((1, 1))),)
     places = ("signals.x_current*0.5", "signals.x_current*0.707", "signals.y_current*2")
     batch = Batch("signal", "signal", "1", places, np.zeros((3, 1), dtype=int), always, fixed=True)
-    half, root, other = (Hypothesis(batch, i, always[0], 200.0 - i * less, (1.0,), 1.0) for i in range(3))
+    half, root, other = (Hypothesis(batch, i, always[0], 200.0 - i * less, (1.0,)) for i in range(3))
     near = ((root, 0.999), (other, 0.1)) if wanted == "ambiguous" else ((other, 0.1),)
     one = Accepted(half, (), np.ones(1), np.eye(1), 200.0, 36.0, near)
     found = SimpleNamespace(detector=small_case.made_detector(), accepted=(one,), steps=[SimpleNamespace(parts={})])
@@ -110,7 +108,7 @@ def test_of_equal_misfits_the_data_have_decided_nothing(statistic, less, wanted)
     """However unlike each other two causes are; of a strong one the error of its response is more than chance."""
     batches = {b.kind: b for b in small_case.made_detector().columns.batches if b.q == 1}
     heat, warmer = (
-        Hypothesis(batches[kind], 0, batches[kind].histories[0], s, (10.0,) * batches[kind].q, 1.0)
+        Hypothesis(batches[kind], 0, batches[kind].histories[0], s, (10.0,) * batches[kind].q)
         for kind, s in (("heat", statistic), ("contact", statistic - less))
     )
     one = Accepted(heat, (), np.full(1, 10.0), np.eye(1), statistic, 36.0, ((warmer, 0.9),))

@@ -130,7 +130,6 @@ class Hypothesis:
     when: History
     statistic: float
     amplitude: tuple[float, ...]
-    information: float
 
     @property
     def family(self) -> str:
@@ -149,13 +148,11 @@ def best(ready: Sequence[Prepared], g: np.ndarray, count: int = 12) -> list[Hypo
     """The best hypotheses of all batches, one per batch and place, largest statistic first."""
     found: list[Hypothesis] = []
     for own in ready:
-        scores, information = score(own, g), own.information
+        scores = score(own, g)
         top = np.argmax(scores.statistic, axis=1)
         for p in np.argsort(-scores.statistic.max(axis=1))[:count]:
             h = int(top[p])
             amplitude = tuple(map(float, scores.amplitude[p, h]))
             statistic = float(scores.statistic[p, h])
-            found.append(
-                Hypothesis(own.batch, int(p), own.batch.histories[h], statistic, amplitude, float(information[p, h]))
-            )
+            found.append(Hypothesis(own.batch, int(p), own.batch.histories[h], statistic, amplitude))
     return sorted(found, key=lambda f: -f.statistic)

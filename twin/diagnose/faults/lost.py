@@ -72,5 +72,5 @@ def lost_candidates(lost: Lost, batches: Sequence[Batch], projector: Projector, 
             always = next(h for h in batch.histories if h.name == "always")
             size = share * (LEFT - 1.0)
             i = batch.places.index(place)
-            found.append(Hypothesis(batch, i, always, float(share**2 * own), (size,), float(own / (LEFT - 1.0) ** 2)))
+            found.append(Hypothesis(batch, i, always, float(share**2 * own), (size,)))
     return found

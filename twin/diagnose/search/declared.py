@@ -131,7 +131,7 @@ def _promising(detector: Detector, y: np.ndarray, of: Callable[[Fault], bool]) -
     for batch in (b for b in detector.columns.batches if of(fault_of(b))):
         D = detector.columns.raw[:, batch.columns[:, 0]].astype(float)
         remains = ((white - D) * projector(white - D)).sum(axis=0)
-        always = [Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0) for i in range(len(batch.places))]
+        always = [Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,)) for i in range(len(batch.places))]
         found += zip(remains.tolist(), always, D.T, strict=True)
     return [(h, D) for _, h, D in sorted(found, key=lambda made: made[0])]
 

@@ -52,10 +52,8 @@ def _likeliest(h: Hypothesis, histories: Sequence[History], g: np.ndarray, block
     ready = prepared(replace(h.batch, places=(h.name,), columns=columns, histories=tuple(histories)), block[None])
     scores = score(ready, g)
     k = int(np.argmax(scores.statistic))
-    return replace(
-        h, when=histories[k], statistic=float(scores.statistic[0, k]),
-        amplitude=tuple(map(float, scores.amplitude[0, k])), information=float(ready.information[0, k]),
-    )  # fmt: skip
+    amplitude = tuple(map(float, scores.amplitude[0, k]))
+    return replace(h, when=histories[k], statistic=float(scores.statistic[0, k]), amplitude=amplitude)
 
 
 def refined_edges(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolicy = POLICY) -> Hypothesis:
@@ -158,9 +156,7 @@ def _plain(h: Hypothesis, g: np.ndarray, block: np.ndarray, sign: int, policy: S
         return None
     batch = replace(h.batch, histories=histories, sign=sign, smallest=0.0)
     amplitude = float(num[k] / F[k])
-    return grown(
-        Hypothesis(batch, h.place, histories[k], float(statistic[k]), (amplitude,), float(F[k])), g, block, policy
-    )
+    return grown(Hypothesis(batch, h.place, histories[k], float(statistic[k]), (amplitude,)), g, block, policy)
 
 
 def _joined(windows: Sequence[Window]) -> tuple[Window, ...]:

@@ -82,7 +82,7 @@ def _curved(detector: Detector, batch: Batch, needed: float, projector: Projecto
     signs = sorted({float(np.sign(s)) for s in tried})
     states, result = motion(detector, None), np.full((len(batch.places), 1), np.inf)
     for i in range(len(batch.places)):
-        of = Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0)
+        of = Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,))
         changes = [curved_change(detector, of, sign * size, states) for size in sizes for sign in signs]
         D = detector.whiten(np.column_stack(changes))
         seen = (D * projector(D)).sum(axis=0).reshape(len(sizes), -1).min(axis=1) >= needed**2

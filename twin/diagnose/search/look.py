@@ -115,7 +115,7 @@ def sized_candidates(detector: Detector, projector: Projector, white: np.ndarray
     """Plays, clocks and lags that would explain white residuals (m,), at sizes that the bank of columns does not know:
     their responses change in shape with their size, not in height."""
     tried = [
-        Hypothesis(batch, i, batch.histories[0], 0.0, (size,), 0.0)
+        Hypothesis(batch, i, batch.histories[0], 0.0, (size,))
         for batch in detector.columns.batches
         for i in range(len(batch.places))
         for size in fault_of(batch).sizes
@@ -130,7 +130,5 @@ def sized_candidates(detector: Detector, projector: Projector, white: np.ndarray
     explained = white @ D - half[:, -1] @ half[:, :-1]  # D^T Pi r
     own = (D**2).sum(axis=0) - (half[:, :-1] ** 2).sum(axis=0)  # D^T Pi D
     return [
-        replace(h, statistic=float(2.0 * g - F), information=float(F) / h.amplitude[0] ** 2)
-        for h, g, F in zip(tried, explained, own, strict=True)
-        if 2.0 * g > F
+        replace(h, statistic=float(2.0 * g - F)) for h, g, F in zip(tried, explained, own, strict=True) if 2.0 * g > F
     ]

@@ -122,4 +122,4 @@ def factors_of(detector: Detector, j: int) -> Iterator[tuple[Hypothesis, float, 
             signal = detector.columns.raw[:, batch.columns[i, 0]].astype(float)
             along = float(signal @ own)
             cosine = along / np.sqrt(max(size * float(signal @ signal), 1e-30))
-            yield Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,), 0.0), float(cosine), 1.0 + along / size
+            yield Hypothesis(batch, i, batch.histories[0], 0.0, (1.0,)), float(cosine), 1.0 + along / size

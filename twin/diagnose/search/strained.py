@@ -156,7 +156,7 @@ def strained(start: Start, y: np.ndarray) -> tuple[Fitted, Accepted] | None:
             always = next(h for h in batch.histories if not h.windows)
             size, _ = fault.amplitude(float(fitted.x[j] * detector.study.scale[j]))
             likelihood = float((policy.pulled * strain[j]) ** 2)
-            found.append(Hypothesis(batch, i, always, likelihood, (size,), float(detector.study.scale[j] ** -2.0)))
+            found.append(Hypothesis(batch, i, always, likelihood, (size,)))
     seen, ranked, _ = start.scored
     most = ranked[0].statistic if ranked else 0.0
     freed_ones, before = [], misfit(detector, fitted)

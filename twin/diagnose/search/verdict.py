@@ -30,10 +30,10 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
     value, variance = float(a.amplitude[0]), max(float(a.covariance[0, 0]), 0.0)
     sigma = 0.0 if h.batch.fixed else float(np.hypot(np.sqrt(variance), fault.uncertain(value)))
     told = fault.curve.told
-    low, high = value - 1.96 * sigma, value + 1.96 * sigma
+    low, high = value - policy.sure * sigma, value + policy.sure * sigma
     if value > 0.0:  # what a conductance has gained is known by a factor, what it has lost by a share
         change, spread = fault.log_change(value, sigma)
-        low, high = (fault.amplitude(change + z * spread)[0] for z in (-1.96, 1.96))
+        low, high = (fault.amplitude(change + z * spread)[0] for z in (-policy.sure, policy.sure))
     if h.batch.sign:  # the interval ends where physics does
         low, high = (max(low, 0.0), high) if h.batch.sign > 0 else (low, min(high, 0.0))
     size = told(value), told(low), told(high)
@@ -57,14 +57,14 @@ def _factors(a: Accepted) -> tuple[float, float]:
     return min(factors), max(factors)
 
 
-def rival_of(h: Hypothesis, cosine: float, remedy: str = "") -> Rival:
+def rival_of(h: Hypothesis, cosine: float, remedy: str = "", policy: SearchPolicy = POLICY) -> Rival:
     """A hypothesis in a row of a table. Its interval is that of an amplitude that enters linearly, of which the
     statistic is (amplitude / sigma)^2; an exact factor has none."""
     value, place, fault = h.amplitude[0], h.name, fault_of(h)
     if fault.corrects:
         place, factor = fault.factor(place)
         return Rival(h.family, place, h.when.name, factor, h.batch.unit, h.statistic, cosine, remedy)
-    half = 1.96 * abs(value) / math.sqrt(h.statistic) if h.statistic > 0.0 and not h.batch.fixed else math.nan
+    half = policy.sure * abs(value) / math.sqrt(h.statistic) if h.statistic > 0.0 and not h.batch.fixed else math.nan
     told = fault.curve.told
     ci95 = (told(value - half), told(value + half))
     return Rival(h.family, place, h.when.name, told(value), h.batch.unit, h.statistic, cosine, remedy, ci95)
@@ -167,10 +167,10 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
     """Declared parameters that calibration alone moved out of their tolerance, at their values without one. Of one that
     has come near a bound of the calibration, the interval reaches as far as physics allows."""
     result, detector = [], found.detector
-    ends = detector.policy.nearly * np.array(bounds(detector.study))
+    sure, ends = detector.policy.sure, detector.policy.nearly * np.array(bounds(detector.study))
     for own in found.loose:
         p = detector.study.probed.parameters[own.index]
-        gain, low, high = (float(np.exp(p.sigma * (own.x + z * own.sigma))) for z in (0.0, -1.96, 1.96))
+        gain, low, high = (float(np.exp(p.sigma * (own.x + z * own.sigma))) for z in (0.0, -sure, sure))
         if own.settled and not ends[0, own.index] < own.x < ends[1, own.index]:
             far = _farthest(detector, own.index, own.x)
             low, high = (low, max(high, far)) if own.x > 0.0 else (min(low, far), high)
