@@ -107,6 +107,17 @@ def test_an_exact_fit_of_a_factor_ends_where_it_stays():
     assert left == pytest.approx(then, abs=detector.policy.close)
 
 
+def test_an_exact_fit_begins_where_a_surrogate_that_leads_away_has_left_least():
+    """As of drawn network 515, where that of a motor of a ninth of its heat turned a fit of 866 units into 169,797."""
+    detector, y = small_case.made_detector(), of_another("spindle_speed")
+    corrected = with_signal(detector.study, "spindle_speed", 2.0)
+    right = _fitted_by(detector, y, corrected, np.inf)
+    surrogate = detector.fitter.surrogate
+    wrong = replace(surrogate, J=-3.0 * surrogate.J, H=-3.0 * surrogate.H)
+    lost = replace(detector, fitter=replace(detector.fitter, surrogate=wrong))
+    assert _fitted_by(lost, y, corrected, np.inf) == pytest.approx(right, abs=detector.policy.close)
+
+
 def test_a_factor_counts_by_its_exact_fit_and_not_by_its_score(monkeypatch):
     detector, y = small_case.made_detector(), of_another("spindle_speed")
     factors = declared_exactly(detector, y, detector.fitter(y))

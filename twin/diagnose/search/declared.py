@@ -150,19 +150,25 @@ def _fitted_with(detector: Detector, y: np.ndarray, change: np.ndarray) -> float
 
 def _fitted_by(detector: Detector, y: np.ndarray, study: Study, enough: float) -> float:
     """The misfit of a study with other loads, parameters fitted. Where it is below `enough`, with exact derivatives:
-    where these end a surrogate of other loads does not."""
+    where these end a surrogate of other loads does not, and far from the description it may lead away, so that they
+    begin where it has left least."""
     (low, high), policy = bounds(study), detector.policy
-    x, hotter, left = np.zeros(len(low)), imitating(detector.study, study), np.inf
+    hotter = imitating(detector.study, study)
 
     def step(x: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, float]:
         projector = detector.fitter.projector(J)
         white = detector.whiten(y - study.all_outputs(x) + J @ x)
         return np.clip(projector.most_likely(white)[: len(x)], low, high), float(white @ projector(white))
 
+    x, begun, least = np.zeros(len(low)), np.zeros(len(low)), np.inf
     for _ in range(policy.exact_passes):
-        x, left = step(x, detector.fitter.surrogate.at(x + hotter)[1])
-    if left >= enough:
-        return left
+        after, left = step(x, detector.fitter.surrogate.at(x + hotter)[1])
+        if left > least + policy.less:
+            x = begun
+            break
+        x, begun, least = after, x, left
+    if least >= enough:
+        return least
     there, least = np.full_like(x, np.inf), np.inf
     for _ in range(policy.exact_passes):
         if np.abs(x - there).max(initial=0.0) > policy.anew:
