@@ -16,7 +16,7 @@ from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.accepted import Accepted
-from twin.diagnose.search.contest import judged, proof, tried, worth
+from twin.diagnose.search.contest import foremost, judged, proof, tried, worth
 from twin.diagnose.search.exact import _moved, beginning, exact, lowest, solved
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY
@@ -104,6 +104,18 @@ def test_seconds_of_an_edge_are_found_beside_the_share_of_a_conductance():
     np.testing.assert_allclose(solved(F, F @ a, np.array([-0.97, -np.inf])), a, rtol=1e-9)
     held = solved(F, F @ a, np.array([-0.2, -np.inf]))
     np.testing.assert_allclose(held, [-0.2, (F[1] @ a - F[1, 0] * -0.2) / F[1, 1]], rtol=1e-9)
+
+
+def test_a_joint_that_is_nearly_gone_is_compared_whatever_it_scores():
+    """As of drawn network 501, where the joint lost in a window scored less than heat, suns and coolants elsewhere."""
+    detector = small_case.made_detector()
+    heat = next(b for b in detector.columns.batches if b.kind == "heat")
+    joint = next(b for b in detector.columns.batches if b.kind == "contact")
+    scored = [[Hypothesis(heat, 0, heat.histories[0], 900.0 - i, (20.0,))] for i in range(detector.policy.ahead + 3)]
+    gone, weaker = ([Hypothesis(joint, 0, joint.histories[0], 90.0, (a,))] for a in (-1.4, -0.4))
+    found = foremost(detector, [*scored, gone, weaker, *[gone] * 9])
+    assert found[: detector.policy.ahead] == scored[: detector.policy.ahead]
+    assert found[detector.policy.ahead :] == [gone] * detector.policy.entrants
 
 
 def test_what_a_cause_may_be():

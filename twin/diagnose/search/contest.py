@@ -41,6 +41,19 @@ def proof(detector: Detector, h: Hypothesis) -> float:
     return h.statistic - detector.policy.edge * edges - detector.policy.growth * _further(h)
 
 
+def foremost(detector: Detector, candidates: Sequence[Sequence[Hypothesis]]) -> list[Sequence[Hypothesis]]:
+    """Of candidates in all their starts, most worthy first, those that are compared: the first `ahead`, and of others
+    as many of a kind as are refitted where a score says little."""
+    ahead, count = detector.policy.ahead, Counter[str]()
+    found = list(candidates[:ahead])
+    for starts in candidates[ahead:]:
+        kind = starts[0].batch.kind
+        if _told_badly(detector, starts[0]) and count[kind] < detector.policy.entrants:
+            found.append(starts)
+            count[kind] += 1
+    return found
+
+
 def judged(
     detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]],
     named: Callable[[Hypothesis], Hypothesis] = lambda h: h,
@@ -60,8 +73,7 @@ def judged(
         h = starts[0]
         led = worthy(h) < (1.0 - _behind(h, detector.policy)) * leads_by
         bends = bent(detector, h)
-        told_badly = fault_of(h).curved or _saturated(detector, h)
-        if (led and not told_badly) or (bends and count[h.batch.kind] >= detector.policy.entrants):
+        if (led and not _told_badly(detector, h)) or (bends and count[h.batch.kind] >= detector.policy.entrants):
             left.append(h)
             continue
         count[h.batch.kind] += bends
@@ -194,9 +206,10 @@ def _follows(h: Hypothesis) -> bool:
     return fault_of(h).read and not fault_of(h).curved and not h.batch.fixed
 
 
-def _saturated(detector: Detector, h: Hypothesis) -> bool:
-    """A conductance that is nearly gone: it moves temperatures by far more than its score says."""
-    return fault_of(h).conducts and h.amplitude[0] < detector.policy.gone
+def _told_badly(detector: Detector, h: Hypothesis) -> bool:
+    """Whether a score says little: of what is curved, and of a conductance that is nearly gone, which moves
+    temperatures by far more."""
+    return fault_of(h).curved or (fault_of(h).conducts and h.amplitude[0] < detector.policy.gone)
 
 
 def bent(detector: Detector, h: Hypothesis) -> bool:

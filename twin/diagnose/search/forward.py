@@ -20,7 +20,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, settled, strong
-from twin.diagnose.search.contest import judged, proof, tried, worth
+from twin.diagnose.search.contest import foremost, judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.exact import beginning, misfit, unexplained
 from twin.diagnose.search.growth import chilled, grown
@@ -80,7 +80,8 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         ahead = sorted((_starts(seen, h, policy) for h in passing), key=lambda starts: -worth(starts[0], policy))
         rest = exchanged(detector.study, y, accepted)
         named = partial(_named, detector, y, fitted, accepted)
-        proved, others = judged(detector, rest, fitted, tried(detector, rest, fitted, ahead[: policy.ahead]), named)
+        compared = tried(detector, rest, fitted, foremost(detector, ahead))
+        proved, others = judged(detector, rest, fitted, compared, named)
         standing = [h for h in proved if proof(detector, h) > policy.named * limits[h.family] and _possible(h)]
         if not any(proof(detector, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
