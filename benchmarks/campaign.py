@@ -40,7 +40,7 @@ from twin.progress import bar
 OUT = Path("out/campaign")
 NOISE = 0.08  # K
 SETTINGS = Settings(temperature_sigma=NOISE)
-FIRST = 5800  # seed of the first trial: none that anything was tuned on
+FIRST = 5800  # seed of the first of the stored trials; fresh ones begin behind those looked at (docs/campaign.md)
 CATALOGUE = tuple(f.name for f in FAMILIES)
 KNOWN = known_of(EXPERIMENT, CATALOGUE, [f.name for f in FAMILIES if f.group in ("machine", "signal")])
 

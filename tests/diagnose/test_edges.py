@@ -125,6 +125,7 @@ def test_longer_windows_end_where_the_next_one_begins_or_the_run_ends():
     assert longer(study, elements, whole) is whole
 
 
+@pytest.mark.long
 def test_another_exponent_of_a_loss_leaves_open_the_change_by_its_exponent():
     study, elements = small_case.study(linear=True), small_case.elements(linear=True)
     place, name = next((p, n) for kind, p, n in elements.index if kind == "source" and n.endswith("^2.00"))
