@@ -195,6 +195,9 @@ def test_no_medium_is_frozen():
     np.testing.assert_array_equal(fault_of(plain).limited(detector.study, plain.name, np.array([-1e9])), [-1e9])
 
 
+STRAIGHT, BENT = (SimpleNamespace(x=np.array([x])) for x in (0.0, 9.0))  # fits without a cause
+
+
 def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
     """A linear score ranks the face behind first; after some passes from its last start the wetted one leads."""
     contest = sys.modules[worth.__module__]
@@ -212,17 +215,21 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
     monkeypatch.setattr(contest, "without_one", lambda study, h: [])
     nothing = np.zeros(0)
     far = replace(wetted, statistic=0.2 * behind.statistic)
-    order = tried(SEARCHED, nothing, None, [(heat,), (behind,), (wetted, cold), (far,)])
+    order = tried(SEARCHED, nothing, STRAIGHT, [(heat,), (behind,), (wetted, cold), (far,)])
     assert order.pop() == (far,)
     assert [starts[0].statistic for starts in order] == [1100.0, 950.0, 850.0]
     assert order[0][0].amplitude == cold.amplitude
     assert len(passes) == 2
     assert passes[0] == passes[1] > 0  # some, not as many as a refit needs
     heat = replace(heat, statistic=2000.0)
-    order = tried(SEARCHED, nothing, None, [(behind,), (heat,), (wetted, cold)])
+    order = tried(SEARCHED, nothing, STRAIGHT, [(behind,), (heat,), (wetted, cold)])
     assert order == [(heat,), (behind,), (wetted, cold)]  # as they were
     assert len(passes) == 2
-    assert tried(SEARCHED, nothing, None, []) == []
+    assert tried(SEARCHED, nothing, STRAIGHT, []) == []
+    monkeypatch.setattr(contest, "shorter", lambda study, h: [])
+    heat = replace(heat, statistic=850.0)
+    tried(SEARCHED, nothing, BENT, [(heat,), (behind,), (wetted, cold)])
+    assert len(passes) == 5  # from all starts, where a fit has bent parameters
 
 
 def test_a_coolant_is_tried_in_longer_windows_while_they_explain_more(monkeypatch):
@@ -238,7 +245,7 @@ def test_a_coolant_is_tried_in_longer_windows_while_they_explain_more(monkeypatc
     monkeypatch.setattr(
         contest, "longer", lambda study, elements, h: replace(h, amplitude=(2.0 * h.amplitude[0], -1.0))
     )
-    found = contest._in_other_windows(small_case.made_detector(), np.zeros(0), None, a_coolant(1, 1.0, -1.0))
+    found = contest._in_other_windows(small_case.made_detector(), np.zeros(0), STRAIGHT, a_coolant(1, 1.0, -1.0))
     assert found.statistic == 400.0
     assert tries == [2.0, 4.0, 8.0]
 
@@ -248,6 +255,7 @@ def test_a_coolant_is_tried_without_a_window_that_explains_nothing(monkeypatch):
     first, second = (detector.study.runs[k].run.name for k in detector.study.fitted)
     right, wrong = Window(first, 3600.0, 7200.0), Window(second, 3600.0, 7200.0)
     one = a_coolant(1, 20.0, -20.0)
+    one = replace(one, when=replace(one.when, windows=(right,)))
     both = replace(one, when=replace(one.when, windows=(right, wrong)))
 
     def exact(detector, y, fitted, h, most):
@@ -255,9 +263,12 @@ def test_a_coolant_is_tried_without_a_window_that_explains_nothing(monkeypatch):
 
     monkeypatch.setattr(contest, "exact", exact)
     monkeypatch.setattr(contest, "longer", lambda study, elements, h: h)
-    found = contest._in_other_windows(detector, np.zeros(0), None, both)
+    found = contest._in_other_windows(detector, np.zeros(0), STRAIGHT, both)
     assert found.when.windows == (right,)
     assert found.when.name == f"from 1.0 h to 2.0 h of {first}"
+    right = replace(right, end=5400.0)  # half of it, where a fit has bent parameters
+    assert contest._in_other_windows(detector, np.zeros(0), STRAIGHT, both).when.windows != (right,)
+    assert contest._in_other_windows(detector, np.zeros(0), BENT, one).when.windows == (right,)
 
 
 def test_a_capacity_further_behind_is_refitted(monkeypatch):

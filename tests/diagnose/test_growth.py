@@ -10,7 +10,7 @@ import pytest
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
 from twin.diagnose.evidence.bells import Bell, by_blocks, name
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.growth import chilled, grown, refined_edges
+from twin.diagnose.search.growth import between, chilled, grown, refined_edges
 
 BLOCKS = 6
 
@@ -187,3 +187,16 @@ def test_a_familys_own_windows_keep_their_edges():
     h = of(batch, 0, g, F)
     assert refined_edges(h, g, F) is h
     assert grown(h, g, F).when.windows == first
+
+
+def test_a_coolant_that_warms_is_cold_in_the_hours_between():
+    """Heat in all other hours is as good as cold in its own where parameters are free."""
+    batch, _ = coolant()
+    warm = Hypothesis(batch, 0, batch.histories[1], 9.0, (60.0, 5.0))
+    cold = between(warm)
+    assert cold is not None
+    assert [(w.start, w.end) for w in cold.when.windows] == [(0.0, 3600.0)]
+    assert cold.when.weights == pytest.approx(batch.histories[0].weights)
+    assert cold.amplitude == (60.0, -5.0)
+    assert between(Hypothesis(batch, 0, batch.histories[1], 9.0, (60.0, -5.0))) is None
+    assert between(Hypothesis(batch, 0, batch.histories[2], 9.0, (60.0, 5.0))) is None  # no hours are left

@@ -17,7 +17,7 @@ from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.accepted import Accepted, as_scored
+from twin.diagnose.search.accepted import Accepted, as_scored, possible
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import _leaking, _restless, refit, search
@@ -147,8 +147,13 @@ def test_a_number_is_not_out_of_tolerance_where_something_seen_explains_more(sta
     alarm = replace(other, statistic=1.3 * detector.thresholds[other.family])
     ended = closed(replace(start, glance=(seen, [alarm], step)), y, relaxed)
     assert (ended is not None) == stays
-    quiet = replace(other, statistic=0.5 * detector.thresholds[other.family])
-    assert closed(replace(start, glance=(seen, [quiet], step)), y, relaxed) is not None
+    chance = float(np.quantile(detector.nulls[other.family], 0.97))
+    for statistic, told in ((0.5 * (chance + detector.thresholds[other.family]), not stays), (0.9 * chance, False)):
+        quiet = replace(other, statistic=statistic)  # too weak to be named
+        ended = closed(replace(start, glance=(seen, [quiet], step)), y, relaxed)
+        assert ended is not None
+        rivals = {h.name for h, _ in ended.accepted[0].rivals}
+        assert (other.name in rivals) == told
 
 
 def relaxed_source() -> tuple[Detector, list[Hypothesis], Callable[[list[Hypothesis]], Search | None]]:
@@ -251,3 +256,13 @@ def test_of_two_that_leave_as_much_the_one_farther_out_counts(less, first, monke
     assert (one.hypothesis.name, fit.reachable) == (first, left[first])
     assert [h.name for h, _ in one.rivals] == (["sources.rear"] if less < 6.0 else [])
     assert all(h.statistic == one.statistic for h, _ in one.rivals)
+
+
+def test_a_size_is_refused_where_its_interval_lies_beyond_physics():
+    """A film of nine times is fitted as ten, and known to an eighth."""
+    detector = small_case.made_detector()
+    batch = next(b for b in detector.columns.batches if b.family == "film_gain" and b.kind == "group")
+    h = Hypothesis(batch, 0, batch.histories[0], 100.0, (1.0,))
+    assert batch.largest[0] == 9.0  # of a relative change
+    assert possible(detector, h, 9.4)
+    assert not possible(detector, h, 12.0)

@@ -54,10 +54,11 @@ class Batch:
     def q(self) -> int:
         return self.histories[0].weights.shape[0]
 
-    def possible(self, place: int, amplitude: float) -> bool:
-        """Whether a first amplitude at a place is of the sign and within the range that physics allows."""
+    def possible(self, place: int, amplitude: float, uncertain: float) -> bool:
+        """Whether a first amplitude at a place, known but for so much, is of the sign and within the range that physics
+        allows."""
         return (self.sign == 0 or self.sign * amplitude > 0.0) and (
-            not self.largest or abs(amplitude) <= self.largest[place]
+            not self.largest or abs(amplitude) - uncertain <= self.largest[place]
         )
 
 

@@ -59,6 +59,11 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
     return [] if j is None else [j]
 
 
+def possible(detector: Detector, h: Hypothesis, amplitude: float) -> bool:
+    """Whether physics allows a first amplitude of a hypothesis, within what the form of the model may have wrong."""
+    return h.batch.possible(h.place, amplitude, detector.policy.sure * fault_of(h).uncertain(abs(amplitude)))
+
+
 def jacobian(
     detector: Detector, x: np.ndarray, causes: Sequence[tuple[Hypothesis, np.ndarray]], closely: bool
 ) -> np.ndarray:

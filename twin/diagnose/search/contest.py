@@ -18,8 +18,8 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.edges import edges_of, longer, without_one
-from twin.diagnose.search.exact import by_chance, closer, exact, misfit, reached
+from twin.diagnose.search.edges import edges_of, longer, shorter, without_one
+from twin.diagnose.search.exact import bends, by_chance, closer, exact, misfit, reached
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
@@ -114,17 +114,23 @@ def tried(
     detector: Detector, y: np.ndarray, fitted: Fitted, candidates: Sequence[Sequence[Hypothesis]]
 ) -> list[Sequence[Hypothesis]]:
     """Candidates of `judged`, most worthy first. Where a coolant leads, it and others within `saturates` have been
-    refitted for some passes, from the last of their starts, in ever longer windows and in fewer: a film saturates most
-    at the wetted face, which linearity would leave aside, and within the hour, where linearity ends its window."""
+    refitted for some passes, in ever longer windows and in fewer: a film saturates most at the wetted face, which
+    linearity would leave aside, and within the hour, where linearity ends its window. From the last of their starts;
+    where the fit has bent parameters, from all of them."""
     order = sorted(candidates, key=lambda starts: -worth(starts[0], detector.policy))
     if not order or not fault_of(order[0][0]).wets:
         return order
     least = (1.0 - detector.policy.saturates) * worth(order[0][0], detector.policy)
+    strong = bends(fitted.x, detector.policy)
+
+    def trial(starts: Sequence[Hypothesis]) -> Hypothesis:
+        ended = [exact(detector, y, fitted, s, detector.policy.trial) for s in (starts if strong else starts[-1:])]
+        return _in_other_windows(detector, y, fitted, max(ended, key=partial(worth, policy=detector.policy)))
+
     passed = [
-        (_in_other_windows(detector, y, fitted, exact(detector, y, fitted, starts[-1], detector.policy.trial)),)
-        if fault_of(starts[0]).wets and worth(starts[0], detector.policy) > least else starts
+        (trial(starts),) if fault_of(starts[0]).wets and worth(starts[0], detector.policy) > least else starts
         for starts in order
-    ]  # fmt: skip
+    ]
     return sorted(passed, key=lambda starts: -worth(starts[0], detector.policy))
 
 
@@ -135,6 +141,7 @@ def _in_other_windows(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypo
     worthy = partial(worth, policy=policy)
     while True:
         starts = [s for s in (longer(study, detector.elements, h), *without_one(study, h)) if s is not h]
+        starts += shorter(study, h) if bends(fitted.x, policy) else []
         tried_ones = (exact(detector, y, fitted, s, policy.trial) for s in starts)
         best = max(tried_ones, key=worthy, default=h)
         if worthy(best) <= worthy(h):

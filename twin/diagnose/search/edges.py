@@ -108,6 +108,16 @@ def without_one(study: Study, h: Hypothesis) -> list[Hypothesis]:
     return [in_windows(h, left, spans) for left in fewer]
 
 
+def shorter(study: Study, h: Hypothesis) -> list[Hypothesis]:
+    """The hypothesis with one half of each of its windows in turn: what ends with a run stays there otherwise."""
+    windows, spans, result = h.when.windows, _spans(study), list[Hypothesis]()
+    for i, w in enumerate(windows):
+        middle = 0.5 * (w.start + w.end)
+        halves = (replace(w, end=middle), replace(w, start=middle)) if w.end - w.start > 2.0 * SHORTEST else ()
+        result += [in_windows(h, (*windows[:i], half, *windows[i + 1 :]), spans) for half in halves]
+    return result
+
+
 def in_windows(h: Hypothesis, windows: Sequence[Window], spans: dict[str, float]) -> Hypothesis:
     """The hypothesis in other windows, which its name tells; spans: when every run ends [s]."""
     first, runs = windows[0], [w.run for w in windows]

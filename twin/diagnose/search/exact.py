@@ -66,11 +66,13 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
     a = np.array(h.amplitude)
     if fault_of(h).conducts:  # as if temperatures were linear in t
         a = np.clip(1.0 / np.maximum(1.0 - a, 0.2) - 1.0, policy.lowest_change, policy.highest_change)
+    if fault_of(h).wets:  # a strong film saturates: a score that takes it as linear says little
+        a[0] = fault_of(h).prior(h.batch.q)[0][0]
     if h.when.bell is not None:
         h = moved(detector.study, detector.elements, h, ())  # hours found by `growth` get their windows
     x = beginning(fitted.x, policy).copy()
     x[freed(detector.study, h)] = 0.0
-    return _descended(detector, y, fitted, _Point(a, x, h), passes)
+    return _descended(detector, y, fitted, _Point(a, x, h), passes, held=policy.held if fault_of(h).wets else 0)
 
 
 def closer(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
@@ -82,7 +84,36 @@ def closer(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> 
     """
     if fault_of(h).curved or not strong(detector, h):
         return h
-    return max(h, reached(detector, y, fitted, h), key=lambda own: own.statistic)
+    begun = _edges_tried(detector, y, fitted, h)
+    return max(h, reached(detector, y, fitted, begun), key=lambda own: own.statistic)
+
+
+def _edges_tried(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+    """A hypothesis with its edges, one after the other, where they explain most some quarters of an hour earlier or
+    later, at its size, also where they begin or end with a run. What an edge does at a light part is over within
+    minutes, and derivatives see none farther off."""
+    study, policy = detector.study, detector.policy
+    whole = [Edge(what, i) for i in range(len(h.when.windows)) for what in ("begin", "end")]
+    edges = whole if h.when.bell is None else edges_of(study, h)
+    if not edges:
+        return h
+    a, x = np.array(h.amplitude), beginning(fitted.x, policy)
+    J = jacobian(detector, x, [(h, a)], closely=False)
+    projector, there = detector.fitter.projector(J, fitted.more), y - fitted.beside + J @ x
+
+    def left(own: Hypothesis) -> float:
+        white = detector.whiten(there - _outputs(detector, _Point(a, x, own), ())[0])
+        return float(white @ projector(white))
+
+    best, least, before = h, left(h), np.inf
+    while least < before - policy.less:
+        before = least
+        for edge in edges:
+            shifts = [(edge, by * policy.edge_step) for by in (-1.0, -0.5, 0.5, 1.0)]
+            tried = [moved(study, detector.elements, best, [shift]) for shift in shifts]
+            remains, found = min(((left(own), own) for own in tried), key=lambda own: own[0])
+            best, least = (found, remains) if remains < least else (best, least)
+    return best
 
 
 def reached(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
@@ -95,17 +126,16 @@ def reached(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) ->
 
 
 def _descended(
-    detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, passes: int, closely: bool = False
+    detector: Detector, y: np.ndarray, fitted: Fitted, now: _Point, passes: int, closely: bool = False, held: int = 0
 ) -> Hypothesis:
-    """Where Gauss-Newton steps with a line search from a point end."""
+    """Where Gauss-Newton steps with a line search from a point end; held: first passes, that leave amplitudes of which
+    more is known beforehand and the parameters where they are."""
     study, policy, h = detector.study, detector.policy, now.h
     fault, q = fault_of(h), h.batch.q
     before, inner = misfit(detector, fitted), edges_of(study, h)
     read = readings_columns(detector, h) if fault.read else np.zeros((len(y), q))
     (low, high), (mean, inverse), floor = bounds(study), fault.prior(q), lowest(detector, h)
     a = np.maximum(now.a, floor)
-    if fault.wets and not closely:  # a strong film saturates: a score that takes it as linear says little
-        a[0] = mean[0]
     now = replace(now, a=a)
     best, statistic, step, share = now, -np.inf, _Step(np.zeros(q), np.zeros_like(now.x), ()), 1.0
 
@@ -113,7 +143,6 @@ def _descended(
         a = fault.limited(study, h.name, _moved(at.a, found[:q], fault.conducts, h.batch.sign, policy))
         return a, np.clip(found[q:], -policy.edge_step, policy.edge_step)
 
-    held = policy.held if fault.wets and not closely else 0
     others = detector.fitter.without_parameters(fitted.more) if closely else None
     for i in range(passes or held + (policy.passes if not inner else policy.window_passes)):
         edges = [inner[(i + j) % len(inner)] for j in range(min(len(inner), K - q))] if inner else []
@@ -193,16 +222,17 @@ def _read_anew(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis)
 
 def beginning(x: np.ndarray, policy: SearchPolicy = POLICY) -> np.ndarray:
     """(n,) parameters from which a cause is refitted: those without it, or the description where it has bent them."""
-    return np.zeros_like(x) if _bends(x, policy) else x
+    return np.zeros_like(x) if bends(x, policy) else x
 
 
-def _bends(x: np.ndarray, policy: SearchPolicy) -> bool:
+def bends(x: np.ndarray, policy: SearchPolicy) -> bool:
+    """Whether a fit has bent parameters (n,) towards a cause that none of them is."""
     return bool(np.abs(x).max(initial=0.0) >= policy.bends)
 
 
 def unbent(detector: Detector, y: np.ndarray, fitted: Fitted) -> Fitted:
     """A fit of measurements y (m,); where it has bent parameters and no cause is named yet, the description instead."""
-    bent = _bends(fitted.x, detector.policy) and fitted.more is None
+    bent = bends(fitted.x, detector.policy) and fitted.more is None
     return detector.fitter.at_description(y) if bent else fitted
 
 

@@ -19,13 +19,13 @@ from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
-from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, settled, strong
+from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, possible, settled, strong
 from twin.diagnose.search.contest import foremost, judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.exact import beginning, misfit, unexplained
-from twin.diagnose.search.growth import chilled, grown
+from twin.diagnose.search.growth import between, chilled, grown
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Search, Step, distinct, look, with_cosines
+from twin.diagnose.search.look import Scored, Search, Step, distinct, look, with_cosines
 from twin.diagnose.search.loose import loose_ones
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
@@ -77,12 +77,14 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         passing = _passing(detector, ranked, accepted, refused, limits)
         if not passing or len(accepted) >= policy.causes or fruitless >= policy.tries or imitated:
             break
-        ahead = sorted((_starts(seen, h, policy) for h in passing), key=lambda starts: -worth(starts[0], policy))
+        alone = None if accepted else start.alone
+        ahead = sorted((_starts(seen, h, alone, policy) for h in passing), key=lambda starts: -worth(starts[0], policy))
         rest = exchanged(detector.study, y, accepted)
         named = partial(_named, detector, y, fitted, accepted)
         compared = tried(detector, rest, fitted, foremost(detector, ahead))
         proved, others = judged(detector, rest, fitted, compared, named)
-        standing = [h for h in proved if proof(detector, h) > policy.named * limits[h.family] and _possible(h)]
+        enough = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
+        standing = [h for h in enough if _possible(detector, h)]
         if not any(proof(detector, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
@@ -170,7 +172,20 @@ def _without(
     return refit(detector, y, fitted.x, left) if left else (detector.fitter(y), left)
 
 
-def _starts(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis]:
+def _starts(seen: Sight, h: Hypothesis, alone: Scored | None, policy: SearchPolicy) -> list[Hypothesis]:
+    """A hypothesis in the windows that it likes best; where a fit has bent parameters, also in those that it likes
+    alone (`Start.alone`), and a coolant in the hours between."""
+    starts = _in_windows(seen, h, policy)
+    if alone is None or not (h.when.windows or h.when.bell is not None):
+        return starts
+    same = [o for o in alone[1] if (o.family, o.name, o.batch.kind) == (h.family, h.name, h.batch.kind)]
+    best = max(same, key=lambda o: o.statistic, default=None)
+    more = [between(starts[0]), *([] if best is None else _in_windows(alone[0], best, policy))]
+    known = [s.when.windows for s in starts]
+    return [*starts, *(s for s in more if s is not None and s.when.windows not in known)]
+
+
+def _in_windows(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis]:
     """A hypothesis in the windows that it likes best, and a coolant in the one that cold likes best, too."""
     k = next(i for i, own in enumerate(seen.ready) if own.batch is h.batch)
     block = seen.blocks[k][h.place]
@@ -241,9 +256,9 @@ def _parts(study: Study, name: str) -> set[str]:
     return {spot.part}
 
 
-def _possible(h: Hypothesis) -> bool:
+def _possible(detector: Detector, h: Hypothesis) -> bool:
     """Whether a hypothesis has a size that physics allows."""
-    return h.batch.fixed or h.batch.possible(h.place, h.amplitude[0])
+    return h.batch.fixed or possible(detector, h, h.amplitude[0])
 
 
 def stands(detector: Detector, a: Accepted) -> bool:
@@ -256,7 +271,7 @@ def stands(detector: Detector, a: Accepted) -> bool:
         float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude)
         > detector.policy.stands * a.threshold
         and abs(first) >= detector.policy.stands * batch.smallest
-        and batch.possible(a.hypothesis.place, first)
+        and possible(detector, a.hypothesis, first)
     )
 
 

@@ -144,6 +144,24 @@ def chilled(h: Hypothesis, g: np.ndarray, block: np.ndarray, policy: SearchPolic
     )
 
 
+def between(h: Hypothesis) -> Hypothesis | None:
+    """A coolant that warms in its windows, cold in all other hours instead; None where it does not, or has all hours.
+    Heat in all other hours is as good as cold in its own, and beside free parameters may even lead."""
+    parts = _blocks(h.batch.histories)
+    if not fault_of(h).wets or not h.when.windows or h.amplitude[1] <= 0.0 or not parts:
+        return None
+    found, spans = list[Window](), _spans(parts)
+    for run, end in spans.items():
+        now = min(own.start for own, _ in parts if own.run == run)
+        for w in (*(w for w in h.when.windows if w.run == run), Window(run, end, end)):
+            found += [Window(run, now, w.start)] if w.start > now else []
+            now = w.end
+    if not found:
+        return None
+    when = replace(h.when, weights=_acting(parts, found), windows=tuple(found))
+    return in_windows(replace(h, when=when, amplitude=(h.amplitude[0], -h.amplitude[1])), found, spans)
+
+
 def _plain(h: Hypothesis, g: np.ndarray, block: np.ndarray, sign: int, policy: SearchPolicy) -> Hypothesis | None:
     """A coolant's heat of one sign without its film, in the windows that it likes best; None if it explains nothing."""
     histories = tuple(replace(w, weights=w.weights[1:]) for w in h.batch.histories)

@@ -15,6 +15,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight
+from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.search.accepted import settled
 from twin.diagnose.search.declared import (
     declared_candidates,
@@ -25,7 +26,7 @@ from twin.diagnose.search.declared import (
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.exact import left_less, unbent
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Step, distinct, look, scored
+from twin.diagnose.search.look import Scored, Step, distinct, look, scored
 from twin.diagnose.search.loose import Freed, loose_ones
 
 Glance = tuple[Sight, list[Hypothesis], Step]
@@ -42,6 +43,7 @@ class Start:
     scored: Glance  # all hypotheses
     declared: list[Hypothesis]
     glance: Glance  # with the exact fits of those that are declared
+    alone: Scored | None  # all where nothing else is at work, if the fit has bent parameters
     loose: tuple[Loose, ...]
     freed: Freed
 
@@ -61,6 +63,7 @@ def begun(described: Detector, y: np.ndarray) -> Start:
     known, freed = scored(detector, fitted), Freed()
     first = look(detector, fitted, declared, known)
     straight = _from_description(detector, y, fitted)
+    alone = _alone(detector, y) if straight else None
     glance = _with(straight, declared) if straight else first
     loose = loose_ones(detector, y, fitted, x0, freed)
     if loose or any(h.statistic > detector.thresholds[h.family] for h in glance[1]):  # without, no cause is named
@@ -74,7 +77,7 @@ def begun(described: Detector, y: np.ndarray) -> Start:
             glance = _with((straight[0], _unfitted(straight[1], factors), straight[2]), declared)
         else:
             glance = look(detector, fitted, declared, (known[0], _unfitted(known[1], factors)))
-    return Start(detector, fitted, x0, covariance, first, declared, glance, loose, freed)
+    return Start(detector, fitted, x0, covariance, first, declared, glance, alone, loose, freed)
 
 
 def _from_description(detector: Detector, y: np.ndarray, fitted: Fitted) -> Glance | None:
@@ -88,6 +91,15 @@ def _from_description(detector: Detector, y: np.ndarray, fitted: Fitted) -> Glan
     if not any(h.statistic > detector.thresholds[h.family] for h in own):
         return None
     return seen, own, replace(step, parts={part: evidence - less for part, evidence in step.parts.items()})
+
+
+def _alone(detector: Detector, y: np.ndarray) -> Scored:
+    """Scores at the description where nothing else is at work. A cause that bends parameters overwhelms tolerances and
+    model discrepancy alike: beside those it scores as well in the hours in which it does not act, with parameters that
+    no machine has."""
+    nothing = np.zeros((len(y), 1))
+    bare = replace(detector, columns=detector.columns.beside(nothing))
+    return scored(bare, replace(detector.fitter.at_description(y), projector=Projector.of(nothing)))
 
 
 def _unfitted(scores: Sequence[Hypothesis], fitted: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -16,11 +16,11 @@ from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, readings_columns, settled
+from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, possible, readings_columns, settled
 from twin.diagnose.search.contest import bent
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.detector import ALARM, Detector
 from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, unbent, unexplained
-from twin.diagnose.search.look import Search, look, with_cosines
+from twin.diagnose.search.look import Search, distinct, look, with_cosines
 from twin.diagnose.search.loose import Freed, factors_of, variance_of
 from twin.diagnose.search.refit import refit
 from twin.diagnose.search.start import Start
@@ -75,6 +75,15 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         h for h in family
         if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
     ]  # fmt: skip
+    # nor is a number out of its tolerance for sure where a cause beside which it is not explains more: too little to be
+    # named alone, but more than its family does by chance. What bends scores more than it removes, and is left out
+    known |= {h.name for h, _ in rivals}
+    likely = [
+        h for h in more[: detector.policy.others]
+        if h.name not in known and h.statistic > max(removed + detector.policy.close, _often(detector, h.family))
+        and not bent(detector, h) and not _stays(detector, there, one, h)
+    ]  # fmt: skip
+    near = distinct([*near, *likely])
     rivals += tuple(pair for h in near for pair in with_cosines(detector, before, one.hypothesis, [h]))
     amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
     one = replace(
@@ -86,6 +95,12 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         detector, start.x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
         unexplained(detector, fitted), loose,
     )  # fmt: skip
+
+
+def _often(detector: Detector, family: str) -> float:
+    """The statistic that a family reaches in ALARM of all synthetic measurements."""
+    values = detector.nulls[family]
+    return float(np.quantile(values, 1.0 - ALARM)) if len(values) else 0.0
 
 
 def _explained(detector: Detector, y: np.ndarray, before: Fitted, fitted: Fitted, ranked: Sequence[Hypothesis]) -> bool:
@@ -210,7 +225,7 @@ def _freed(
         known.refitted[h.name] = at, one
     fitted, one = known.refitted[h.name]
     change, sigma = float(one.amplitude[0]), float(np.sqrt(one.covariance[0, 0]))
-    if not sigma > 0.0 or not h.batch.possible(h.place, change):
+    if not sigma > 0.0 or not possible(detector, h, change):
         return None
     # as a logarithm: derivatives at many times a film say little of the film itself
     change, sigma = fault_of(h).log_change(change, sigma)
