@@ -183,6 +183,21 @@ def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
     assert ended([scored]) is None
 
 
+def test_another_cause_at_the_place_of_a_number_is_its_rival_by_what_it_removes(monkeypatch):
+    """Motion that cools a film is more of that film, or less."""
+    _, ranked, ended = relaxed_source()
+    module = sys.modules[closed.__module__]
+    monkeypatch.setattr(module, "misfit", lambda *_: 0.0)
+    monkeypatch.setattr(module, "_stays", lambda *_: False)
+    film = next(h for h in ranked if h.family == "forced_convection")
+    there = replace(film, batch=replace(film.batch, places=("sources.front",) * len(film.batch.places)), statistic=1.0)
+    for removes, told in ((-7.0, False), (-5.0, True)):
+        monkeypatch.setattr(module, "exact", lambda d, y, f, h, removes=removes: replace(h, statistic=removes))
+        found = ended([there])
+        assert found is not None
+        assert ("forced_convection" in [h.family for h, _ in found.accepted[0].rivals]) == told
+
+
 def test_no_more_is_refitted_than_decides(monkeypatch):
     """Each refit takes seconds, and a machine of parts has a hundred joints and windows that score."""
     detector, ranked, ended = relaxed_source()

@@ -76,13 +76,20 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
     ]  # fmt: skip
     # nor is a number out of its tolerance for sure where a cause beside which it is not explains more: too little to be
-    # named alone, but more than its family does by chance. What bends scores more than it removes, and is left out
+    # named alone, but more than its family does by chance. What bends scores more than it removes, and is refitted at
+    # the same place alone: motion that cools a film, or more of that film
     known |= {h.name for h, _ in rivals}
     likely = [
         h for h in more[: detector.policy.others]
         if h.name not in known and h.statistic > max(removed + detector.policy.close, _often(detector, h.family))
         and not bent(detector, h) and not _stays(detector, there, one, h)
     ]  # fmt: skip
+    here = [
+        exact(detector, y, before, h) for h in ranked
+        if h.name == one.hypothesis.name and h.family != one.hypothesis.family and bent(detector, h)
+        and not _stays(detector, there, one, h)
+    ]  # fmt: skip
+    likely += [h for h in here if h.statistic > removed - detector.policy.close]
     near = distinct([*near, *likely])
     rivals += tuple(pair for h in near for pair in with_cosines(detector, before, one.hypothesis, [h]))
     amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
