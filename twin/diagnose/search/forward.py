@@ -25,11 +25,11 @@ from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.exact import beginning, misfit, unexplained
 from twin.diagnose.search.growth import between, chilled, grown
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Scored, Search, Step, distinct, look, with_cosines
+from twin.diagnose.search.look import Search, Step, distinct, look, with_cosines
 from twin.diagnose.search.loose import loose_ones
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
-from twin.diagnose.search.start import Start, afresh, begun
+from twin.diagnose.search.start import Alone, Start, afresh, begun
 from twin.diagnose.search.strained import closed, strained
 
 
@@ -77,11 +77,12 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         passing = _passing(detector, ranked, accepted, refused, limits)
         if not passing or len(accepted) >= policy.causes or fruitless >= policy.tries or imitated:
             break
-        alone = None if accepted else start.alone
-        ahead = sorted((_starts(seen, h, alone, policy) for h in passing), key=lambda starts: -worth(starts[0], policy))
+        ahead = sorted((_starts(seen, h, policy) for h in passing), key=lambda starts: -worth(starts[0], policy))
         rest = exchanged(detector.study, y, accepted)
         named = partial(_named, detector, y, fitted, accepted)
-        compared = tried(detector, rest, fitted, foremost(detector, ahead))
+        alone = None if accepted else start.alone
+        more = [[*starts, *_starts_alone(alone, starts, policy)] for starts in foremost(detector, ahead)]
+        compared = tried(detector, rest, fitted, more)
         proved, others = judged(detector, rest, fitted, compared, named)
         enough = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
         standing = [h for h in enough if _possible(detector, h)]
@@ -172,25 +173,25 @@ def _without(
     return refit(detector, y, fitted.x, left) if left else (detector.fitter(y), left)
 
 
-def _starts(seen: Sight, h: Hypothesis, alone: Scored | None, policy: SearchPolicy) -> list[Hypothesis]:
-    """A hypothesis in the windows that it likes best; where a fit has bent parameters, also in those that it likes
-    alone (`Start.alone`), and a coolant in the hours between."""
-    starts = _in_windows(seen, h, policy)
-    if alone is None or not (h.when.windows or h.when.bell is not None):
-        return starts
-    same = [o for o in alone[1] if (o.family, o.name, o.batch.kind) == (h.family, h.name, h.batch.kind)]
-    best = max(same, key=lambda o: o.statistic, default=None)
-    more = [between(starts[0]), *([] if best is None else _in_windows(alone[0], best, policy))]
-    known = [s.when.windows for s in starts]
-    return [*starts, *(s for s in more if s is not None and s.when.windows not in known)]
-
-
-def _in_windows(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis]:
+def _starts(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis]:
     """A hypothesis in the windows that it likes best, and a coolant in the one that cold likes best, too."""
     k = next(i for i, own in enumerate(seen.ready) if own.batch is h.batch)
     block = seen.blocks[k][h.place]
     cold = chilled(h, seen.g, block, policy)
     return [grown(h, seen.g, block, policy), *([] if cold is None else [cold])]
+
+
+def _starts_alone(alone: Alone | None, starts: Sequence[Hypothesis], policy: SearchPolicy) -> list[Hypothesis]:
+    """Further starts of a hypothesis where a fit has bent parameters: in the windows that it likes best where nothing
+    else is at work, and of a coolant in the hours between."""
+    h = starts[0]
+    if alone is None or not (h.when.windows or h.when.bell is not None):
+        return []
+    seen, best = alone
+    own = best.get((h.family, h.name, h.batch.kind))
+    more = [between(h), *([] if own is None else _starts(seen, own, policy))]
+    known = [s.when.windows for s in starts]
+    return [s for s in more if s is not None and s.when.windows not in known]
 
 
 def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:

@@ -26,10 +26,11 @@ from twin.diagnose.search.declared import (
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.exact import left_less, unbent
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Scored, Step, distinct, look, scored
+from twin.diagnose.search.look import Step, distinct, look, scored
 from twin.diagnose.search.loose import Freed, loose_ones
 
 Glance = tuple[Sight, list[Hypothesis], Step]
+Alone = tuple[Sight, dict[tuple[str, str, str], Hypothesis]]  # the best of every family, place and kind
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Start:
     scored: Glance  # all hypotheses
     declared: list[Hypothesis]
     glance: Glance  # with the exact fits of those that are declared
-    alone: Scored | None  # all where nothing else is at work, if the fit has bent parameters
+    alone: Alone | None  # where nothing else is at work, if the fit has bent parameters
     loose: tuple[Loose, ...]
     freed: Freed
 
@@ -93,13 +94,14 @@ def _from_description(detector: Detector, y: np.ndarray, fitted: Fitted) -> Glan
     return seen, own, replace(step, parts={part: evidence - less for part, evidence in step.parts.items()})
 
 
-def _alone(detector: Detector, y: np.ndarray) -> Scored:
+def _alone(detector: Detector, y: np.ndarray) -> Alone:
     """Scores at the description where nothing else is at work. A cause that bends parameters overwhelms tolerances and
     model discrepancy alike: beside those it scores as well in the hours in which it does not act, with parameters that
     no machine has."""
     nothing = np.zeros((len(y), 1))
     bare = replace(detector, columns=detector.columns.beside(nothing))
-    return scored(bare, replace(detector.fitter.at_description(y), projector=Projector.of(nothing)))
+    seen, found = scored(bare, replace(detector.fitter.at_description(y), projector=Projector.of(nothing)))
+    return seen, {(h.family, h.name, h.batch.kind): h for h in sorted(found, key=lambda h: h.statistic)}
 
 
 def _unfitted(scores: Sequence[Hypothesis], fitted: Sequence[Hypothesis]) -> list[Hypothesis]:
