@@ -54,7 +54,7 @@ class Batch:
     def q(self) -> int:
         return self.histories[0].weights.shape[0]
 
-    def possible(self, place: int, amplitude: float, uncertain: float) -> bool:
+    def possible(self, place: int, amplitude: float, uncertain: float = 0.0) -> bool:
         """Whether a first amplitude at a place, known but for so much, is of the sign and within the range that physics
         allows."""
         return (self.sign == 0 or self.sign * amplitude > 0.0) and (
