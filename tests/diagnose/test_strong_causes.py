@@ -50,6 +50,7 @@ def test_derivatives_beside_a_strong_cause_are_those_of_differences():
         by[:, j] = (more - less) / (2.0 * step)
     by = detector.whiten(by)
     assert strong(detector, h)
+    assert not strong(replace(detector, poor=True), h)  # whose slow errors hold more
     known = detector.whiten(jacobian(detector, x, [(h, np.array(h.amplitude))], closely=True))
     unknown = detector.whiten(jacobian(detector, x, [(h, np.array(h.amplitude))], closely=False))
     off = np.linalg.norm(known - by) / np.linalg.norm(by)

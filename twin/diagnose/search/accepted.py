@@ -93,10 +93,13 @@ def jacobian(
 def strong(detector: Detector, h: Hypothesis) -> bool:
     """Whether an error of a twentieth of the response to a cause would pass for another cause. Of the response as it
     is: calibration may imitate nearly all of it, and does not imitate the error. Not where the cause has the place of a
-    parameter, beside whose change the surrogate knows what others do. A source that is elsewhere is strong whatever its
-    size: the surrogate knows what its number does where the source is not."""
+    parameter, beside whose change the surrogate knows what others do, nor in a poor model, whose slow errors hold more.
+    A source that is elsewhere is strong whatever its size: the surrogate knows what its number does where the source is
+    not."""
     if not units_of(detector.study, h) or freed(detector.study, h):
         return False
+    if detector.poor:
+        return fault_of(h).elsewhere
     response = readings_columns(detector, h) @ np.array(h.amplitude)
     limit = min(detector.thresholds.values())
     return fault_of(h).elsewhere or detector.policy.misfit * float(response @ response) > limit
