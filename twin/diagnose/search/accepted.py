@@ -60,8 +60,10 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
 
 
 def possible(detector: Detector, h: Hypothesis, amplitude: float) -> bool:
-    """Whether physics allows a first amplitude of a hypothesis, within what the form of the model may have wrong."""
-    return h.batch.possible(h.place, amplitude, detector.policy.sure * fault_of(h).uncertain(abs(amplitude)))
+    """Whether physics allows a first amplitude of a hypothesis, within what the form of the model may have wrong; that
+    of a known size always."""
+    uncertain = detector.policy.sure * fault_of(h).uncertain(abs(amplitude))
+    return h.batch.fixed or h.batch.possible(h.place, amplitude, uncertain)
 
 
 def jacobian(

@@ -76,8 +76,9 @@ def exact(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis, pass
 
 
 def closer(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
-    """A hypothesis that has been compared, where it is strong: from there on with derivatives of the exact model beside
-    it, and by what the parameters that are reached leave. Unchanged where that explains no more.
+    """A hypothesis that has been compared, where it is strong: once its edges have been tried nearby, with derivatives
+    of the exact model beside it, and by what the parameters that are reached leave. Unchanged where that explains no
+    more.
 
     Every step otherwise counts what the most likely parameters of the linear model would leave: far from the minimum
     even a wrong linear model explains nearly all, and one of several strong causes leads by that alone.

@@ -85,7 +85,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         compared = tried(detector, rest, fitted, more)
         proved, others = judged(detector, rest, fitted, compared, named)
         enough = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
-        standing = [h for h in enough if _possible(detector, h)]
+        standing = [h for h in enough if possible(detector, h, h.amplitude[0])]
         if not any(proof(detector, h) > limits[h.family] for h in standing):
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
@@ -255,11 +255,6 @@ def _parts(study: Study, name: str) -> set[str]:
     if spot.of is Of.FILM:
         return {Spot.read(p.name).part for p in study.probed.places if p.film == spot.name}
     return {spot.part}
-
-
-def _possible(detector: Detector, h: Hypothesis) -> bool:
-    """Whether a hypothesis has a size that physics allows."""
-    return h.batch.fixed or possible(detector, h, h.amplitude[0])
 
 
 def stands(detector: Detector, a: Accepted) -> bool:
