@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import partial
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -15,8 +18,10 @@ from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.elements import elements_of
 from twin.diagnose.faults.fault import Unit
 from twin.diagnose.faults.table import OF_KIND
+from twin.diagnose.model import integration
 from twin.diagnose.model.bank import nominal_run
-from twin.diagnose.model.integration import loads_for, stands_still, states_of
+from twin.diagnose.model.integration import stands_still, states_of
+from twin.diagnose.model.probed_loads import loads_for
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.slots import first_slots, no_slots
 from twin.diagnose.model.study import Study, make_study
@@ -94,6 +99,32 @@ def test_joints_that_stand_still_need_no_term_in_every_step():
     )  # fmt: skip
     assert np.ptp(still) > 1.0
     np.testing.assert_allclose(still, moving, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.long
+def test_derivatives_made_in_blocks_of_steps_are_the_same(monkeypatch):
+    """As those of a machine whose terms a processor keeps; 72 steps are four blocks and a half."""
+    study = small_case.study()
+    probed, planned = study.probed, study.runs[0]
+    slots = first_slots(slots_with(study, small_case.elements(), units(KINDS, study), 0), 4)
+    x = 0.3 * np.random.default_rng(4).standard_normal(len(probed.parameters))
+    v = jnp.concatenate([x * study.scale, jnp.array([5.0, 2.0, 3000.0, 0.3])])
+    loads = jax.tree.map(lambda own: own[:72], planned.run.loads)
+    short = {f.name: getattr(slots, f.name)[:72] for f in fields(slots) if len(getattr(slots, f.name)) > 72}
+    slots = replace(slots, **short)
+
+    def derivatives(in_cache):
+        monkeypatch.setattr(integration, "IN_CACHE", in_cache)
+        states = partial(integration.trajectory, probed.layout, probed.contacts, True, False, probed.ports_first,
+                         study.effects, loads, slots, planned.z0)  # fmt: skip
+        return jax.jit(lambda v: (states(v), jax.jacfwd(states)(v)))(v)
+
+    (z, D), (by_blocks, D_by_blocks) = derivatives(1e9), derivatives(0.0)
+    assert np.ptp(z) > 1.0
+    np.testing.assert_allclose(by_blocks, z, rtol=1e-11, atol=1e-11)
+    size = np.abs(D).max(axis=(0, 1))
+    assert (size > 0.0).sum() >= 30
+    assert (np.abs(D_by_blocks - D).max(axis=(0, 1)) <= 1e-10 * size).all()
 
 
 @pytest.mark.long

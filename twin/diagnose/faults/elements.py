@@ -27,7 +27,7 @@ from twin.build.places import beside
 from twin.diagnose.evidence.film_laws import SPEEDS
 from twin.diagnose.evidence.nulls import convection
 from twin.diagnose.model.bank import Column, Nominal
-from twin.diagnose.model.integration import gammas
+from twin.diagnose.model.probed_loads import gammas
 from twin.diagnose.model.study import Study, own_place
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place

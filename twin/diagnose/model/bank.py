@@ -17,7 +17,7 @@ import jax
 import numpy as np
 import scipy.linalg
 
-from twin.diagnose.model.integration import gammas
+from twin.diagnose.model.probed_loads import gammas
 from twin.diagnose.model.study import Study
 from twin.rom.step_loads import Tabulated, film_loads
 from twin.rom.tableau import SDIRK2, stages

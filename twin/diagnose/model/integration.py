@@ -12,9 +12,9 @@ differentiated like a parameter:
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import repeat
 
 import twin.run.jax_setup  # noqa: F401  isort: skip
 
@@ -22,100 +22,35 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jax.scipy.linalg import cho_solve
 
 from twin.calibrate.fit.effects import Effects, Factors, factors_at
 from twin.calibrate.fit.integration import Rows, displacements, temperatures
 from twin.diagnose.model.ports_first import PortsFirst, packed, unpacked, within
+from twin.diagnose.model.probed_loads import ProbedLoads
 from twin.diagnose.model.slots import Slots
-from twin.rom.contact_matrix import ContactEntries, ContactPlaces, dense, entries_by_contact, product, scaled
-from twin.rom.drive import Drive
-from twin.rom.model import MachineModel
+from twin.diagnose.model.solve import Fixed, by_factor, change_of, products_of
+from twin.rom.contact_matrix import ContactPlaces, dense, scaled
 from twin.rom.step_loads import Tabulated, film_loads, source_powers
 from twin.rom.tableau import SDIRK2
 from twin.run.integrator import integrate, solved
 from twin.run.system import Array, Layout
 
+BLOCK = 16  # steps whose factors are kept at once
+IN_CACHE = 1e6  # bytes that a processor reads again in no time: terms of more are read once per block
 LITTLE = 0.5  # K, of a surface above its air: the room's own draught is left below it
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class ProbedLoads:
-    """A run of n steps."""
+class _Known:
+    """A step that has been made, for its derivatives."""
 
-    rate: Array  # (n,) 1/s
-    theta: Array  # (n, n_theta) W/(m^2 K): convection of films that read the log alone, then joints
-    film_table: Array  # (n, k, 65) W/(m^2 K) over DIFFERENCES
-    contacts: ContactEntries  # each contact on its own
-    environment: Array  # (n, n_environments) degC
-    position: Array  # (n, axes) m, means
-    power: Array  # (n, n_sources) W
-    power_table: Array  # (n, l, 121) W over TEMPERATURES
-    contact_heat: Array  # (n, s, r) W, projected
-    usual: Array  # (n, n_films) K: the rise at which films of another exponent have the described coefficient
-    wind: Array  # (n, n_films) d ln h / dw, of the relative speed that films' laws read
-    wind_exponent: Array  # (n, n_films) d ln h / dm
-
-
-def loads_for(model: MachineModel, drive: Drive) -> ProbedLoads:
-    """The loads of a run, for a model of one body."""
-    (body,) = model.bodies
-    return ProbedLoads(
-        rate=np.full(drive.n_steps, 1.0 / (drive.time[1] - drive.time[0])),
-        theta=drive.theta,
-        film_table=drive.films.value,
-        contacts=entries_by_contact(model.load_model, drive),
-        environment=drive.environment,
-        position=drive.mean_position,
-        power=drive.power,
-        power_table=drive.losses.value,
-        contact_heat=drive.contact_heat @ body.P.T,
-        usual=np.ones((drive.n_steps, len(model.load_model.films))),
-        wind=np.zeros((drive.n_steps, len(model.load_model.films))),
-        wind_exponent=np.zeros((drive.n_steps, len(model.load_model.films))),
-    )
-
-
-def gammas(places: ContactPlaces, loads: ProbedLoads, contact: np.ndarray) -> np.ndarray:
-    """Gamma (n, n_ports, n_ports) W/K of all steps of a run, with the contacts scaled by contact (c,)."""
-    if not places.n_ports:
-        return np.zeros((len(loads.rate), 0, 0))
-    return np.asarray(
-        jax.jit(jax.vmap(lambda one: dense(jnp, places, scaled(jnp, places, one, contact))))(loads.contacts)
-    )
+    factor: jax.Array  # (r, r) Cholesky factor of its matrix
+    solutions: tuple[jax.Array, jax.Array]  # (q + n_contacts, r) `products_of` its two stages
+    bases: tuple[jax.Array, ...]  # (c, r) of the terms of E with what each of the stages begins at
 
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class _Fixed:
-    """What derivatives of a solve take as it is."""
-
-    factor: jax.Array  # (r, r) Cholesky factor of S = c + P Gamma P^T
-    terms: jax.Array  # (q, r, r), many: c is their combination
-    contacts: ContactEntries
-    P: jax.Array  # (r, n_ports)
-
-
-def _by_factor(fixed: _Fixed, right: jax.Array, near: jax.Array) -> jax.Array:
-    return jnp.asarray(cho_solve((fixed.factor, True), right))
-
-
-def _change(places: ContactPlaces, many: bool) -> Callable[[_Fixed, tuple[jax.Array, jax.Array], jax.Array], jax.Array]:
-    """S' x by c, (r, r) or (q,) of the terms, and by the contacts' factors.
-
-    Few derivatives: a matrix dc for each, made once. Many: the products of terms with the solution, which they share.
-    The other way about, either takes several times as long.
-    """
-
-    def change(fixed: _Fixed, d: tuple[jax.Array, jax.Array], x: jax.Array) -> jax.Array:
-        dc, dcontact = d
-        flow = product(jnp, places, scaled(jnp, places, fixed.contacts, dcontact), (fixed.P.T @ x)[:, None])[:, 0]
-        return (dc @ (fixed.terms @ x) if many else dc @ x) + fixed.P @ flow
-
-    return change
-
-
 @dataclass(frozen=True)
 class Operators:
     """What stays during a trajectory, in the coordinates of `twin.diagnose.model.ports_first`; t = r (r + 1) / 2."""
@@ -153,10 +88,10 @@ class Operators:
 
 
 def _step(
-    layout: Layout, places: ContactPlaces, many: bool, still: bool, machine: PortsFirst, f: Factors, a: jax.Array,
-    fixed: Operators, z: jax.Array, now: tuple[ProbedLoads, Slots],
-) -> tuple[jax.Array, jax.Array]:  # fmt: skip
-    """The state (r,) after a step, twice."""
+    layout: Layout, places: ContactPlaces, still: bool, machine: PortsFirst, f: Factors, a: jax.Array,
+    fixed: Operators, z: jax.Array, now: tuple[ProbedLoads, Slots], known: _Known | None = None,
+) -> tuple[jax.Array, jax.Array, jax.Array]:  # fmt: skip
+    """The state (r,) after a step, that at its first stage, and the factor (r, r) of its matrix."""
     loads, slots = now
     system = machine.system
     n, T_ref = layout.n_films, system.reference_temperature
@@ -178,17 +113,11 @@ def _step(
     gate = a * jnp.asarray(slots.gate)
     nominal = jnp.asarray(system.nominal)
     coefficients = jnp.concatenate([films.total - nominal[:n], joints - nominal[n:], gate])
+    many = len(fixed.terms) > 0
     moving = jnp.concatenate([coefficients[:n], gate]) if still else coefficients
     total = rate * fixed.packed_E + fixed.still + (lax.stop_gradient(moving) if many else moving) @ fixed.A
     matrix = unpacked(total, len(z))
     c = jnp.concatenate([coefficients, rate * fixed.factors]) if many else matrix
-
-    def capacity(x: jax.Array) -> jax.Array:
-        if not many:
-            return rate * (fixed.E @ x)
-        change = fixed.factors - lax.stop_gradient(fixed.factors)
-        own = fixed.terms[len(coefficients) :]
-        return rate * (fixed.E @ x + change @ (own @ lax.stop_gradient(x)))
 
     told = Tabulated(
         jnp.asarray(loads.power) * f.source, layout.following_losses,
@@ -199,18 +128,75 @@ def _step(
     forcing = system.M @ (films.total * (films.outer - T_ref)) + system.H @ films.lift.ravel()
     forcing = forcing + fixed.B @ power + ports
     forcing = forcing + (gate * jnp.asarray(slots.rise)) @ fixed.M + a @ jnp.asarray(slots.forcing)
-    gamma = dense(jnp, places, scaled(jnp, places, loads.contacts, lax.stop_gradient(contact)))
-    coupled = machine.ports.joined(lax.stop_gradient(matrix), gamma)
-    factor = lax.linalg.cholesky(coupled, symmetrize_input=False)  # it reads the lower triangle
-    known = _Fixed(factor, fixed.terms, loads.contacts, P)
-    change = _change(places, many)
+    if known is None:
+        gamma = dense(jnp, places, scaled(jnp, places, loads.contacts, lax.stop_gradient(contact)))
+        coupled = machine.ports.joined(lax.stop_gradient(matrix), gamma)
+        factor = lax.linalg.cholesky(coupled, symmetrize_input=False)  # it reads the lower triangle
+    else:
+        factor = known.factor
+    # asked for in the order of the stages
+    solutions = repeat(None) if known is None else iter(known.solutions)
+    bases = repeat(None) if known is None else iter(known.bases)
+
+    def capacity(x: jax.Array) -> jax.Array:
+        products = next(bases)
+        if not many:
+            return rate * (fixed.E @ x)
+        products = fixed.terms[len(coefficients) :] @ lax.stop_gradient(x) if products is None else products
+        return rate * (fixed.E @ x + (fixed.factors - lax.stop_gradient(fixed.factors)) @ products)
 
     def solve(right: jax.Array, near: jax.Array) -> tuple[jax.Array, jax.Array]:
-        y = solved(_by_factor, change, known, (c, contact), right, near)
+        own = Fixed(factor, fixed.terms, next(solutions), loads.contacts, P)
+        y = solved(by_factor, partial(change_of, places), own, (c, contact), right, near)
         return y, y
 
-    after, *_ = integrate(SDIRK2, 1, solve, capacity, z, jnp.asarray(forcing))
-    return after, after
+    after, mean, *_ = integrate(SDIRK2, 1, solve, capacity, z, jnp.asarray(forcing))
+    first = (mean - SDIRK2.weights[1] * after) / SDIRK2.weights[0]
+    return after, first, factor
+
+
+def _in_blocks(
+    layout: Layout, places: ContactPlaces, still: bool, machine: PortsFirst, f: Factors, a: jax.Array,
+    fixed: Operators, z: jax.Array, now: tuple[ProbedLoads, Slots],
+) -> jax.Array:  # fmt: skip
+    """States (n, r) after all steps from z (r,), for many derivatives. Block by block the steps are made first, then
+    the products of all terms with their stages, one product of matrices each, then the steps again with derivatives.
+
+    Products with one state at a time read all terms in every stage: at 221 states and 70 terms that took half of the
+    time of 82 derivatives. All steps at once would keep a factor of each.
+    """
+    n, r = len(now[0].rate), len(z)
+    count = -(-n // BLOCK)
+    share = SDIRK2.rows[1][0] / SDIRK2.diagonal
+    of_E = fixed.terms[len(fixed.terms) - len(fixed.factors) :]
+    step = partial(_step, layout, places, still, machine)
+    make = partial(step, *lax.stop_gradient((f, a, replace(fixed, terms=fixed.terms[:0]))))
+
+    def blocks(x: Array) -> jax.Array:
+        beyond = jnp.repeat(jnp.asarray(x)[-1:], count * BLOCK - n, axis=0)
+        return jnp.concatenate([jnp.asarray(x), beyond]).reshape(count, BLOCK, *beyond.shape[1:])
+
+    products = jax.vmap(partial(products_of, places, fixed.terms, jnp.asarray(machine.system.P[0])))
+
+    def made(z: jax.Array, now: tuple[ProbedLoads, Slots]) -> tuple[jax.Array, tuple[jax.Array, ...]]:
+        every = make(z, now)
+        return every[0], every
+
+    def again(z: jax.Array, now: tuple[tuple[ProbedLoads, Slots], _Known]) -> tuple[jax.Array, jax.Array]:
+        z, *_ = step(f, a, fixed, z, *now)
+        return z, z
+
+    def block(z: jax.Array, own: tuple[ProbedLoads, Slots]) -> tuple[jax.Array, jax.Array]:
+        begin = lax.stop_gradient(z)
+        _, (after, first, factor) = lax.scan(made, begin, lax.stop_gradient(own))
+        before = jnp.concatenate([begin[None], after[:-1]])
+        bases = before, before + share * (first - before)
+        solutions = products(own[0].contacts, first), products(own[0].contacts, after)
+        known = _Known(factor, solutions, tuple(jax.vmap(lambda x: of_E @ x)(x) for x in bases))
+        return lax.scan(again, z, (own, known))
+
+    _, states = lax.scan(block, z, jax.tree.map(blocks, now))
+    return states.reshape(-1, r)[:n]
 
 
 def trajectory(
@@ -236,8 +222,16 @@ def trajectory(
         slots, A=unused, M=unused, E=unused, B=unused, reads=unused, initial=unused,
         forcing=jnp.asarray(slots.forcing) @ T,
     )  # fmt: skip
-    one = partial(_step, layout, places, many, still, machine, f, a, fixed)
-    _, states = lax.scan(one, jnp.linalg.solve(T, z0), (loads, steps))
+    begun = jnp.linalg.solve(T, z0)
+    if fixed.terms.nbytes > IN_CACHE:
+        states = _in_blocks(layout, places, still, machine, f, a, fixed, begun, (loads, steps))
+    else:
+
+        def one(z: jax.Array, now: tuple[ProbedLoads, Slots]) -> tuple[jax.Array, jax.Array]:
+            z, *_ = _step(layout, places, still, machine, f, a, fixed, z, now)
+            return z, z
+
+        _, states = lax.scan(one, begun, (loads, steps))
     return jnp.concatenate([z0[None], states @ T.T])
 
 

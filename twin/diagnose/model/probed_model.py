@@ -18,8 +18,8 @@ from twin.build.places import DISPLACED, Place, pruned
 from twin.calibrate.fit.measured import tcp_positions
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
-from twin.diagnose.model.integration import ProbedLoads, loads_for
 from twin.diagnose.model.ports_first import PortsFirst
+from twin.diagnose.model.probed_loads import ProbedLoads, loads_for
 from twin.diagnose.model.rich_probed_model import Mesh, RichProbedModel, rich_probed_model
 from twin.errors import LogError
 from twin.logs.run import Run

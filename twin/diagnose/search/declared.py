@@ -19,7 +19,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.faults.fault import Fault
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.model.integration import loads_for
+from twin.diagnose.model.probed_loads import loads_for
 from twin.diagnose.model.study import Planned, Study
 from twin.diagnose.model.surrogate import jacobian_of
 from twin.diagnose.search.accepted import as_scored, exchanged, outputs_with, parameter_of
