@@ -199,14 +199,11 @@ def _in_blocks(
     return states.reshape(-1, r)[:n]
 
 
-def trajectory(
+def _turned(
     layout: Layout, places: ContactPlaces, many: bool, still: bool, machine: PortsFirst, effects: Effects,
     loads: ProbedLoads, slots: Slots, start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
-    """States (n + 1, r) from start (r,); v: parameters u of the machine, then amplitudes a (K,) of all slots.
-
-    still: joints conduct alike in all steps (`stands_still`), which takes their terms out of every step.
-    """
+    """What `trajectory` returns, in the coordinates of the ports."""
     n = effects.source.shape[1]
     v = jnp.asarray(v)
     u, a = v[:n], v[n:]
@@ -232,7 +229,18 @@ def trajectory(
             return z, z
 
         _, states = lax.scan(one, begun, (loads, steps))
-    return jnp.concatenate([z0[None], states @ T.T])
+    return jnp.concatenate([begun[None], states])
+
+
+def trajectory(
+    layout: Layout, places: ContactPlaces, many: bool, still: bool, machine: PortsFirst, effects: Effects,
+    loads: ProbedLoads, slots: Slots, start: Array, v: Array,
+) -> jax.Array:  # fmt: skip
+    """States (n + 1, r) from start (r,); v: parameters u of the machine, then amplitudes a (K,) of all slots.
+
+    still: joints conduct alike in all steps (`stands_still`), which takes their terms out of every step.
+    """
+    return _turned(layout, places, many, still, machine, effects, loads, slots, start, v) @ machine.ports.T.T
 
 
 def stands_still(layout: Layout, loads: ProbedLoads, slots: Slots) -> bool:
@@ -246,10 +254,13 @@ def outputs_of(
     effects: Effects, loads: ProbedLoads, slots: Slots, rows: Rows, bins: tuple[Array, Array], start: Array, v: Array,
 ) -> jax.Array:  # fmt: skip
     """Means of sensors over bins (b s,) [degC], then TCP rows (k 3,) [m]."""
-    states = trajectory(layout, places, many, still, machine, effects, loads, slots, start, v)
+    states = _turned(layout, places, many, still, machine, effects, loads, slots, start, v)
     mean_of, column = bins
     T = jnp.asarray(mean_of) @ temperatures(machine.system, states)[:, column]
-    w = displacements(effects, rows, states, jnp.asarray(v))
+    # what reads them is turned, not the states with their derivatives
+    turn = machine.ports.T
+    rows = replace(rows, row=rows.row @ turn, member_row=rows.member_row @ turn)
+    w = displacements(replace(effects, mean=effects.mean @ turn), rows, states, jnp.asarray(v))
     return jnp.concatenate([T.ravel(), (w - w[0] if from_first else w).ravel()])
 
 

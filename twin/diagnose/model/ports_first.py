@@ -81,6 +81,7 @@ def turned(system: System, T: np.ndarray) -> System:
         system, A0=(within(T, np.asarray(system.A0[0])),), A=(within(T, np.asarray(system.A[0])),), P=(P,),
         M=T.T @ np.asarray(system.M), H=T.T @ np.asarray(system.H), B=T.T @ np.asarray(system.B),
         source_rows=np.asarray(system.source_rows) @ T, film_rows=np.asarray(system.film_rows) @ T,
+        C=np.asarray(system.C) @ T,
     )  # fmt: skip
 
 
