@@ -27,6 +27,7 @@ from twin.diagnose.faults.table import FAMILIES
 from twin.diagnose.model.probed_model import ProbedModel, drive_arrays, make_probed_model
 from twin.diagnose.model.study import make_study
 from twin.diagnose.model.surrogate import Surrogate
+from twin.diagnose.model.time_step import time_step
 from twin.diagnose.plan.plan import make_plan
 from twin.diagnose.plan.suspicion import known_family, named, pairs_of, suspicions_in, worst_of_machine
 from twin.diagnose.report.scene import scene_of
@@ -112,6 +113,8 @@ def prepare(
     known = parameters(machine)
     every = [*runs, *sealed]
     probed = make_probed_model(machine, known, every, progress)
+    if (step := time_step(machine, probed, every)) != probed.runs[0].step:
+        probed = make_probed_model(machine, known, every, progress, step=step)
     plans = [measured(probed.base, run, own.drive, own.name, exclude=settings.exclude)
              for run, own in zip(every, probed.runs, strict=True)]  # fmt: skip
     closed = [*plans[: len(runs)], *(_closed(m) for m in plans[len(runs) :])]

@@ -79,7 +79,8 @@ def differences(
     # elements err about each sensor by itself: refined at once, a bearing in a coarse box would hide the castings
     apart = np.zeros(len(J), dtype=int) if machine.lumped else np.unique(channel_of(study), return_inverse=True)[1]
 
-    known = _Known(tuple(parameters), tuple(runs), tuple(plans), tuple(study.fitted), machine.lumped)
+    step = study.runs[0].run.step
+    known = _Known(tuple(parameters), tuple(runs), tuple(plans), tuple(study.fitted), machine.lumped, step)
     found, every = [], list(_others(machine))
     with progress("other discretisations", sum(map(len, every))) as advance:
         # two windows made alike are off alike
@@ -111,10 +112,13 @@ class _Known:
     plans: tuple[Measured, ...]
     fitted: tuple[int, ...]
     lumped: bool
+    step: float  # s
 
     def study(self, other: _Other) -> Study:
         acting = [_acting(p, other.machine) for p in self.parameters]
-        probed = make_probed_model(other.machine, acting, self.runs, silent, other.mesh, not self.lumped)
+        probed = make_probed_model(
+            other.machine, acting, self.runs, silent, other.mesh, not self.lumped, step=self.step
+        )
         return make_study(probed, self.plans, self.fitted)
 
 

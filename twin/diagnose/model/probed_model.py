@@ -49,7 +49,7 @@ class ProbedRun:
     """A run without its measurements."""
 
     name: str
-    drive: Drive  # of the description, steps of STEP
+    drive: Drive  # of the description
     signals: dict[str, np.ndarray]  # (n_steps,) means over the drive's steps, currents as rms, SI
     start: float  # degC
     stated_start: bool
@@ -108,9 +108,9 @@ def drive_arrays(drive: Drive) -> tuple[np.ndarray, ...]:
 
 def make_probed_model(
     machine: Machine, parameters: Sequence[Parameter], runs: Sequence[Run], progress: Progress = silent,
-    mesh: Mesh = Mesh.DESCRIBED, nominal_alone: bool = False,
+    mesh: Mesh = Mesh.DESCRIBED, nominal_alone: bool = False, step: float = STEP,
 ) -> ProbedModel:  # fmt: skip
-    """The probed model of a machine and the loads of runs, cached by both; mesh: of which elements it is.
+    """The probed model of a machine and the loads of runs, cached by both; mesh: of which elements it is; step [s].
 
     nominal_alone: it knows these runs at nominal values, and nothing of other values and of heat at places.
     """
@@ -119,7 +119,7 @@ def make_probed_model(
     base = pruned(rich.rich)
     load = base.load_model
     names = run_names(runs)
-    drives = [drive_of(base, run) for run in runs]
+    drives = [drive_of(base, run, step) for run in runs]
     starts = [
         run.initial_temperature if run.initial_temperature is not None
         else float(measured_air(load, drive)[0, load.surroundings])

@@ -74,7 +74,7 @@ def foreseen(
     n = len(runs)
     described = [p for p in today.probed.parameters if p.kind not in OF_LAWS]
     every = [*runs, *(e.run for e in experiments)]
-    probed = make_probed_model(machine, described, every, progress)
+    probed = make_probed_model(machine, described, every, progress, step=today.runs[0].run.step)
     probed = _with_sensors(probed, list(dict.fromkeys(p for e in experiments for p in e.places)))
     plans = [
         measured(probed.base, run, own.drive, own.name, exclude=_left_out(today, run))

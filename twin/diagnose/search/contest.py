@@ -19,7 +19,7 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import edges_of, longer, shorter, without_one
-from twin.diagnose.search.exact import bends, by_chance, closer, exact, misfit, reached
+from twin.diagnose.search.exact import bends, by_chance, closer, edges_tried, exact, misfit, reached
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
@@ -141,7 +141,8 @@ def _in_other_windows(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypo
     worthy = partial(worth, policy=policy)
     while True:
         starts = [s for s in (longer(study, detector.elements, h), *without_one(study, h)) if s is not h]
-        starts += shorter(study, h) if bends(fitted.x, policy) else []
+        if bends(fitted.x, policy):
+            starts += [*shorter(study, h), edges_tried(detector, y, fitted, h)]
         tried_ones = (exact(detector, y, fitted, s, policy.trial) for s in starts)
         best = max(tried_ones, key=worthy, default=h)
         if worthy(best) <= worthy(h):

@@ -85,14 +85,14 @@ def closer(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> 
     """
     if fault_of(h).curved or not strong(detector, h):
         return h
-    begun = _edges_tried(detector, y, fitted, h)
+    begun = edges_tried(detector, y, fitted, h)
     return max(h, reached(detector, y, fitted, begun), key=lambda own: own.statistic)
 
 
-def _edges_tried(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
-    """A hypothesis with its edges, one after the other, where they explain most some quarters of an hour earlier or
-    later, at its size, also where they begin or end with a run. What an edge does at a light part is over within
-    minutes, and derivatives see none farther off."""
+def edges_tried(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
+    """A refitted hypothesis with its edges, one after the other, where they explain most some quarters of an hour
+    earlier or later, at its size, also where they begin or end with a run. What an edge does at a light part is over
+    within minutes, and derivatives see none farther off."""
     study, policy = detector.study, detector.policy
     whole = [Edge(what, i) for i in range(len(h.when.windows)) for what in ("begin", "end")]
     edges = whole if h.when.bell is None else edges_of(study, h)
