@@ -73,6 +73,24 @@ def heat(place: str, watts: float) -> np.ndarray:
     return watts * small_case.responses()[:, columns].astype(float).sum(axis=1)
 
 
+@pytest.mark.parametrize("swapped", [False, True])
+def test_two_channels_have_each_others_names_where_the_model_leaves_less_of_them_exchanged(swapped: bool):
+    runs, _ = as_measured(0.0)
+    a, b = small_case.study().runs[0].measured.sensors[:2]
+    if swapped:
+        tables = [(run, run.temperatures.columns) for run in runs]
+        runs = [
+            replace(run, temperatures=replace(run.temperatures, columns=own | {a: own[b], b: own[a]}))
+            for run, own in tables
+        ]
+    end = float(runs[1].temperatures.time[-1])
+    told = Finding("swapped", (a, b), (0, 1), -1.0, end, np.nan, (np.nan, np.nan), 80.0, 50.0)
+    judgement = Judgement((told,), (), ())
+    plans = plans_of([*set_aside(runs, judgement.findings), *small_case.runs()[2:]])
+    kept = upheld(emptied(small_case.made_detector(), plans), plans, runs, judgement)
+    assert kept.findings == ((told,) if swapped else ())
+
+
 @pytest.mark.parametrize(
     ("log", "sensor", "watts", "stands"),
     [

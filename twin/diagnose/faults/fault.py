@@ -133,6 +133,7 @@ class Fault:
     lasts: bool = False  # of a reading: goes on in runs that were not looked at
     everywhere: bool = False  # of no one place: it may switch as often as the weather
     elsewhere: bool = False  # all of a source's heat at another place, compared with the description
+    replaces: bool = False  # a law of another shape: what its source emits as described has no tolerance beside it
     partner: str = ""  # what the second of the two names of its place is called in settings
 
     @property

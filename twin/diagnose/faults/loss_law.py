@@ -18,7 +18,7 @@ GAIN = Fault(
     "loss_law", "gain", "1", least=0.15, own=0.1, curve=Curve.LOGARITHM, parameter=True, read=True,
     largest=float(np.log(5.0)),  # friction of a bearing with preload and lubricant
 )  # fmt: skip
-SHAPE = Fault("loss_law", "source", "W", "sources.", least=1.0)
+SHAPE = Fault("loss_law", "source", "W", "sources.", least=1.0, replaces=True)
 FAULTS = (GAIN, SHAPE)
 
 
@@ -35,7 +35,7 @@ def is_source(parameter: Parameter) -> bool:
 
 
 def edit(cause: Cause, study: Study) -> Effect:
-    """A shape of its own is the described source and more."""
+    """A shape of its own is beside what calibration leaves of the described source."""
     effect = as_found(cause, study)
     return replace(effect, settings={**effect.settings, "gain": 1.0}) if cause.signal else effect
 

@@ -59,6 +59,12 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
     return [] if j is None else [j]
 
 
+def loosened(study: Study, accepted: Sequence[Accepted]) -> list[int]:
+    """The parameters without a tolerance beside causes: of sources that emit by a law of another shape."""
+    replaced = [a.hypothesis.name for a in accepted if fault_of(a.hypothesis).replaces]
+    return [j for name in replaced if (j := parameter_of(study, name)) is not None]
+
+
 def possible(detector: Detector, h: Hypothesis, amplitude: float) -> bool:
     """Whether physics allows a first amplitude of a hypothesis, within what the form of the model may have wrong; that
     of a known size always."""
@@ -265,4 +271,4 @@ def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> 
             read += read_change(detector, a.hypothesis, a.amplitude, there)
         return detector.whiten(y - outputs_with(detector, accepted, there)) - read
 
-    return settle(detector.fitter, outputs, left)
+    return settle(detector.fitter, outputs, left, loosened(study, accepted))

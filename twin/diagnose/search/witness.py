@@ -5,7 +5,7 @@ run looks like that of a sensor that drifts, and so does the air's, which falls 
 are inputs of the model. A finding is kept where the model, calibrated to the readings as they are, leaves as much as a
 faulty sensor must explain; of a sensor in the air, where other temperatures of the machine say that the air was another
 one. Of readings that were taken out no response is known: what the model predicts there must be nearer to the readings
-less the fault than to the readings.
+less the fault than to the readings. Two channels are swapped where the model leaves less of them exchanged.
 """
 
 from __future__ import annotations
@@ -62,6 +62,12 @@ def other_measurements(
 def _stands(
     detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], findings: Sequence[Finding], f: Finding
 ) -> bool:
+    others = [g for g in findings if g is not f]
+    if f.what == "swapped":
+        exchanged, as_read = (
+            _left(_with_readings(detector, plans, set_aside(runs, own))) for own in (findings, others)
+        )
+        return exchanged < as_read
     threshold = detector.thresholds.get(FAMILY)
     if threshold is None or not f.sized or not np.isfinite(f.statistic):
         return True
@@ -69,13 +75,20 @@ def _stands(
     air = dict(base.ambient_sensors).get(f.channels[0])
     if air is not None:
         return _air_stands(detector, plans, runs, f, air, threshold)
-    fitter = _with_readings(detector, plans, set_aside(runs, [g for g in findings if g is not f]))
+    fitter = _with_readings(detector, plans, set_aside(runs, others))
     D = fitter.whiten(_column(fitter.study, f))
     if not D.any():
         return f.channels[0] not in base.sensors or _nearer_corrected(detector, plans, runs, f)
     fitted = fitter(measured_of(fitter.study))
     seen = fitted.projector(D)
     return float(seen @ fitter.whiten(fitted.residual)) ** 2 > threshold * float(seen @ D)
+
+
+def _left(fitter: Fitter) -> float:
+    """The misfit of its measurements to the calibrated model."""
+    fitted = fitter(measured_of(fitter.study))
+    white = fitter.whiten(fitted.residual)
+    return float(white @ fitted.projector(white))
 
 
 def _nearer_corrected(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], f: Finding) -> bool:
