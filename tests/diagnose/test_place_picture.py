@@ -15,6 +15,7 @@ from tests.support.descriptions import SLIDE
 from twin.build.places import Place
 from twin.diagnose.report.place import channels_told, place_html, place_picture
 from twin.diagnose.report.scene import scene_of
+from twin.diagnose.search.accepted import parameter_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.support import shared, support_of
 from twin.machine.load import load_machine
@@ -47,6 +48,20 @@ def test_one_channel_carries_a_sensor_at_fault_and_several_carry_heat():
     assert several.participation > 1.1 * alone.participation
     assert sum(share for _, share in several.shares) == pytest.approx(1.0)
     assert {name for name, _ in several.shares} == {"front", "housing", "screw_middle", "dx", "dy", "dz"}
+
+
+@pytest.mark.long
+def test_a_loss_out_of_its_tolerance_rests_on_the_channel_beside_it():
+    detector, rng = small_case.made_detector(), np.random.default_rng(4)
+    study = detector.study
+    x = np.zeros(len(study.scale))
+    x[parameter_of(study, "sources.nut")] = 5.0
+    y = study.all_outputs(x)
+    found = search(detector, y + detector.whiten.colour(rng.standard_normal(len(y))))
+    assert [(a.hypothesis.family, a.hypothesis.name) for a in found.accepted] == [("loss_law", "sources.nut")]
+    name, share = support_of(found).shares[0]
+    assert name == "screw_middle"
+    assert share > 0.5
 
 
 @pytest.mark.long

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import COMPONENTS, Study
 from twin.diagnose.result.place import Support
 from twin.diagnose.search.accepted import jacobian, read_change, readings_columns
@@ -24,15 +25,19 @@ def support_of(found: Search) -> Support | None:
     beside = [readings_columns(detector, a.hypothesis) for a in others]
     projector = detector.fitter.projector(J, np.hstack(beside) if beside else None)
     explained = read_change(detector, first.hypothesis, first.amplitude, found.x)
-    return _shared(detector.study, explained * projector(detector.whiten(found.residual)))
+    explained = np.where(np.isfinite(found.residual), explained, 0.0)
+    left = detector.whiten(found.residual)
+    if fault_of(first.hypothesis).parameter:  # the residual is beside it, of others with it
+        left = left + explained
+    return _shared(detector.study, explained * projector(left))
 
 
 def _shared(study: Study, rows: np.ndarray) -> Support | None:
     """From the terms (m,) of a statistic: channels that speak against a cause carry nothing of it."""
     total: dict[str, float] = {}
     for planned, T, w in study.split(rows):
-        for names, values in ((planned.measured.sensors, T), (COMPONENTS, w)):
-            for name, value in zip(names, values.sum(axis=0), strict=True):
+        for names, values in ((planned.measured.sensors, T), (COMPONENTS if len(w) else (), w)):
+            for name, value in zip(names, values.sum(axis=0), strict=bool(names)):
                 total[name] = total.get(name, 0.0) + float(value)
     return shared(total)
 
