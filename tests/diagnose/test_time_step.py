@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.diagnose.test_lumped import MACHINE, NULLS, loads, twin
-from twin.diagnose.model.probed_model import STEP, make_probed_model
-from twin.diagnose.model.time_step import ERROR, step_error, time_step
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.time_step import step_error, time_step
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 from twin.machine.parameters import parameters
@@ -56,16 +56,18 @@ def with_bearing(folder: Path, capacity: float) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(("capacity", "longest"), [(1.6, 30.0), (40.0, STEP)])
+@pytest.mark.parametrize(("capacity", "longest"), [(1.6, 30.0), (40.0, 60.0)])
 def test_steps_are_as_short_as_the_lightest_part_needs(tmp_path, capacity, longest):
     machine = load_machine(with_bearing(tmp_path / "machine", capacity))
     runs = [read_run(loads(tmp_path / "monday", 0))]
     probed = make_probed_model(machine, parameters(machine), runs)
     step = time_step(machine, probed, runs)
-    assert step == STEP if capacity > 2.0 else step <= longest
+    assert step == longest if capacity > 2.0 else step <= longest
     finer = make_probed_model(machine, parameters(machine), runs, step=step)
     assert finer.runs[0].step == step
-    assert finer.runs[0].drive.n_steps == pytest.approx(probed.runs[0].drive.n_steps * STEP / step, abs=1)
+    assert finer.runs[0].drive.n_steps == pytest.approx(
+        probed.runs[0].drive.n_steps * probed.runs[0].step / step, abs=1
+    )
 
 
 def test_the_error_of_a_step_is_that_of_the_worst_sensor():
@@ -74,7 +76,6 @@ def test_the_error_of_a_step_is_that_of_the_worst_sensor():
     coarse[:, 1] = [0.0, 0.2, 0.2, 0.0]
     assert step_error(coarse, fine) == pytest.approx(np.sqrt(0.02))
     assert step_error(coarse, fine[:6]) == pytest.approx(np.sqrt(0.08 / 3))  # the last of the coarse ones is beyond it
-    assert ERROR < 0.2
 
 
 @pytest.mark.slow

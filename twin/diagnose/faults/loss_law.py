@@ -43,7 +43,8 @@ def edit(cause: Cause, study: Study) -> Effect:
 FAMILY = Family(
     4, "loss_law", "Loss law or coefficient wrong",
     "Friction, winding resistance, preload or wear differ from the described law, in size or in shape.",
-    "(a - 1) P_j(t), or b_j s_alt(t) beside any share of P_j(t)", "goes with the power of one drive; or bends with its speed",
+    "(a - 1) P_j(t), or b_j s_alt(t) beside any share of P_j(t)",
+    "goes with the power of one drive; or bends with its speed",
     "15 % of a source", "either", "every source: its gain, and other exponents of its speed", "machine",
     batches, what="a loss other than declared", times="times the declared", declared=True, edit=edit,
 )  # fmt: skip
