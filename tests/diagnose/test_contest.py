@@ -227,6 +227,7 @@ def test_where_a_coolant_leads_those_near_it_are_tried_first(monkeypatch):
     assert len(passes) == 2
     assert tried(SEARCHED, nothing, STRAIGHT, []) == []
     monkeypatch.setattr(contest, "shorter", lambda study, h: [])
+    monkeypatch.setattr(contest, "edges_tried", lambda detector, y, fitted, h: h)
     heat = replace(heat, statistic=850.0)
     tried(SEARCHED, nothing, BENT, [(heat,), (behind,), (wetted, cold)])
     assert len(passes) == 5  # from all starts, where a fit has bent parameters

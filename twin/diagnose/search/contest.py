@@ -136,14 +136,15 @@ def tried(
 
 def _in_other_windows(detector: Detector, y: np.ndarray, fitted: Fitted, h: Hypothesis) -> Hypothesis:
     """A refitted coolant in windows twice as long, or without one of them, and so on, while that explains more: they
-    were chosen by scores that take its film as linear."""
+    were chosen by scores that take its film as linear. Where the fit has bent parameters in halves of them, too, and
+    with edges nearby."""
     study, policy = detector.study, detector.policy
     worthy = partial(worth, policy=policy)
     while True:
-        starts = [s for s in (longer(study, detector.elements, h), *without_one(study, h)) if s is not h]
+        starts = [longer(study, detector.elements, h), *without_one(study, h)]
         if bends(fitted.x, policy):
             starts += [*shorter(study, h), edges_tried(detector, y, fitted, h)]
-        tried_ones = (exact(detector, y, fitted, s, policy.trial) for s in starts)
+        tried_ones = (exact(detector, y, fitted, s, policy.trial) for s in starts if s is not h)
         best = max(tried_ones, key=worthy, default=h)
         if worthy(best) <= worthy(h):
             return h
