@@ -264,11 +264,16 @@ def test_a_coolant_is_tried_without_a_window_that_explains_nothing(monkeypatch):
 
     monkeypatch.setattr(contest, "exact", exact)
     monkeypatch.setattr(contest, "longer", lambda study, elements, h: h)
+    monkeypatch.setattr(contest, "edges_tried", lambda detector, y, fitted, h: h)
     found = contest._in_other_windows(detector, np.zeros(0), STRAIGHT, both)
     assert found.when.windows == (right,)
     assert found.when.name == f"from 1.0 h to 2.0 h of {first}"
     right = replace(right, end=5400.0)  # half of it, where a fit has bent parameters
     assert contest._in_other_windows(detector, np.zeros(0), STRAIGHT, both).when.windows != (right,)
+    assert contest._in_other_windows(detector, np.zeros(0), BENT, one).when.windows == (right,)
+    right = replace(right, end=6300.0)  # or with an edge a quarter of an hour earlier
+    edge_moved = replace(one, when=replace(one.when, windows=(right,)))
+    monkeypatch.setattr(contest, "edges_tried", lambda detector, y, fitted, h: edge_moved)
     assert contest._in_other_windows(detector, np.zeros(0), BENT, one).when.windows == (right,)
 
 
