@@ -63,7 +63,7 @@ def _stands(
     detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], findings: Sequence[Finding], f: Finding
 ) -> bool:
     others = [g for g in findings if g is not f]
-    if f.what == "swapped":
+    if len(f.channels) == 2:  # swapped
         exchanged, as_read = (
             _left(_with_readings(detector, plans, set_aside(runs, own))) for own in (findings, others)
         )
