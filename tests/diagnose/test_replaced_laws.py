@@ -10,7 +10,7 @@ import pytest
 from tests.diagnose import small_case
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.search.accepted import Accepted, as_scored, loosened, outputs_with, parameter_of, settled
+from twin.diagnose.search.accepted import Accepted, as_scored, outputs_with, parameter_of, settled, untied_beside
 from twin.diagnose.search.refit import refit
 
 SIZE = 60.0  # W at top speed
@@ -28,7 +28,7 @@ def test_what_a_source_emits_as_described_is_free_beside_a_law_of_another_shape(
     """Sources are declared within some per cent; here less than half of what is described is left of this one."""
     detector, one = small_case.made_detector(), shape()
     study = detector.study
-    (j,) = loosened(study, [one])
+    (j,) = untied_beside(study, [one])
     assert j == parameter_of(study, one.hypothesis.name)
     x = np.zeros(len(study.scale))
     x[j] = -8.0
@@ -46,6 +46,5 @@ def test_what_a_source_emits_as_described_is_free_beside_a_law_of_another_shape(
 def test_other_causes_leave_tolerances_as_they_are():
     detector = small_case.made_detector()
     heat = next(b for b in detector.columns.batches if b.family == "heat_source")
-    assert (
-        loosened(detector.study, [as_scored(detector.study, Hypothesis(heat, 0, heat.histories[0], 1.0, (5.0,)))]) == []
-    )
+    one = as_scored(detector.study, Hypothesis(heat, 0, heat.histories[0], 1.0, (5.0,)))
+    assert untied_beside(detector.study, [one]) == []

@@ -16,7 +16,7 @@ from twin.logs.faults.usable import BROKEN, usable
 from twin.logs.run import Run
 
 FAMILY = "sensor"  # of everything here
-UNKNOWN = math.nan, math.nan  # 95 % interval of what rows of a run itself show
+NO_INTERVAL = math.nan, math.nan  # 95 % interval of what rows of a run itself show
 REFUTED = "that all other channels refute"  # in the history of a channel: a leap that ...
 _SAID = {"leap": "a leap", "offset": "an offset", "drift": "a drift", "swapped": "names"}
 
@@ -56,7 +56,7 @@ def _cause(f: Finding, runs: Sequence[Run], names: Sequence[str]) -> Cause:
     windows = tuple(Window(names[k], 0.0 if k in whole else f.start, ends[k]) for k in f.runs)
     return Cause(
         FAMILY, f"sensors.{'<>'.join(f.channels)}", "", f.size,
-        UNKNOWN if shown else f.interval, UNITS[f.what], f.statistic, f.least,
+        NO_INTERVAL if shown else f.interval, UNITS[f.what], f.statistic, f.least,
         history=f.what if shown else f"{_SAID[f.what]} {REFUTED}", windows=windows,
     )  # fmt: skip
 
@@ -73,7 +73,7 @@ def _leaps(
                 known.add(channel)
                 window = Window(name, f.first_time, f.last_time)
                 causes.append(
-                    Cause(FAMILY, f"sensors.{channel}", "", f.size, UNKNOWN, f.unit, math.inf, 0.0,
+                    Cause(FAMILY, f"sensors.{channel}", "", f.size, NO_INTERVAL, f.unit, math.inf, 0.0,
                           history=f.kind, windows=(window,))
                 )  # fmt: skip
     return causes

@@ -163,7 +163,7 @@ def _in_blocks(
     the products of all terms with their stages, one product of matrices each, then the steps again with derivatives.
 
     Products with one state at a time read all terms in every stage: at 221 states and 70 terms that took half of the
-    time of 82 derivatives. All steps at once would keep a factor of each.
+    time of 82 derivatives (by a script). All steps at once would keep a factor of each.
     """
     n, r = len(now[0].rate), len(z)
     count = -(-n // BLOCK)

@@ -21,7 +21,9 @@ from twin.diagnose.model.study import start_of
 from twin.logs.run import Run
 from twin.machine.description import Machine
 
-ERROR = 0.1  # K, rms at the worst sensor: beside nuts of the five-axis machine a minute is 0.06 K off
+ERROR = (
+    0.1  # K, rms at the worst sensor; chosen above what a minute is off beside nuts of five_axis, 0.06 (by a script)
+)
 SHORTEST = STEP / 16  # s
 
 

@@ -59,8 +59,8 @@ def freed(study: Study, h: Hypothesis) -> list[int]:
     return [] if j is None else [j]
 
 
-def loosened(study: Study, accepted: Sequence[Accepted]) -> list[int]:
-    """The parameters without a tolerance beside causes: of sources that emit by a law of another shape."""
+def untied_beside(study: Study, accepted: Sequence[Accepted]) -> list[int]:
+    """The parameters that have no tolerance beside causes: of sources that emit by a law of another shape."""
     replaced = [a.hypothesis.name for a in accepted if fault_of(a.hypothesis).replaces]
     return [j for name in replaced if (j := parameter_of(study, name)) is not None]
 
@@ -271,4 +271,4 @@ def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> 
             read += read_change(detector, a.hypothesis, a.amplitude, there)
         return detector.whiten(y - outputs_with(detector, accepted, there)) - read
 
-    return settle(detector.fitter, outputs, left, loosened(study, accepted))
+    return settle(detector.fitter, outputs, left, untied_beside(study, accepted))

@@ -24,12 +24,12 @@ from twin.diagnose.search.accepted import (
     freed,
     gains_of,
     jacobian,
-    loosened,
     motion,
     readings_columns,
     shifted,
     spans,
     strong,
+    untied_beside,
 )
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.edges import shape_errors
@@ -61,9 +61,9 @@ def refit(
     mean, inverse_prior = (np.concatenate(p) for p in zip(*priors, strict=True))
     floor = np.concatenate([lowest(detector, a.hypothesis) for a in accepted])
     held = [j for a in accepted for j in freed(study, a.hypothesis)]
-    x, loose = x.copy(), np.ones(len(x))
+    x, untied = x.copy(), np.ones(len(x))
     x[held] = 0.0
-    loose[loosened(study, accepted)] = policy.wide
+    untied[untied_beside(study, accepted)] = policy.wide
 
     def of_runs(x: np.ndarray, a: Sequence[float]) -> list[tuple[np.ndarray, np.ndarray]]:
         return over_runs(lambda k: study.by_amplitudes(k, x, slots[k], a), study.fitted)
@@ -111,11 +111,11 @@ def refit(
         for q, _ in gains:
             white = white + D[:, q] * amplitude[q]
         errors = np.hstack([_own_errors(study, D, accepted, amplitude), detector.whiten(shapes)])
-        projector = fitter.projector(J * loose, errors)
+        projector = fitter.projector(J * untied, errors)
         PD = projector(D)
         F = D.T @ PD + np.diag(inverse_prior)
         found = solved(F, PD.T @ white + inverse_prior * mean, floor)
-        nuisance = np.clip(loose * projector.most_likely(white - D @ found)[: len(x)], low, high)
+        nuisance = np.clip(untied * projector.most_likely(white - D @ found)[: len(x)], low, high)
         step = float((np.abs(found - amplitude) * np.sqrt(np.maximum(np.diag(F), 0.0))).max(initial=0.0))
         left = white - D @ amplitude
         before, misfit = misfit, float(left @ projector(left))
@@ -132,7 +132,7 @@ def refit(
             break
     if misfit > least + policy.refit_less:  # it has not arrived: what curves strongly swings about
         x, amplitude, J, D, F, errors, residual, f, there, white = best
-        projector = fitter.projector(J * loose, errors)
+        projector = fitter.projector(J * untied, errors)
     inverse = np.linalg.pinv(F)
     alone = sizes_by_run(projector.N, D, white, study.rows, [own.start for own in of_each])
     result = [
@@ -141,7 +141,7 @@ def refit(
     ]
     more = np.hstack([policy.wide * D * np.sqrt(np.maximum(np.diag(inverse), 0.0)), errors])
     bare = study.all_outputs(there) if units else f
-    return Fitted(x, J, residual, fitter.projector(J * loose, more), f - bare, more), result
+    return Fitted(x, J, residual, fitter.projector(J * untied, more), f - bare, more), result
 
 
 def _own_errors(study: Study, D: np.ndarray, accepted: Sequence[Accepted], amplitude: np.ndarray) -> np.ndarray:

@@ -36,8 +36,8 @@ def _shared(study: Study, rows: np.ndarray) -> Support | None:
     """From the terms (m,) of a statistic: channels that speak against a cause carry nothing of it."""
     total: dict[str, float] = {}
     for planned, T, w in study.split(rows):
-        for names, values in ((planned.measured.sensors, T), (COMPONENTS if len(w) else (), w)):
-            for name, value in zip(names, values.sum(axis=0), strict=bool(names)):
+        for names, values in ((planned.measured.sensors, T), (COMPONENTS, w)):
+            for name, value in zip(names, values.sum(axis=0), strict=True) if len(values) else ():
                 total[name] = total.get(name, 0.0) + float(value)
     return shared(total)
 

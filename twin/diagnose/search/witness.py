@@ -25,6 +25,7 @@ from twin.diagnose.model.study import Study, with_measured
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import readings_columns
 from twin.diagnose.search.detector import Detector, emptied
+from twin.diagnose.search.exact import misfit_of_each
 from twin.diagnose.search.look import look
 from twin.logs.run import Run
 from twin.rom.drive import measured_air
@@ -64,9 +65,7 @@ def _stands(
 ) -> bool:
     others = [g for g in findings if g is not f]
     if len(f.channels) == 2:  # swapped
-        exchanged, as_read = (
-            _left(_with_readings(detector, plans, set_aside(runs, own))) for own in (findings, others)
-        )
+        exchanged, as_read = (_left(detector, plans, set_aside(runs, own)) for own in (findings, others))
         return exchanged < as_read
     threshold = detector.thresholds.get(FAMILY)
     if threshold is None or not f.sized or not np.isfinite(f.statistic):
@@ -84,11 +83,11 @@ def _stands(
     return float(seen @ fitter.whiten(fitted.residual)) ** 2 > threshold * float(seen @ D)
 
 
-def _left(fitter: Fitter) -> float:
-    """The misfit of its measurements to the calibrated model."""
+def _left(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run]) -> float:
+    """The misfit of the readings of the fitted runs to the calibrated model."""
+    fitter = _with_readings(detector, plans, runs)
     fitted = fitter(measured_of(fitter.study))
-    white = fitter.whiten(fitted.residual)
-    return float(white @ fitted.projector(white))
+    return float(misfit_of_each(replace(detector, fitter=fitter), fitted).sum())
 
 
 def _nearer_corrected(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], f: Finding) -> bool:
