@@ -165,7 +165,8 @@ def calibrate(
     """Fit the parameters of a model to the temperatures and TCP deviations measured in runs.
 
     Temperatures are first judged by each other, over all runs: what they refute is not used, and told in `channels` of
-    the report. only, hold: parameters to fit and to leave as they are, each a path or a pattern such as "sources.*".
+    the report; a leap that the model makes, too, is none. only, hold: parameters to fit and to leave as they are, each
+    a path or a pattern such as "sources.*".
     Bounded least squares with priors; an interrupt keeps the best values so far. on_iteration, on_window: told of each
     as it comes. Raises LogError for runs that hold nothing to compare, TwinError for parameters and sensors that there
     are not.
@@ -182,8 +183,9 @@ def calibrate(
     """
     import twin.run.jax_setup  # noqa: F401  isort: skip  first: it prepares JAX before NumPy is loaded
 
+    from twin.calibrate.channels.explained import judge_beside
     from twin.calibrate.channels.filled import filled
-    from twin.calibrate.channels.judge import KNOWN, judge, set_aside
+    from twin.calibrate.channels.judge import KNOWN, set_aside
     from twin.calibrate.fit.calibration import chosen
 
     options = options or CalibrateOptions()
@@ -198,7 +200,7 @@ def calibrate(
     if unknown:
         raise TwinError(f"no sensor '{unknown[0]}'", "--exclude", f"sensors are: {', '.join(known)}")
     whole = runs_of(given)
-    judgement = judge(whole, sensors=loaded.sensors)
+    judgement = judge_beside(loaded.artefact, whole)
     read_runs = set_aside(whole, judgement.findings)
     if judgement.findings:
         read_runs = filled(whole, read_runs, KNOWN)

@@ -111,7 +111,8 @@ def score(
 
     from twin import __version__
     from twin.atomic import check_folder
-    from twin.calibrate.channels.judge import judge, set_aside, words
+    from twin.calibrate.channels.explained import judge_beside
+    from twin.calibrate.channels.judge import set_aside, words
     from twin.calibrate.channels.table import as_set_aside, channel_rows, with_findings
     from twin.calibrate.score.files import score_json, write_score
     from twin.calibrate.score.score import run_name
@@ -134,7 +135,7 @@ def score(
     }
     told = score_json(found, settings, facts)
     measured = [*scored, *kept]
-    judgement = judge([run for _, run in measured], sensors=loaded.sensors)
+    judgement = judge_beside(loaded.artefact, [run for _, run in measured])
     names = [run_name(name) for name, _ in measured]
     told["refuted"] = [words(f, names) for f in judgement.findings]
     sound = set_aside([run for _, run in measured], judgement.findings)

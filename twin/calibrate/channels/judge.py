@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -11,7 +11,7 @@ import numpy as np
 from twin.calibrate.channels.filled import driven
 from twin.calibrate.channels.finding import Finding, What
 from twin.calibrate.channels.readings import EMPTIED, STUCK, emptied, readings
-from twin.calibrate.channels.refute import refuted
+from twin.calibrate.channels.refute import nothing, refuted
 from twin.logs.faults.fault import Fault
 from twin.logs.run import Run
 from twin.logs.stuck import frozen_throughout
@@ -33,19 +33,24 @@ class Judgement:
 
 
 def judge(
-    runs: Sequence[Run], within: Collection[str] | None = None, sensors: Collection[str] | None = None
-) -> Judgement:
+    runs: Sequence[Run], within: Collection[str] | None = None, sensors: Collection[str] | None = None,
+    explained: Callable[[Finding], bool] = nothing,
+) -> Judgement:  # fmt: skip
     """Find broken and stuck channels and splices in each run, then what all channels together say of each of them.
 
     within: columns that may be judged, all temperatures by default; all take part as witnesses. sensors: of the model,
     all columns by default: of others nothing says how warm their place may be (of a real spindle one of 16 is 7 K above
-    the others at all times), so that an offset in all runs is none. Nothing is changed.
+    the others at all times), so that an offset in all runs is none. explained: whether something else than the others
+    explains what these refute. Nothing is changed.
     """
-    found = judged([emptied(run) for run in runs], within)
+    found = judged([emptied(run) for run in runs], within, explained)
     return found if sensors is None else _without_warm_places(found, sensors, len(runs))
 
 
-def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[str] | None = None) -> Judgement:
+def judged(
+    parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[str] | None = None,
+    explained: Callable[[Finding], bool] = nothing,
+) -> Judgement:  # fmt: skip
     """The same, of what `emptied` has made of each run, all columns taken for the model's."""
     frozen = _frozen([run for run, _ in parts])
     plain = [_without(run, k, [f for f in frozen if k in f.runs]) for k, (run, _) in enumerate(parts)]
@@ -55,7 +60,7 @@ def judged(parts: Sequence[tuple[Run, tuple[Fault, ...]]], within: Collection[st
     found = [*_own(faults), *frozen]
     if table is not None:
         told = [(k, f.channels[0], f.first_time) for k, f in leaps if len(f.channels) == 1]
-        found += filter(partial(_shown, plain), refuted(table, told))
+        found += filter(partial(_shown, plain), refuted(table, told, explained))
     return Judgement(
         tuple(f for f in found if within is None or set(f.channels) & set(within)),
         tuple((k, f) for k, f in faults if f.kind == "splice"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,10 +37,18 @@ class Suspect:
     sigma: float  # K
 
 
-def refuted(r: Readings, leaps: Sequence[tuple[int, str, float]] = ()) -> list[Finding]:
+def nothing(_: Finding) -> bool:
+    """What explains a finding where nothing is known but the channels."""
+    return False
+
+
+def refuted(
+    r: Readings, leaps: Sequence[tuple[int, str, float]] = (), explained: Callable[[Finding], bool] = nothing
+) -> list[Finding]:
     """Channels that read LEAST or more beside what all others say of them, most likely first.
 
     leaps: (run, channel, time [s]) of those that rows of the run itself show: when these begin need not be looked for.
+    explained: whether something else explains a finding; such a channel is a witness as all others are.
     """
     found: list[Finding] = []
     judged = [c for c in range(len(r.names)) if np.isfinite(r.values[:, c]).any()]
@@ -55,9 +63,9 @@ def refuted(r: Readings, leaps: Sequence[tuple[int, str, float]] = ()) -> list[F
         left = [c for c in judged if c not in gone]
         if len(left) <= FEWEST:
             break
-        suspects = _suspects(predictions, of, least, usual)
+        suspects = [s for s in _suspects(predictions, of, least, usual) if not explained(_told(r, s))]
         pair = exchanges(r, predictions, usual, gone)
-        if pair is not None and pair.statistic > _beside(suspects, pair):
+        if pair is not None and not explained(_pair(r, pair)) and pair.statistic > _beside(suspects, pair):
             found.append(_pair(r, pair))
         elif suspects:
             found.append(_told(r, _to_blame(r, suspects, left, of, least, usual, gone)))

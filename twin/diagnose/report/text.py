@@ -247,10 +247,10 @@ def chance(nulls: np.ndarray | None, threshold: float) -> str:
     if not n or not math.isfinite(threshold):
         return ""
     # none of n: with 95 % confidence the rate is below 3 / n
-    often = f"once in {round(n / above)}" if above else f"at most once in {max(1, round(n / 3))}"
+    rare = "" if above else f", which makes it rarer than once in {max(1, round(n / 3))} with 95 % confidence"
     return (
-        f"Data of a machine without this effect give more than {number(threshold)} {often} ({above or 'none'} of {n} "
-        f"simulated data sets; the largest of them gave {number(float(values.max()))})."
+        f"Of {n} simulated data sets of a machine without this effect, {above or 'none'} gave more than "
+        f"{number(threshold)}{rare}; the largest gave {number(float(values.max()))}."
     )
 
 
@@ -348,6 +348,7 @@ def whiteness_lines(d: Diagnosis) -> list[str]:
 def gain_lines(d: Diagnosis) -> list[str]:
     """What the extended model brings on each sealed run: the channels that the causes move, then the others."""
     result, runs = [], list(dict.fromkeys(g.run for g in d.gain))
+    extended = "with what was withdrawn" if any(n.startswith("withdrawn: ") for n in d.notes) else "extended"
     groups = product(runs, ((True, "that the causes move"), (False, "that they do not move")), MEASURED)
     for run, (affected, which), (unit, name) in groups:
         these = [g for g in d.gain if g.run == run and g.affected == affected and g.unit == unit]
@@ -360,7 +361,7 @@ def gain_lines(d: Diagnosis) -> list[str]:
         better, worse = sum(g.ci95[0] > 0 for g in these), sum(g.ci95[1] < 0 for g in these)
         lost = [g.channel for g in these if g.ci95_delivered[1] < 0.0]
         result.append(
-            f"{head}: {counted} {which}: {a} as delivered, {b} recalibrated, {c} extended (root mean square, "
+            f"{head}: {counted} {which}: {a} as delivered, {b} recalibrated, {c} {extended} (root mean square, "
             f"noise included); better beyond chance in {better}, worse in {worse}"
             + (f"; worse than as delivered: {', '.join(lost)}." if lost else ".")
         )
