@@ -111,12 +111,11 @@ def prepare(
     Raises LogError for runs that hold nothing to compare, or too little.
     """
     known = parameters(machine)
-    every = [*runs, *sealed]
+    every = [_read(run, settings.exclude) for run in (*runs, *sealed)]
     probed = make_probed_model(machine, known, every, progress)
     if (step := time_step(machine, probed, every)) != probed.runs[0].step:
         probed = make_probed_model(machine, known, every, progress, step=step)
-    plans = [measured(probed.base, run, own.drive, own.name, exclude=settings.exclude)
-             for run, own in zip(every, probed.runs, strict=True)]  # fmt: skip
+    plans = [measured(probed.base, run, p.drive, p.name) for run, p in zip(every, probed.runs, strict=True)]
     closed = [*plans[: len(runs)], *(_closed(m) for m in plans[len(runs) :])]
     form = form_of(machine)
     study = with_film_laws(make_study(probed, closed, range(len(runs))), form)
@@ -130,8 +129,8 @@ def prepare(
     for planned in study.runs:
         m, drive, signals = planned.measured, planned.run.drive, planned.run.signals
         parts += [m.mean_of, m.column, np.nan_to_num(m.count), m.tcp_step, m.tcp_share, m.pose, planned.z0,
-                  np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
-                  *(signals[name] for name in sorted(signals))]  # fmt: skip
+                  np.array(planned.run.begins.apart), np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma,
+                  *drive_arrays(drive), *(signals[name] for name in sorted(signals))]  # fmt: skip
     # the window's coordinates: made anew on other cores they may be others, and z0 is zero at the reference temperature
     parts += [probed.B, *(body.C for body in probed.base.bodies)]
     asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)
@@ -150,6 +149,14 @@ def prepare(
         lambda: stored(make_detector(study, families, instruments, policy, form, counts, progress, differ)),
     )  # fmt: skip
     return detector.of(study, policy), plans
+
+
+def _read(run: Run, exclude: Sequence[str]) -> Run:
+    """A run without excluded sensors, which say nothing of where it begins either."""
+    if run.temperatures is None or not set(exclude) & set(run.temperatures.columns):
+        return run
+    columns = {name: values for name, values in run.temperatures.columns.items() if name not in exclude}
+    return replace(run, temperatures=replace(run.temperatures, columns=columns))
 
 
 def _closed(m: Measured) -> Measured:

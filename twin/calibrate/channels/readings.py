@@ -41,15 +41,16 @@ class Readings:
 
 
 def emptied(run: Run) -> tuple[Run, tuple[Fault, ...]]:
-    """The run without readings that are noise, rest at a limit or stand still, and without all rows after a splice; and
-    all faults of its temperatures, leaps too. Files and other tables are left as they are."""
+    """The run without readings that are noise, rest at a limit, stand still or are repeated by a logger, and without
+    all rows after a splice; and all faults of its temperatures, leaps too. Files and other tables are left as they are.
+    """
     table = run.temperatures
     if table is None:
         return run, ()
     found = tuple(f for f in faults_of(run) if f.table == "temperatures" and _lasts(f))
     columns = {name: np.array(values, dtype=float) for name, values in table.columns.items()}
     for f in found:
-        names = columns if f.kind == "splice" else f.channels if f.kind in EMPTIED else ()
+        names = columns if f.kind == "splice" else f.channels if f.kind in (*EMPTIED, "held") else ()
         for name in names:
             columns[name][f.first_row : f.last_row + 1] = np.nan
     return replace(run, temperatures=replace(table, columns=columns)), found

@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 
 from twin.build.places import beside
 from twin.diagnose.evidence.discretisation import Difference
+from twin.diagnose.model.beginning import Beginning
 from twin.diagnose.model.study import Study, heated_places, own_place
 from twin.diagnose.result.spot import Spot
 from twin.machine.description import Machine
@@ -124,8 +125,9 @@ def null(
             if vector is not None:
                 forcing += _power(study, k, j)[:, None] * vector
         fluctuation = _ornstein(rng, n, len(load.environments), form.air_time / 60.0) * form.air
-        initial = form.start * rng.standard_normal() * body.one if not run.stated_start else np.zeros(body.n)
-        initial = initial + form.start_apart * _body_starts(study, rng)
+        whole, part = start_of(run.begins, form)
+        initial = np.zeros(body.n) if run.begins.stated else whole * rng.standard_normal() * body.one
+        initial = initial + part * _body_starts(study, rng)
         slots.A[0], slots.M[0], slots.E[0], slots.gate[:, 0], slots.rise[:, 0] = A, M, E, 1.0, rise
         slots.film[:, 0], slots.joint[:, 0], slots.contact[:, 0], slots.initial[0] = wobble, joint, contact, initial
         slots.forcing[:, 0], slots.environment[:, 0] = forcing, fluctuation
@@ -206,6 +208,13 @@ def lump_of(study: Study, place: int, form: Form) -> float:
     (body,) = study.probed.base.bodies
     b = study.probed.B[place]
     return float(min(form.lump, 0.5 / (b @ np.linalg.solve(body.E, b))))
+
+
+def start_of(begins: Beginning, form: Form) -> tuple[float, float]:
+    """K by which a machine, and each of its parts beside that, may begin otherwise: standard deviations. Where a run
+    does not say where it begins, as much at least as its sensors differ in what they read first."""
+    part = max(form.start_apart, begins.apart)
+    return part if begins.stated else max(form.start, part), part
 
 
 def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> np.ndarray | None:

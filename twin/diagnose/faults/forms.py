@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from twin.diagnose.evidence.formal import Described
-from twin.diagnose.evidence.nulls import Form, convection, lump_of
+from twin.diagnose.evidence.nulls import Form, convection, lump_of, start_of
 from twin.diagnose.faults.elements import Elements, Key
 from twin.diagnose.faults.signal import CLOCK
 from twin.diagnose.model.study import Study, heated_places
@@ -43,8 +43,8 @@ def described_forms(study: Study, elements: Elements, raw: np.ndarray, form: For
             add((kind, source, history), form.beside)
         elif kind == "start":
             run = next(p.run for p in study.runs if source.startswith(f"{p.run.name}."))
-            whole = source == f"{run.name}.machine" and not run.stated_start
-            add((kind, source, history), form.start if whole else form.start_apart)
+            whole, part = start_of(run.begins, form)
+            add((kind, source, history), whole if source == f"{run.name}.machine" else part)
     for (kind, _), own in elements.block_of.items():
         if kind in ("joint", "contact"):
             columns.append(form.contact * raw[:, own].astype(float).sum(axis=1))

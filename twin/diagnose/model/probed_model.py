@@ -18,6 +18,7 @@ from twin.build.places import DISPLACED, Place, pruned
 from twin.calibrate.fit.measured import tcp_positions
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
+from twin.diagnose.model.beginning import Beginning, beginning_of
 from twin.diagnose.model.ports_first import PortsFirst
 from twin.diagnose.model.probed_loads import ProbedLoads, loads_for
 from twin.diagnose.model.rich_probed_model import Mesh, RichProbedModel, rich_probed_model
@@ -27,7 +28,7 @@ from twin.logs.signals import signal_values
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
 from twin.rom.contact_matrix import ContactPlaces
-from twin.rom.drive import Drive, evaluate, measured_air
+from twin.rom.drive import Drive, evaluate
 from twin.rom.load_model import LoadModel
 from twin.rom.model import MachineModel
 from twin.rom.parameter import Parameter
@@ -51,10 +52,8 @@ class ProbedRun:
     name: str
     drive: Drive  # of the description
     signals: dict[str, np.ndarray]  # (n_steps,) means over the drive's steps, currents as rms, SI
-    start: float  # degC
-    stated_start: bool
+    begins: Beginning
     loads: ProbedLoads
-    rested: bool = False  # it starts in equilibrium with its surroundings, `start` being those of the machine
 
     @property
     def step(self) -> float:
@@ -120,16 +119,13 @@ def make_probed_model(
     load = base.load_model
     names = run_names(runs)
     drives = [drive_of(base, run, step) for run in runs]
-    starts = [
-        run.initial_temperature if run.initial_temperature is not None
-        else float(measured_air(load, drive)[0, load.surroundings])
-        for run, drive in zip(runs, drives, strict=True)
-    ]  # fmt: skip
+    begins = [beginning_of(load, base.sensors, run, drive) for run, drive in zip(runs, drives, strict=True)]
+    starts = tuple(own.temperature for own in begins)
     known = tuple((p.path, p.nominal, p.sigma, p.low, p.high) for p in parameters)
 
     def make() -> tuple[np.ndarray, tuple[float, float]]:
         coarse = tuple(drive_of(base, run, TRAINING_STEP) for run in runs)
-        shared = Shared(rich.rich, base, tuple(parameters), rich.places, coarse, tuple(starts))
+        shared = Shared(rich.rich, base, tuple(parameters), rich.places, coarse, starts)
         if nominal_alone:
             train = held = nominal(shared)
         else:
@@ -149,9 +145,9 @@ def make_probed_model(
         V, reduction = np.eye(rich.rich.n), (0.0, 0.0)
     else:
         logged = (*_logged(load, runs), rich.rich.poses)
-        inputs = (machine_hash(machine), mesh.name, nominal_alone, known, tuple(starts), arrays_hash(logged))
+        inputs = (machine_hash(machine), mesh.name, nominal_alone, known, starts, arrays_hash(logged))
         V, reduction = cached("window", __name__, inputs, make)
-    return _assembled(rich, V, parameters, runs, names, drives, starts, reduction)
+    return _assembled(rich, V, parameters, runs, names, drives, begins, reduction)
 
 
 def _logged(load: LoadModel, runs: Sequence[Run]) -> Iterator[np.ndarray]:
@@ -174,7 +170,7 @@ def _rows(model: MachineModel) -> np.ndarray:
 
 def _assembled(
     rich: RichProbedModel, V: np.ndarray, parameters: Sequence[Parameter], runs: Sequence[Run], names: Sequence[str],
-    drives: Sequence[Drive], starts: Sequence[float], reduction: tuple[float, float],
+    drives: Sequence[Drive], begins: Sequence[Beginning], reduction: tuple[float, float],
 ) -> ProbedModel:  # fmt: skip
     whole = merged(rich.rich, V)
     (body,) = whole.bodies
@@ -191,9 +187,8 @@ def _assembled(
     base = replace(base, sensors=tuple(whole.sensors[k] for k in real))
     prepared = prepare(base)
     made = [
-        ProbedRun(name, drive, _means(base, run, drive), start,
-                  run.steady_start or run.initial_temperature is not None, loads_for(base, drive), run.steady_start)
-        for run, name, drive, start in zip(runs, names, drives, starts, strict=True)
+        ProbedRun(name, drive, _means(base, run, drive), own, loads_for(base, drive))
+        for run, name, drive, own in zip(runs, names, drives, begins, strict=True)
     ]  # fmt: skip
     return ProbedModel(
         base, prepared.layout, prepared.system, ContactPlaces.of(load), tuple(parameters), rich.places,

@@ -187,9 +187,9 @@ def make_study(probed: ProbedModel, measured: Sequence[Measured], fitted: Sequen
 
 def start_of(model: MachineModel, run: ProbedRun) -> np.ndarray:
     """State (N,) in which a run of a model begins, in the model's own coordinates."""
-    if run.rested:
-        return at_rest(model, run.drive, run.start)
-    return np.concatenate([(run.start - model.reference_temperature) * b.one for b in model.bodies])
+    if run.begins.rested:
+        return at_rest(model, run.drive, run.begins.temperature)
+    return np.concatenate([(run.begins.temperature - model.reference_temperature) * b.one for b in model.bodies])
 
 
 def with_measured(study: Study, measured: Sequence[Measured]) -> Study:

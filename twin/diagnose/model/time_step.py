@@ -41,7 +41,9 @@ def time_step(machine: Machine, probed: ProbedModel, runs: Sequence[Run]) -> flo
             dt, coarse = dt / 2, fine
         return dt
 
-    loads = arrays_hash(a for run in probed.runs for a in (np.array([run.start]), *drive_arrays(run.drive)))
+    loads = arrays_hash(
+        a for run in probed.runs for a in (np.array([run.begins.temperature]), *drive_arrays(run.drive))
+    )
     return float(cached("step", __name__, (machine_hash(machine), loads), make))
 
 

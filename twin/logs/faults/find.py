@@ -10,6 +10,7 @@ import numpy as np
 from twin.logs.faults.breaks import noise, rail, rest_before, rests_by_rounding
 from twin.logs.faults.cold_start import begins_apart
 from twin.logs.faults.fault import Fault, Kind
+from twin.logs.faults.held import LONGEST, held
 from twin.logs.faults.leaps import Changes, changes, leaps, leapt_together, set_to_zero
 from twin.logs.faults.series import Series, beside, long_enough, tcp_series, temperature_series
 from twin.logs.run import Run, Table
@@ -41,7 +42,8 @@ def faults_of(run: Run) -> list[Fault]:
     noisy = [_fault("noise", s, n.first, n.last, n.size) for s in (*temperatures, *tcp) for n in noise(s)]
     temperatures, tcp = (long_enough(_without(s, noisy) for s in series) for series in (temperatures, tcp))
     borders = [t for segment in run.segments for t in (segment.start, segment.end)]
-    found = [*noisy, *_splices(temperatures, borders), *_stuck(run, temperatures), *_stuck_probes(run, tcp)]
+    still = _with_held(_stuck(run, temperatures), temperatures)
+    found = [*noisy, *_splices(temperatures, borders), *still, *_stuck_probes(run, tcp)]
     for s in (*temperatures, *tcp):
         known = [f for f in found if f.fault.kind == "splice" or _of(f.fault, s)]
         leapt = _rails_and_leaps(s, known, borders)
@@ -133,6 +135,14 @@ def _stuck(run: Run, series: Sequence[Series]) -> list[_Found]:
     return found
 
 
+def _with_held(stuck: Sequence[_Found], series: Sequence[Series]) -> list[_Found]:
+    """Standstills, and what a logger repeats in place of the shorter ones of them."""
+    lasting = [f for f in stuck if f.fault.last_time - f.fault.first_time > LONGEST]
+    repeated = [_fault("held", s, h.first, h.last, h.size) for s in series for h in held(s)]
+    repeated = [f for f in repeated if not any(_overlap(f.fault, other.fault) for other in lasting)]
+    return [f for f in stuck if not any(_overlap(f.fault, other.fault) for other in repeated)] + repeated
+
+
 def _stuck_probes(run: Run, series: Sequence[Series]) -> list[_Found]:
     """Components of the TCP that stand still while the temperatures, or the other components, go on."""
     found = []
@@ -170,7 +180,7 @@ def _of(fault: Fault, s: Series) -> bool:
 
 def _fault(kind: Kind, s: Series, first: int, last: int, size: float) -> _Found:
     """Of the readings first .. last of a series."""
-    value = kind in ("rail", "stuck")
+    value = kind in ("rail", "stuck", "held")
     unit = "K" if s.unit == "degC" and not value else s.unit
     rows, times = (int(s.row[first]), int(s.row[last])), (float(s.time[first]), float(s.time[last]))
     return _Found(Fault(kind, s.table, (s.name,), *rows, *times, float(size), unit), _near(s))
@@ -182,9 +192,12 @@ def _near(s: Series) -> float:
 
 def _within(fault: Fault, others: Iterable[Fault]) -> bool:
     """Whether a standstill is what another fault of the same channel tells already."""
-    return fault.kind == "stuck" and any(
-        o.channels == fault.channels and o.first_row <= fault.last_row and fault.first_row <= o.last_row for o in others
-    )
+    return fault.kind in ("stuck", "held") and any(_overlap(o, fault) for o in others)
+
+
+def _overlap(a: Fault, b: Fault) -> bool:
+    """Whether two faults of the same channels have rows in common."""
+    return a.channels == b.channels and a.first_row <= b.last_row and b.first_row <= a.last_row
 
 
 def _at_once(a: Fault, b: Fault, near: float) -> bool:

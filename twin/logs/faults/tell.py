@@ -54,6 +54,9 @@ def _problem(run: Run, same: Sequence[Fault]) -> Problem:
             "a frozen channel" if f.table == "temperatures" else "a frozen probe, or one that is read in motion only"
         )
         return warning(what, lines, f"{remedy}? leave its cells empty if so")
+    if f.kind == "held":
+        what = f"{_do(f, 'repeat')} {_size(f)}, {during}"
+        return warning(what, lines, "a logger that had no new reading? leave its cells empty if so")
     if f.kind == "rail":
         what = f"{_do(f, 'leap')} to {_size(f)} and {'stay' if len(f.channels) > 1 else 'stays'} there, {during}"
         return warning(what, lines, f"an open or short circuit? {_EMPTY}")
@@ -96,7 +99,8 @@ def _do(f: Fault, verb: str) -> str:
 
 
 def _size(f: Fault) -> str:
-    return f"{'up to ' if len(f.channels) > 1 and f.kind not in ('rail', 'stuck') else ''}{shown(f.size, f.unit)}"
+    several = len(f.channels) > 1 and f.kind not in ("rail", "stuck", "held")
+    return f"{'up to ' if several else ''}{shown(f.size, f.unit)}"
 
 
 def _hours(seconds: float) -> str:

@@ -1,4 +1,5 @@
-"""A run without what is no measurement of its machine: a broken sensor, a leap, rows of another time.
+"""A run without what is no measurement of its machine: a broken sensor, a leap, rows of another time, what a logger
+repeats.
 
 One such channel decides a fit by least squares: it would be told as heat that nobody described. What is set aside is
 told, never lost silently. What may have been the machine stays: leaps of several channels at once (a coolant that is
@@ -20,6 +21,8 @@ from twin.logs.run import Run, Table, Tcp
 BROKEN: tuple[Kind, ...] = ("noise", "rail", "leap")  # of temperatures: what a channel shows from there on is not known
 NEAR = 120.0  # s between rows, beyond which a wetted surface (time constant 100 s and more) may seem to leap
 MOST = 0.8  # of the sensors that a splice moves: a door that opens moves those in the air
+
+_DOES = {"noise": "noise of", "rail": "rests at", "leap": "leaps by", "stuck": "stands still at", "held": "repeats"}
 
 
 def usable(run: Run, sensors: Collection[str]) -> tuple[Run, tuple[Fault, ...]]:
@@ -51,7 +54,8 @@ def _aside(run: Run, table: Table, named: Sequence[str]) -> tuple[Fault, ...]:
     splices = [_ended(run, f) for f in found if f.kind == "splice" and len(f.channels) > MOST * len(named)]
     broken = [_ended(run, f) for f in found if f.kind in BROKEN and (f.kind != "leap" or _alone(f, step))]
     broken = [f for f in broken if not any(s.first_row <= f.first_row <= s.last_row for s in splices)]
-    return tuple(sorted((*splices, *broken), key=lambda f: f.first_row))
+    repeated = [f for f in found if f.kind == "held"]
+    return tuple(sorted((*splices, *broken, *repeated), key=lambda f: f.first_row))
 
 
 def _alone(f: Fault, step: float) -> bool:
@@ -87,5 +91,4 @@ def aside_words(f: Fault) -> str:
     if f.kind == "splice":
         return f"all sensors and TCP rows {when}: rows of another time, {lines}"
     name = ", ".join(f"'{c}'" for c in f.channels)
-    what = {"noise": "noise of", "rail": "rests at", "leap": "leaps by", "stuck": "stands still at"}[f.kind]
-    return f"{name} {when}, {lines}: {what} {shown(f.size, f.unit)}"
+    return f"{name} {when}, {lines}: {_DOES[f.kind]} {shown(f.size, f.unit)}"

@@ -1,0 +1,86 @@
+"""Where a run begins that does not say so: what its sensors read first, and how far they are from each other."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.diagnose.test_lumped import MACHINE, NULLS, loads, twin
+from twin.diagnose.evidence.nulls import Form, start_of
+from twin.diagnose.model.beginning import Beginning, beginning_of
+from twin.diagnose.model.probed_model import make_probed_model
+from twin.logs.read import read_run
+from twin.logs.run import Run, Table
+from twin.logs.write import write_run
+from twin.machine.load import load_machine
+from twin.machine.parameters import parameters
+
+HOUR = 3600.0
+
+
+@pytest.fixture(scope="module")
+def probed(tmp_path_factory):
+    day = read_run(loads(tmp_path_factory.mktemp("beginning") / "day", 0))
+    machine = load_machine(MACHINE)
+    return make_probed_model(machine, parameters(machine), [day]), day
+
+
+def begins(probed, temperatures: Table | None, **more: object) -> Beginning:
+    model, day = probed
+    run = replace(day, temperatures=temperatures, initial_temperature=None, **more)
+    return beginning_of(model.base.load_model, model.base.sensors, run, model.runs[0].drive)
+
+
+def table(**first: float) -> Table:
+    time = np.arange(0.0, 2 * HOUR, 60.0)
+    columns = {name: value + 30.0 * (time > 120.0) for name, value in first.items()}
+    return Table(time, columns, dict.fromkeys(columns, "degC"))
+
+
+def test_a_run_begins_as_it_says_else_as_its_sensors_read_first_else_as_its_air(probed):
+    model, day = probed
+    assert model.runs[0].begins == Beginning(20.0, stated=True)
+    found = begins(probed, table(motor=26.0, head=23.0, column=22.0, air=19.0))
+    assert found == Beginning(23.0, apart=pytest.approx((10.0 / 3.0) ** 0.5))
+    air = day.loads.columns["air"][0]
+    assert begins(probed, None) == begins(probed, table(foreign=40.0)) == Beginning(pytest.approx(air, abs=0.1))
+    rested = begins(probed, table(motor=26.0), steady_start=True)
+    assert (rested.stated, rested.rested, rested.temperature) == (True, True, pytest.approx(air, abs=0.1))
+
+
+def test_what_is_not_known_of_a_beginning_is_left_open():
+    form = Form(start=0.1, start_apart=0.03)
+    assert start_of(Beginning(20.0, stated=True), form) == (0.03, 0.03)
+    assert start_of(Beginning(20.0), form) == (0.1, 0.03)
+    assert start_of(Beginning(23.0, apart=1.5), form) == (1.5, 1.5)
+
+
+def later(run: Run, since: float) -> Run:
+    """The run from a time on, of which nobody says where it begins."""
+
+    def cut(t: Table) -> Table:
+        kept = t.time >= since
+        return replace(t, time=t.time[kept] - since, columns={n: v[kept] for n, v in t.columns.items()})
+
+    return replace(run, loads=cut(run.loads), temperatures=cut(run.temperatures), tcp=None, initial_temperature=None)
+
+
+@pytest.mark.slow
+def test_a_machine_that_is_warm_from_the_hours_before_hides_nothing(tmp_path):
+    """It was heat that is not described, and a sensor at fault."""
+    twin("build", MACHINE, "-o", tmp_path / "four.h5")
+    for seed, day in enumerate(("monday", "tuesday")):
+        loads(tmp_path / f"{day}_loads", 4 * seed)
+        twin("simulate", MACHINE, tmp_path / f"{day}_loads", "-o", tmp_path / f"{day}_whole", "--noise-temperature",
+             "0.1 K", "--seed", seed)  # fmt: skip
+        run = later(read_run(tmp_path / f"{day}_whole"), 2.5 * HOUR)
+        first = [float(v[0]) for n, v in run.temperatures.columns.items() if n != "air"]
+        assert np.ptp(first) > 3.0
+        write_run(tmp_path / day, run)
+    days = [tmp_path / day for day in ("monday", "tuesday")]
+    twin("diagnose", tmp_path / "four.h5", *days, "-o", tmp_path / "found", *NULLS, "--no-build")
+    found = json.loads((tmp_path / "found" / "report.json").read_text(encoding="utf-8"))
+    assert (found["verdict"], found["causes"]) == ("nothing", [])
