@@ -49,6 +49,7 @@ def test_a_run_begins_as_it_says_else_as_its_sensors_read_first_else_as_its_air(
     assert begins(probed, None) == begins(probed, table(foreign=40.0)) == Beginning(pytest.approx(air, abs=0.1))
     rested = begins(probed, table(motor=26.0), steady_start=True)
     assert (rested.stated, rested.rested, rested.temperature) == (True, True, pytest.approx(air, abs=0.1))
+    assert rested.apart == pytest.approx(26.0 - rested.temperature)
 
 
 def test_what_is_not_known_of_a_beginning_is_left_open():

@@ -129,8 +129,9 @@ def prepare(
     for planned in study.runs:
         m, drive, signals = planned.measured, planned.run.drive, planned.run.signals
         parts += [m.mean_of, m.column, np.nan_to_num(m.count), m.tcp_step, m.tcp_share, m.pose, planned.z0,
-                  np.array(planned.run.begins.apart), np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma,
-                  *drive_arrays(drive), *(signals[name] for name in sorted(signals))]  # fmt: skip
+                  np.array(planned.run.begins.apart), np.array(planned.run.unlogged, dtype=int),
+                  np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
+                  *(signals[name] for name in sorted(signals))]  # fmt: skip
     # the window's coordinates: made anew on other cores they may be others, and z0 is zero at the reference temperature
     parts += [probed.B, *(body.C for body in probed.base.bodies)]
     asked = tuple((p.run.name, p.measured.from_first, tuple(sorted(p.run.signals))) for p in study.runs)

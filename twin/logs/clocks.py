@@ -62,6 +62,15 @@ def changes_only(table: Table) -> bool:
     return bool(np.mean(each > 0) > 0.98 and (n == 1 or np.median(each) <= max(1.0, n / 2)))
 
 
+def gaps_of(table: Table) -> list[tuple[float, float]]:
+    """Begin and end [s] of the stretches without a row, one usual step after the last row before; none where rows stand
+    only where something changes: what is not told there did not."""
+    step, usual = np.diff(table.time), usual_step(table)
+    if usual == 0.0 or changes_only(table):
+        return []
+    return [(float(table.time[k] + usual), float(table.time[k + 1])) for k in _lost(step, usual)]
+
+
 def _begin(run: Run, name: str, table: Table, where: str) -> list[Problem]:
     first = float(table.time[0])
     if abs(first) > 366.0 * _DAY:
@@ -78,10 +87,21 @@ def _begin(run: Run, name: str, table: Table, where: str) -> list[Problem]:
     return []
 
 
-def _gaps(step: np.ndarray, usual: float, where: str) -> list[Problem]:
+def _jitter(step: np.ndarray, usual: float) -> tuple[float, bool]:
+    """What 95 % of the steps [s] do not depart by from the usual one, and whether that is a regular beat."""
     jitter = float(np.quantile(np.abs(step - usual), 0.95))
-    regular = len(step) >= _LEAST and jitter < 0.1 * usual
-    gaps = np.flatnonzero(step > (_LOST if regular else _GAP) * usual)
+    return jitter, len(step) >= _LEAST and jitter < 0.1 * usual
+
+
+def _lost(step: np.ndarray, usual: float) -> np.ndarray:
+    """Which steps are gaps."""
+    _, regular = _jitter(step, usual)
+    return np.flatnonzero(step > (_LOST if regular else _GAP) * usual)
+
+
+def _gaps(step: np.ndarray, usual: float, where: str) -> list[Problem]:
+    jitter, regular = _jitter(step, usual)
+    gaps = _lost(step, usual)
     problems = []
     if len(gaps):
         gaps = gaps[np.argsort(-step[gaps], kind="stable")]

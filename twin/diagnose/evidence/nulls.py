@@ -124,6 +124,10 @@ def null(
         for j, vector in enumerate(split):
             if vector is not None:
                 forcing += _power(study, k, j)[:, None] * vector
+        for first, end in run.unlogged:
+            for j in sources_of_surfaces(study):
+                lost = swing(study, k, j) * rng.standard_normal()
+                forcing[first:end] += lost * body.B[:, body.sources.index(j)]
         fluctuation = _ornstein(rng, n, len(load.environments), form.air_time / 60.0) * form.air
         whole, part = start_of(run.begins, form)
         initial = np.zeros(body.n) if run.begins.stated else whole * rng.standard_normal() * body.one
@@ -201,6 +205,16 @@ def _power(study: Study, k: int, source: int) -> np.ndarray:
         place = int(np.searchsorted(drive.losses.grid, 30.0))
         return drive.losses.value[:, i, place]
     return drive.power[:, source]
+
+
+def sources_of_surfaces(study: Study) -> list[int]:
+    """All but those that are heat of a contact."""
+    return [j for j, source in enumerate(study.probed.base.load_model.sources) if not source.contact]
+
+
+def swing(study: Study, k: int, source: int) -> float:
+    """W, by which the heat of a source differs from time to time in a run: a standard deviation."""
+    return float(np.std(_power(study, k, source)))
 
 
 def lump_of(study: Study, place: int, form: Form) -> float:

@@ -14,6 +14,7 @@ Kinds by what they do to the model x' = A(theta) x + B(theta) u, y = C x:
     moved    j>p        P_j(t) (B_p - B_j)                    all of a source's heat elsewhere
     signal   q*f                                              a load channel times a factor
     start    m          T(0) of a member                      1 K
+    unlogged i.g.j      heat of a source in a gap of loads    1 W
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import numpy as np
 
 from twin.build.places import beside
 from twin.diagnose.evidence.film_laws import SPEEDS
-from twin.diagnose.evidence.nulls import convection
+from twin.diagnose.evidence.nulls import convection, sources_of_surfaces
 from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.probed_loads import gammas
 from twin.diagnose.model.study import Study, own_place
@@ -151,7 +152,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
 
     def add(
         kind: str, name: str, of: Sequence[np.ndarray], acting: Mapping[str, Sequence[np.ndarray | None]],
-        in_blocks: bool = False,
+        in_blocks: bool = False, at_start: bool = False,
     ) -> None:  # fmt: skip
         """A vector per run, as a column for each history, and for each block."""
         v = len(vectors[0])
@@ -159,7 +160,7 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
             own.append(np.asarray(vector))
         for history, values in acting.items():
             index[kind, name, history] = len(columns)
-            columns.append(Column(v, tuple(values)))
+            columns.append(Column(v, tuple(values), at_start))
         if not in_blocks:
             return
         block_of[kind, name] = len(columns) + np.arange(len(histories.blocks))
@@ -215,10 +216,15 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         add("signal", f"{name}*{factor:.6g}", of, always)
     for i in range(len(study.fitted)):
         for m, field in _fields(study):
-            pulse = np.zeros(n[i])
-            pulse[0] = nominal[i].rate
-            only_here = [pulse if j == i else None for j in range(len(runs))]
-            add("start", f"{runs[i].name}.{m}", [field] * len(runs), {"always": only_here})
+            only_here = [np.zeros(n[i]) if j == i else None for j in range(len(runs))]
+            add("start", f"{runs[i].name}.{m}", [field] * len(runs), {"always": only_here}, at_start=True)
+        for g, (first, end) in enumerate(study.runs[study.fitted[i]].run.unlogged):
+            gate = np.zeros(n[i])
+            gate[first:end] = 1.0
+            for j in sources_of_surfaces(study):
+                B = body.B[:, body.sources.index(j)]
+                only_here = [gate if k == i else None for k in range(len(runs))]
+                add("unlogged", f"{i}.{g}.{j}", [B] * len(runs), {"always": only_here})
     return Elements(histories, tuple(tuple(v) for v in vectors), tuple(columns), index, block_of)
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from twin.diagnose.evidence.formal import Described
-from twin.diagnose.evidence.nulls import Form, convection, lump_of, start_of
+from twin.diagnose.evidence.nulls import Form, convection, lump_of, start_of, swing
 from twin.diagnose.faults.elements import Elements, Key
 from twin.diagnose.faults.signal import CLOCK
 from twin.diagnose.model.study import Study, heated_places
 
 # Kinds that `described_forms` makes nuisances of: with every history, or the one named
 NUISANCE = {"film": "always", "capacity": "", "moved": "", "start": "", "joint": "", "contact": "",
-            "group": "", "air": ""}  # fmt: skip
+            "group": "", "air": "", "unlogged": ""}  # fmt: skip
 
 
 def is_nuisance(key: Key) -> bool:
@@ -45,6 +45,9 @@ def described_forms(study: Study, elements: Elements, raw: np.ndarray, form: For
             run = next(p.run for p in study.runs if source.startswith(f"{p.run.name}."))
             whole, part = start_of(run.begins, form)
             add((kind, source, history), whole if source == f"{run.name}.machine" else part)
+        elif kind == "unlogged":
+            i, _, j = map(int, source.split("."))
+            add((kind, source, history), swing(study, study.fitted[i], j))
     for (kind, _), own in elements.block_of.items():
         if kind in ("joint", "contact"):
             columns.append(form.contact * raw[:, own].astype(float).sum(axis=1))

@@ -10,12 +10,11 @@ from twin.diagnose.faults.fault import Family, Fault, Slot
 
 @dataclass(frozen=True)
 class Start(Fault):
-    """Heat of the first step of one run, whatever a history says."""
+    """What the state of one run begins with, whatever a history says."""
 
     def fill(self, slot: Slot) -> None:
-        history = slot.column.histories[slot.k]
-        if history is not None:
-            slot.force(slot.vector, history)
+        if slot.column.histories[slot.k] is not None:
+            slot.slots.initial[slot.s] = slot.vector
 
 
 FAULTS = (Start("initial_state", "start", "K", "runs.", 0, 0.2, 30.0, several=True),)

@@ -72,6 +72,7 @@ class Column:
 
     vector: int  # index of the vector
     histories: tuple[np.ndarray | None, ...]  # per run of the study; None: not in that run
+    at_start: bool = False  # no forcing: the vector is what the state begins with there, and the history is zero
 
 
 def respond(
@@ -100,8 +101,10 @@ def _integrated(
     C = body.C[planned.measured.column].astype(np.float32)
     used, which = np.unique([c.vector for c in columns], return_inverse=True)
     S = np.stack([np.asarray(c.histories[k], dtype=np.float32) for c in columns], axis=1)  # (n_steps, n)
-    X = np.zeros((r, len(columns)), dtype=np.float32)
+    begins = [vectors[c.vector] if c.at_start else np.zeros(r) for c in columns]
+    X = np.stack(begins, axis=1).astype(np.float32)
     T = np.zeros((n_steps + 1, len(C), len(columns)), dtype=np.float32)
+    T[0] = C @ X
     step, share = planned.rows.step, planned.rows.share
     needed = {int(s) for s in step} | {int(s) + 1 for s in step}
     kept = {0: X}

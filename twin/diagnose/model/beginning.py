@@ -2,7 +2,8 @@
 
 A machine that ran the day before is kelvins warmer than the air, and not everywhere alike. What the sensors read in the
 first minutes tells both: their median where the machine begins as a whole, and how far they are from it by how much
-parts may differ. Without such readings it begins at the temperature of its surroundings.
+parts may differ. Without such readings it begins at the temperature of its surroundings. After a rest, of which a run
+may say so, a part is where the model has it but for as much as its sensors differ from the air: that moved, too.
 """
 
 from __future__ import annotations
@@ -34,15 +35,17 @@ def beginning_of(load: LoadModel, sensors: Collection[str], run: Run, drive: Dri
     if run.initial_temperature is not None:
         return Beginning(run.initial_temperature, stated=True)
     air = float(measured_air(load, drive)[0, load.surroundings])
-    if run.steady_start:
-        return Beginning(air, stated=True, rested=True)
+    read = _first(sensors, run, drive.time[0] + FIRST)
+    middle = air if run.steady_start or not len(read) else float(np.median(read))
+    apart = float(np.sqrt(np.mean((read - middle) ** 2))) if len(read) else 0.0
+    return Beginning(middle, stated=run.steady_start, rested=run.steady_start, apart=apart)
+
+
+def _first(sensors: Collection[str], run: Run, until: float) -> np.ndarray:
+    """(k,) degC: means of what the sensors that have readings by then show."""
     table = run.temperatures
     if table is None:
-        return Beginning(air)
-    first = table.time <= drive.time[0] + FIRST
+        return np.zeros(0)
+    first = table.time <= until
     read = [values[first & np.isfinite(values)] for name, values in table.columns.items() if name in sensors]
-    means = [float(own.mean()) for own in read if len(own)]
-    if not means:
-        return Beginning(air)
-    middle = float(np.median(means))
-    return Beginning(middle, apart=float(np.sqrt(np.mean((np.array(means) - middle) ** 2))))
+    return np.array([own.mean() for own in read if len(own)])

@@ -19,6 +19,7 @@ from twin.calibrate.fit.measured import tcp_positions
 from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.window import merged, window_basis
 from twin.diagnose.model.beginning import Beginning, beginning_of
+from twin.diagnose.model.gaps import unlogged
 from twin.diagnose.model.ports_first import PortsFirst
 from twin.diagnose.model.probed_loads import ProbedLoads, loads_for
 from twin.diagnose.model.rich_probed_model import Mesh, RichProbedModel, rich_probed_model
@@ -53,6 +54,7 @@ class ProbedRun:
     drive: Drive  # of the description
     signals: dict[str, np.ndarray]  # (n_steps,) means over the drive's steps, currents as rms, SI
     begins: Beginning
+    unlogged: tuple[tuple[int, int], ...]  # first step and end of stretches without loads
     loads: ProbedLoads
 
     @property
@@ -187,7 +189,7 @@ def _assembled(
     base = replace(base, sensors=tuple(whole.sensors[k] for k in real))
     prepared = prepare(base)
     made = [
-        ProbedRun(name, drive, _means(base, run, drive), own, loads_for(base, drive))
+        ProbedRun(name, drive, _means(base, run, drive), own, unlogged(run, drive), loads_for(base, drive))
         for run, name, drive, own in zip(runs, names, drives, begins, strict=True)
     ]  # fmt: skip
     return ProbedModel(

@@ -76,8 +76,9 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
     ]  # fmt: skip
     # nor is a number out of its tolerance for sure where a cause beside which it is not explains more: too little to be
-    # named alone, but more than its family does by chance. What bends scores more than it removes, and is refitted at
-    # the same place alone: motion that cools a film, or more of that film
+    # named alone, but more than its family does by chance. At the same place, with no window to choose, it need not:
+    # more of a film, or of its medium another temperature. What bends scores more than it removes, and is refitted
+    # there alone: motion that cools a film
     known |= {h.name for h, _ in rivals}
     likely = [
         h for h in more[: detector.policy.others]
@@ -85,9 +86,9 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         and not bent(detector, h) and not _stays(detector, there, one, h)
     ]  # fmt: skip
     here = [
-        exact(detector, y, before, h) for h in ranked
-        if h.name == one.hypothesis.name and h.family != one.hypothesis.family and bent(detector, h)
-        and not _stays(detector, there, one, h)
+        exact(detector, y, before, h) if bent(detector, h) else h for h in ranked
+        if h.name == one.hypothesis.name and h.family != one.hypothesis.family
+        and (bent(detector, h) or not h.when.windows) and not _stays(detector, there, one, h)
     ]  # fmt: skip
     likely += [h for h in here if h.statistic > removed - detector.policy.close]
     near = distinct([*near, *likely])

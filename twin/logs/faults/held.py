@@ -2,7 +2,7 @@
 
 Heat does not wait, and the reading after such a stretch leaps. With a share p of changes from row to row, k equal
 readings one after the other have a probability of (1 - p)^k where noise makes the changes. In a rounded channel, where
-the temperature makes them, they come together and say nothing.
+the temperature makes them, they come together and say nothing: there a leap must end the rest (`breaks.rest_before`).
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 from twin.logs.faults.breaks import Stretch
 from twin.logs.faults.series import Series
 
-_NOISE = 0.5  # share of changes, from which on noise and not the temperature makes them: it is beyond the last digit
-_RARE = 25.0  # - logarithm of the probability: as of standstills (`twin.logs.stuck`)
+_NOISE = 0.7  # share of changes, from which on noise makes them: rounded channels of a real lathe have up to 0.65
+_RARE = 1e-6  # found by chance in a run, on an average
 _USUAL = 0.98  # of all rests, the shorter ones: what a logger repeats is among the others
 _SURELY = 0.99  # share of changes, at most: no few hundred rows tell more
 LONGEST = 1800.0  # s, of what a logger repeats: a sensor that stands still for longer is stuck
@@ -25,5 +25,7 @@ def held(s: Series) -> list[Stretch]:
     rests = np.diff(edges)
     usual = rests[rests <= np.quantile(rests, _USUAL)]
     share = min(len(usual) / usual.sum(), _SURELY)
-    found = np.flatnonzero(rests * -np.log1p(-share) >= _RARE) if share >= _NOISE else []
+    if share < _NOISE:
+        return []
+    found = np.flatnonzero(len(s.values) * (1.0 - share) ** rests <= _RARE)
     return [Stretch(int(edges[k]) + 1, int(edges[k + 1]) - 1, float(s.values[edges[k]])) for k in found]
