@@ -131,10 +131,14 @@ def _end_of_rest(values: np.ndarray, first: int) -> int:
     return first + int(differ[0]) - 1 if len(differ) else len(values) - 1
 
 
-def _longest_rest(values: np.ndarray) -> int:
-    """The most equal readings in a row."""
+def rests(values: np.ndarray) -> np.ndarray:
+    """How many equal readings stand in a row, one number for each row of them."""
     edges = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0, [True]])) if len(values) else np.zeros(1)
-    return int(np.max(np.diff(edges), initial=0))
+    return np.diff(edges)
+
+
+def _longest_rest(values: np.ndarray) -> int:
+    return int(np.max(rests(values), initial=0))
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:

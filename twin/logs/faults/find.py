@@ -42,8 +42,8 @@ def faults_of(run: Run) -> list[Fault]:
     noisy = [_fault("noise", s, n.first, n.last, n.size) for s in (*temperatures, *tcp) for n in noise(s)]
     temperatures, tcp = (long_enough(_without(s, noisy) for s in series) for series in (temperatures, tcp))
     borders = [t for segment in run.segments for t in (segment.start, segment.end)]
-    still = _with_held(_stuck(run, temperatures), temperatures)
-    found = [*noisy, *_splices(temperatures, borders), *still, *_stuck_probes(run, tcp)]
+    found = [*noisy, *_splices(temperatures, borders), *_stuck(run, temperatures), *_stuck_probes(run, tcp)]
+    found += _repeated(temperatures, found)
     for s in (*temperatures, *tcp):
         known = [f for f in found if f.fault.kind == "splice" or _of(f.fault, s)]
         leapt = _rails_and_leaps(s, known, borders)
@@ -98,7 +98,7 @@ def _rails_and_leaps(s: Series, known: Sequence[_Found], borders: Sequence[float
             found.append(_fault("leap", s, i, at[0][0] - 1, size))
             at = at[1:]
         elif (rest := rest_before(s, i)) is not None:
-            found.append(_fault("stuck", s, rest.first, rest.last, rest.size))
+            found.append(_at_rest(s, rest.first, rest.last))
         else:
             kind: Kind = "rezero" if s.table == "tcp" and _to_zero(s, i, size, change.usual) else "leap"
             found.append(_fault(kind, s, i, len(s.row) - 1, size))
@@ -131,16 +131,20 @@ def _stuck(run: Run, series: Sequence[Series]) -> list[_Found]:
         s = named[still.name]
         first, last = (int(np.searchsorted(s.row, row)) for row in (still.first, still.last))
         if not rests_by_rounding(s, last):
-            found.append(_fault("stuck", s, first, last, still.value))
+            found.append(_at_rest(s, first, last))
     return found
 
 
-def _with_held(stuck: Sequence[_Found], series: Sequence[Series]) -> list[_Found]:
-    """Standstills, and what a logger repeats in place of the shorter ones of them."""
-    lasting = [f for f in stuck if f.fault.last_time - f.fault.first_time > LONGEST]
-    repeated = [_fault("held", s, h.first, h.last, h.size) for s in series for h in held(s)]
-    repeated = [f for f in repeated if not any(_overlap(f.fault, other.fault) for other in lasting)]
-    return [f for f in stuck if not any(_overlap(f.fault, other.fault) for other in repeated)] + repeated
+def _at_rest(s: Series, first: int, last: int) -> _Found:
+    """A standstill of readings first .. last: of a temperature for a while, what a logger repeats."""
+    repeated = s.table == "temperatures" and s.time[last] - s.time[first] <= LONGEST
+    return _fault("held" if repeated else "stuck", s, first + repeated, last, s.values[first])
+
+
+def _repeated(series: Sequence[Series], known: Sequence[_Found]) -> list[_Found]:
+    """What a logger repeats, beside what is known already."""
+    found = [_fault("held", s, h.first, h.last, h.size) for s in series for h in held(s)]
+    return [f for f in found if not any(_overlap(f.fault, other.fault) for other in known)]
 
 
 def _stuck_probes(run: Run, series: Sequence[Series]) -> list[_Found]:

@@ -9,23 +9,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.logs.faults.breaks import Stretch
+from twin.logs.faults.breaks import Stretch, rests
 from twin.logs.faults.series import Series
 
 _NOISE = 0.7  # share of changes, from which on noise makes them: rounded channels of a real lathe have up to 0.65
 _RARE = 1e-6  # found by chance in a run, on an average
-_USUAL = 0.98  # of all rests, the shorter ones: what a logger repeats is among the others
+_USUAL = 0.98  # of the rests of a channel, the shorter ones: what a logger repeats is among the others
 _SURELY = 0.99  # share of changes, at most: no few hundred rows tell more
 LONGEST = 1800.0  # s, of what a logger repeats: a sensor that stands still for longer is stuck
 
 
 def held(s: Series) -> list[Stretch]:
     """Stretches that repeat the reading before them."""
-    edges = np.flatnonzero(np.concatenate([[True], np.diff(s.values) != 0.0, [True]]))
-    rests = np.diff(edges)
-    usual = rests[rests <= np.quantile(rests, _USUAL)]
+    lasting = rests(s.values)
+    usual = lasting[lasting <= np.quantile(lasting, _USUAL)]
     share = min(len(usual) / usual.sum(), _SURELY)
     if share < _NOISE:
         return []
-    found = np.flatnonzero(len(s.values) * (1.0 - share) ** rests <= _RARE)
-    return [Stretch(int(edges[k]) + 1, int(edges[k + 1]) - 1, float(s.values[edges[k]])) for k in found]
+    end = np.cumsum(lasting)
+    return [
+        Stretch(int(end[k] - lasting[k]) + 1, int(end[k]) - 1, float(s.values[end[k] - 1]))
+        for k in np.flatnonzero(len(s.values) * (1.0 - share) ** lasting <= _RARE)
+    ]
