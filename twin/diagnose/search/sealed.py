@@ -1,7 +1,8 @@
 """The sealed runs judge the headline: what names a cause in the machine must predict runs that were not looked at.
 
 They never make a name: a sensor fault, or an event of the runs that were looked at, shows in no other run. But causes
-of the machine are withdrawn with which the sealed runs are less likely, beyond chance, than with a recalibrated model.
+of the machine are withdrawn with which the sealed runs are less likely, beyond chance, than with a recalibrated model:
+that something is there all the same is said where the other runs leave no doubt.
 Where they are likelier with another size that the data allow, they refute the size alone: the name stays, and nothing
 is written. Such sizes are the smallest of the 95 % interval, and for a declared number what the settled calibration
 makes of it without its tolerance. What is told of a declared number is judged beside a calibration of all others, and a
@@ -43,11 +44,7 @@ class Judged:
     note: str = ""  # why a name was withdrawn
     size: str = ""  # why its size was
     less: str = ""  # which of several was withdrawn, beside which the others would have been
-
-    @property
-    def refuted(self) -> bool:
-        """Whether all that was named in the machine is withdrawn."""
-        return self.verdict == "unknown" and bool(self.note)
+    refuted: bool = False  # all that was named in the machine is withdrawn
 
 
 def judged(
@@ -95,7 +92,17 @@ def judged(
     )
     if rivals := list(dict.fromkeys(f"{r.family.replace('_', ' ')} at {r.place}" for c in extension for r in c.rivals)):
         note += f". Not asked of the sealed run, and nearly as likely in the others: {', '.join(rivals)}"
-    return Judged("unknown", tuple(c for c in causes if c not in extension), (), table, note)
+    rest = tuple(c for c in causes if c not in extension)
+    left = "unknown" if _evident(found) else "sensor" if rest else "nothing"
+    return Judged(left, rest, (), table, note, refuted=True)
+
+
+def _evident(found: Search) -> bool:
+    """Whether something is there though its name was refuted: heat of any history that passes, or a cause that explains
+    so much more than it needs that its misfits would pass. A name that has just passed was chance."""
+    heat = max(found.steps[0].parts.values(), default=0.0)
+    strong = any(a.statistic > found.detector.policy.later * a.threshold for a in found.accepted)
+    return heat > found.detector.thresholds["unknown"] or strong
 
 
 def _beside_declared(found: Search, y: np.ndarray) -> Search:
