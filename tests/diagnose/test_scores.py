@@ -243,3 +243,14 @@ def test_days_that_would_cool_are_left_out(made, size):
     assert (a > 0.0).sum() < 3 or min(size) > 0.0
     np.testing.assert_allclose(found.amplitude[0, 0], a, rtol=1e-5, atol=1e-9)
     assert found.statistic[0, 0] == pytest.approx(y @ projector(y) - left**2, rel=1e-6)
+
+
+def test_nuisances_that_are_one_to_rounding_are_projected_out_as_one():
+    """Of measurements beyond all reason a fit bends parameters until two do the same."""
+    rng = np.random.default_rng(5)
+    one = 1e12 * rng.standard_normal(M)
+    both = np.column_stack([one, one * (1.0 + 1e-16), one + 1e-6 * rng.standard_normal(M)])
+    white = rng.standard_normal(M)
+    np.testing.assert_allclose(
+        Projector.of(both)(white), white - one * (one @ white) / (one @ one), atol=1e-3 * np.abs(white).max()
+    )

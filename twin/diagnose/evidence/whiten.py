@@ -20,6 +20,8 @@ import scipy.linalg
 from twin.calibrate.fit.noise import Channels
 from twin.diagnose.model.study import Study
 
+ROUNDING = 1e-10  # of what data say of a nuisance, by which it is held where it is another one to rounding
+
 
 @dataclass(frozen=True)
 class Whitener:
@@ -65,7 +67,12 @@ class Projector:
     def of(cls, *blocks: np.ndarray, gram: np.ndarray | None = None) -> Projector:
         """From the columns; gram: N^T N, where it is known."""
         known = np.block([[a.T @ b for b in blocks] for a in blocks]) if gram is None else gram
-        return cls(blocks, scipy.linalg.cho_factor(np.eye(len(known)) + known, lower=True))
+        precision = np.eye(len(known)) + known
+        try:
+            factor = scipy.linalg.cho_factor(precision, lower=True)
+        except np.linalg.LinAlgError:  # columns alike to rounding, of measurements beyond all reason
+            factor = scipy.linalg.cho_factor(precision + ROUNDING * np.diag(np.diag(known)), lower=True)
+        return cls(blocks, factor)
 
     @cached_property
     def N(self) -> np.ndarray:

@@ -121,10 +121,7 @@ def _named(
     """A strong hypothesis by what is left once it is named; unchanged where that explains no more."""
     if fault_of(h).curved or not strong(detector, h):
         return h
-    try:
-        after, _ = refit(detector, y, beginning(fitted.x, detector.policy), [*accepted, as_scored(detector.study, h)])
-    except np.linalg.LinAlgError:  # measurements beyond all reason have bent the model as far: nothing is compared
-        return h
+    after, _ = refit(detector, y, beginning(fitted.x, detector.policy), [*accepted, as_scored(detector.study, h)])
     return replace(h, statistic=max(h.statistic, misfit(detector, fitted) - misfit(detector, after)))
 
 
