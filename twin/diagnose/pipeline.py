@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from twin.diagnose.faults.channels_check import channels_at_fault, warm_place_no
 from twin.diagnose.faults.coarse_model import too_coarse
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import FAMILIES
-from twin.diagnose.model.probed_model import ProbedModel, drive_arrays, make_probed_model
+from twin.diagnose.model.probed_model import ProbedModel, ProbedRun, drive_arrays, make_probed_model
 from twin.diagnose.model.study import make_study
 from twin.diagnose.model.surrogate import Surrogate
 from twin.diagnose.model.time_step import time_step
@@ -199,6 +199,7 @@ def diagnose(
     shown = beside_sensors(found, y, settings.families) if verdict == "unknown" else found
     groups = {f.name: f.group for f in settings.families}
     notes = [*(f"{m.name}: {text}" for m in plans for text in m.skipped), *map(warm_place_note, judgement.warm)]
+    notes += [f"{planned.run.name}: {text}" for planned in study.runs for text in _left_open(planned.run)]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
     verdict, causes, extension = opened.verdict, opened.causes, opened.extension
@@ -270,6 +271,18 @@ def diagnose(
         channels=tuple(channel_rows(traces, judgement, fitted)),
     )
     return Result(diagnosis, found, extension, settings.families, described)
+
+
+def _left_open(run: ProbedRun) -> Iterator[str]:
+    """What a run does not say of itself."""
+    begins, dt = run.begins, run.step
+    if not begins.stated and begins.apart > 0.0:
+        yield (
+            f"it does not state its initial temperature, and begins at the median of what its sensors read first, "
+            f"{begins.temperature:.1f} degC, every part within {begins.apart:.2g} K (standard deviation)"
+        )
+    if lost := sum(end - first for first, end in run.unlogged):
+        yield f"{dt * lost / 3600.0:.2g} h without a row of its loads, in which any heat of the sources is allowed for"
 
 
 def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unknown: Unknown | None) -> Scene | None:

@@ -11,7 +11,7 @@ from twin.logs.run import Run
 from twin.rom.drive import Drive
 
 LEAST = 300.0  # s, one mean of measurements: of less no reading tells
-PIECE = 600.0  # s, at most, with a heat of its own: light parts tell no more of a quarter of an hour
+PIECE = 600.0  # s, at most, with a heat of its own: two means of measurements
 
 
 def unlogged(run: Run, drive: Drive) -> tuple[tuple[int, int], ...]:

@@ -19,10 +19,12 @@ _CALM = {"degC": 5, "m": 20}
 _NOISE = 3.0
 # The same, to what the sound readings span: a sensor beside a winding flickers with each cut by a per cent of its rise
 _SPAN = 0.05
-_REST = 10  # rows that a rail lasts at least, and
+_REST = 10  # rows that a rail lasts at least, and what a logger repeats until a leap, and
 _LONGER = 3.0  # times the longest rest of the same channel elsewhere: rounded channels rest, too
 _DIGIT = 1.5  # last digits, between one and two
 _STUCK = 20  # rows, of a rest that a leap ends
+_OFTEN = 0.9  # of the rests of a channel, the shorter ones: usual
+LONGEST = 1800.0  # s, of what a logger repeats: a sensor that stands still for longer is stuck
 POSSIBLE = (-50.0, 200.0)  # degC: beyond what any sensor on a machine tool can read: a rail, however short
 _SHORT = 3  # rows of such a one
 
@@ -108,11 +110,14 @@ def rail(s: Series, leap: int) -> Stretch | None:
 
 
 def rest_before(s: Series, leap: int) -> Stretch | None:
-    """The longest rest of a channel, where it ends by a leap: the channel was stuck, and did not rest."""
+    """The longest rest of a channel, where it ends by a leap: the channel was stuck, and did not rest. Up to LONGEST it
+    need be far longer than usual alone: a logger repeats readings now and then."""
     differ = np.flatnonzero(s.values[:leap] != s.values[leap - 1])
     first = int(differ[-1]) + 1 if len(differ) else 0
     elsewhere = max(_longest_rest(s.values[:first]), _longest_rest(s.values[leap:]))
-    if leap - first > max(_STUCK, elsewhere):
+    usual = float(np.quantile(rests(s.values), _OFTEN))
+    repeated = s.time[leap] - s.time[first] <= LONGEST and leap - first >= max(_REST, _LONGER * usual)
+    if repeated or leap - first > max(_STUCK, elsewhere):
         return Stretch(first, leap - 1, float(s.values[first]))
     return None
 

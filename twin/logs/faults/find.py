@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.logs.faults.breaks import noise, rail, rest_before, rests_by_rounding
+from twin.logs.faults.breaks import LONGEST, noise, rail, rest_before, rests_by_rounding
 from twin.logs.faults.cold_start import begins_apart
 from twin.logs.faults.fault import Fault, Kind
-from twin.logs.faults.held import LONGEST, held
+from twin.logs.faults.held import held
 from twin.logs.faults.leaps import Changes, changes, leaps, leapt_together, set_to_zero
 from twin.logs.faults.series import Series, beside, long_enough, tcp_series, temperature_series
 from twin.logs.run import Run, Table
@@ -42,8 +42,10 @@ def faults_of(run: Run) -> list[Fault]:
     noisy = [_fault("noise", s, n.first, n.last, n.size) for s in (*temperatures, *tcp) for n in noise(s)]
     temperatures, tcp = (long_enough(_without(s, noisy) for s in series) for series in (temperatures, tcp))
     borders = [t for segment in run.segments for t in (segment.start, segment.end)]
-    found = [*noisy, *_splices(temperatures, borders), *_stuck(run, temperatures), *_stuck_probes(run, tcp)]
-    found += _repeated(temperatures, found)
+    repeated = _repeated(temperatures)
+    splices = _splices(temperatures, [*borders, *(f.fault.last_time for f in repeated)])
+    found = [*noisy, *splices, *_stuck(run, temperatures), *_stuck_probes(run, tcp)]
+    found += [f for f in repeated if not any(_overlap(f.fault, other.fault) for other in found)]
     for s in (*temperatures, *tcp):
         known = [f for f in found if f.fault.kind == "splice" or _of(f.fault, s)]
         leapt = _rails_and_leaps(s, known, borders)
@@ -141,10 +143,9 @@ def _at_rest(s: Series, first: int, last: int) -> _Found:
     return _fault("held" if repeated else "stuck", s, first + repeated, last, s.values[first])
 
 
-def _repeated(series: Sequence[Series], known: Sequence[_Found]) -> list[_Found]:
-    """What a logger repeats, beside what is known already."""
-    found = [_fault("held", s, h.first, h.last, h.size) for s in series for h in held(s)]
-    return [f for f in found if not any(_overlap(f.fault, other.fault) for other in known)]
+def _repeated(series: Sequence[Series]) -> list[_Found]:
+    """What a logger repeats: the next readings may leap, of all channels at once."""
+    return [_fault("held", s, h.first, h.last, h.size) for s in series for h in held(s)]
 
 
 def _stuck_probes(run: Run, series: Sequence[Series]) -> list[_Found]:

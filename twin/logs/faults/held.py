@@ -16,7 +16,6 @@ _NOISE = 0.7  # share of changes, from which on noise makes them: rounded channe
 _RARE = 1e-6  # found by chance in a run, on an average
 _USUAL = 0.98  # of the rests of a channel, the shorter ones: what a logger repeats is among the others
 _SURELY = 0.99  # share of changes, at most: no few hundred rows tell more
-LONGEST = 1800.0  # s, of what a logger repeats: a sensor that stands still for longer is stuck
 
 
 def held(s: Series) -> list[Stretch]:
