@@ -42,10 +42,7 @@ def faults_of(run: Run) -> list[Fault]:
     noisy = [_fault("noise", s, n.first, n.last, n.size) for s in (*temperatures, *tcp) for n in noise(s)]
     temperatures, tcp = (long_enough(_without(s, noisy) for s in series) for series in (temperatures, tcp))
     borders = [t for segment in run.segments for t in (segment.start, segment.end)]
-    repeated = _repeated(temperatures)
-    splices = _splices(temperatures, [*borders, *(f.fault.last_time for f in repeated)])
-    found = [*noisy, *splices, *_stuck(run, temperatures), *_stuck_probes(run, tcp)]
-    found += [f for f in repeated if not any(_overlap(f.fault, other.fault) for other in found)]
+    found = [*noisy, *_of_temperatures(run, temperatures, borders), *_stuck_probes(run, tcp)]
     for s in (*temperatures, *tcp):
         known = [f for f in found if f.fault.kind == "splice" or _of(f.fault, s)]
         leapt = _rails_and_leaps(s, known, borders)
@@ -57,6 +54,13 @@ def faults_of(run: Run) -> list[Fault]:
         found.append(_fault(kind, s, 0, len(s.row) - 1, apart.size))
     order = [*(run.temperatures.columns if run.temperatures is not None else ()), "dx", "dy", "dz"]
     return sorted(_together(found, order), key=lambda f: (f.table != "temperatures", f.first_row))
+
+
+def _of_temperatures(run: Run, series: Sequence[Series], borders: Sequence[float]) -> list[_Found]:
+    """Splices, standstills, and what a logger repeats beside these: after it all channels may leap at once."""
+    repeated = [_fault("held", s, h.first, h.last, h.size) for s in series for h in held(s)]
+    found = _splices(series, [*borders, *(f.fault.last_time for f in repeated)]) + _stuck(run, series)
+    return found + [f for f in repeated if not any(_overlap(f.fault, other.fault) for other in found)]
 
 
 def _splices(series: Sequence[Series], borders: Sequence[float]) -> list[_Found]:
@@ -141,11 +145,6 @@ def _at_rest(s: Series, first: int, last: int) -> _Found:
     """A standstill of readings first .. last: of a temperature for a while, what a logger repeats."""
     repeated = s.table == "temperatures" and s.time[last] - s.time[first] <= LONGEST
     return _fault("held" if repeated else "stuck", s, first + repeated, last, s.values[first])
-
-
-def _repeated(series: Sequence[Series]) -> list[_Found]:
-    """What a logger repeats: the next readings may leap, of all channels at once."""
-    return [_fault("held", s, h.first, h.last, h.size) for s in series for h in held(s)]
 
 
 def _stuck_probes(run: Run, series: Sequence[Series]) -> list[_Found]:
