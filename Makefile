@@ -78,7 +78,7 @@ campaign: $(READY) ## hide effects in the five-axis machine and look for them (M
 campaign-machines: $(READY) ## the same in drawn and in other shipped machines (KINDS="lumped nodes"; SCHEDULER=tcp://HOST:PORT)
 	@$(BIN)/python -c 'import gmsh' 2>/dev/null || { echo "installing gmsh, for the other mesh of the trials"; \
 	    $(BIN)/python -m pip install -qq --disable-pip-version-check --no-build-isolation -e '.[mesh]'; }
-	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.machines_campaign $(or $(MINUTES),inf) $(or $(FIRST),529) $(KINDS)
+	OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m benchmarks.machines_campaign $(or $(MINUTES),inf) $(or $(FIRST),531) $(KINDS)
 
 .PHONY: fuzz
 fuzz: $(READY) ## 2,000 damaged descriptions, artefacts and run folders, 1,000 flipped bits (FIRST=4000 are others; 4 min)
