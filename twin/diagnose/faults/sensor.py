@@ -11,6 +11,7 @@ from twin.diagnose.faults.context import Singly
 from twin.diagnose.faults.fault import Family, Fault
 from twin.diagnose.faults.readings import lagged
 from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Cause
 
 
 @dataclass(frozen=True)
@@ -34,10 +35,16 @@ FAULTS = (
     Fault("sensor", "swapped", "1", "sensors.", 1, 0.0, fixed=True, read=True, exchanges=True, called="swapped"),
 )  # fmt: skip
 
+
+def said(cause: Cause) -> list[str]:
+    """Of the quickest sensor it says as much of all."""
+    return ["as if it followed late, or as if all temperatures were logged late"] if cause.history == "lag" else []
+
+
 FAMILY = Family(
     9, "sensor", "A temperature sensor is at fault",
     "Offset, drift, lag, contact to the part lost, stuck, or two sensors swapped. The machine model is left alone.",
     "y + a;  a t;  filter;  (1 - w) y + w T_air", "one channel only: neighbours and TCP agree with the model",
     "0.15 K, 0.1 K/day, 2 min, 5 %", "either", "every sensor; every pair", "sensor", Singly(FAULTS),
-    what="a temperature sensor at fault", channel=True, kind_told=True,
+    what="a temperature sensor at fault", channel=True, kind_told=True, said=said,
 )  # fmt: skip
