@@ -69,7 +69,8 @@ def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[
     each of the most promising `signals`; where that explains half of what a signal must, `closely` of them.
 
     Exact derivatives may find what the surrogate of the fit without a cause does not, whatever the factor: twice a
-    speed and half of it explained as much. So what is left without any is fitted in the same way.
+    speed and half of it explained as much. So where a fit without any, by the same derivatives, explains most of it, a
+    factor counts from there.
     """
     before, found = misfit(detector, fitted), list[Hypothesis]()
 
@@ -84,8 +85,9 @@ def declared_exactly(detector: Detector, y: np.ndarray, fitted: Fitted) -> list[
         for h in own[: detector.policy.closely]:
             corrected = with_signal(detector.study, fault_of(h).bare(name), fault_of(h).factor(h.name)[1])
             least = 0.5 * detector.thresholds[h.family]
-            left = _fitted_by(detector, y, corrected, before - least)
-            statistic = (without() if left < before - least else before) - left
+            statistic = before - _fitted_by(detector, y, corrected, before - least)
+            if statistic > least and (other := before - without()) > 0.5 * statistic:
+                statistic -= other
             found.append(replace(h, statistic=max(statistic, 0.0)))
             if statistic < least:
                 break
