@@ -8,8 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.diagnose import small_case
 from tests.diagnose.test_lumped import MACHINE, NULLS, loads, twin
 from twin.diagnose.evidence.nulls import Form, start_of
+from twin.diagnose.faults.elements import elements_of
+from twin.diagnose.model.bank import nominal_run, respond
 from twin.diagnose.model.beginning import Beginning, beginning_of
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.logs.read import read_run
@@ -57,6 +60,22 @@ def test_what_is_not_known_of_a_beginning_is_left_open():
     assert start_of(Beginning(20.0, stated=True), form) == (0.03, 0.03)
     assert start_of(Beginning(20.0), form) == (0.1, 0.03)
     assert start_of(Beginning(23.0, apart=1.5), form) == (1.5, 1.5)
+
+
+def test_another_temperature_at_the_start_is_in_the_first_row():
+    """Of rows that count from the first one, the others had a step: it was heat of the first step."""
+    study = small_case.study()
+    nominal = [nominal_run(study, k) for k in range(len(study.runs))]
+    elements = elements_of(study, nominal)
+    column = elements.index["start", "run_0.machine", "always"]
+    T, w = study.runs[0].split(respond(study, nominal, elements.vectors, [elements.columns[column]])[study.rows[0], 0])
+    x, slots = np.zeros(len(study.scale)), study.slots(0)
+    slots.initial[0] = elements.vectors[0][elements.columns[column].vector]
+    exact_T, exact_w = study.runs[0].split(study.outputs(0, x, slots, (0.1,)) - study.outputs(0, x))
+    np.testing.assert_allclose(T[:3], exact_T[:3] / 0.1, atol=0.03)
+    np.testing.assert_allclose(w[0], exact_w[0] / 0.1, atol=0.03 * np.abs(w).max())
+    assert np.abs(w[0]).max() > 0.0
+    assert elements.columns[column].at_start
 
 
 def later(run: Run, since: float) -> Run:

@@ -248,3 +248,16 @@ def test_two_sensors_with_each_others_name_are_judged_by_putting_them_back():
     assert best.name == h.name
     assert best.statistic == pytest.approx(misfit(detector, fitted) - misfit(detector, detector.fitter(y)), rel=0.1)
     assert not swapped_candidates(detector, y, detector.fitter(y))
+
+
+@pytest.mark.parametrize(("without", "counts_from"), [(700.0, 1000.0), (250.0, 250.0)])
+def test_a_factor_counts_from_a_fit_by_the_same_derivatives_where_that_explains_most(monkeypatch, without, counts_from):
+    """Twice a speed and half of it explained the same of a healthy machine: the derivatives did."""
+    detector = small_case.made_detector()
+    module, plain = sys.modules[declared_exactly.__module__], detector.study
+    monkeypatch.setattr(module, "misfit", lambda *_: 1000.0)
+    monkeypatch.setattr(module, "_fitted_by", lambda _, y, study, enough: without if study is plain else 100.0)
+    y = plain.joined(lambda p: (p.measured.temperature, p.measured.tcp))
+    found = declared_exactly(detector, y, detector.fitter(y))
+    assert found
+    assert {h.statistic for h in found} == {counts_from - 100.0}

@@ -438,6 +438,9 @@ def test_a_channel_that_an_extension_makes_worse_than_it_was_delivered_is_told()
     assert gain.ci95[0] > 0.0 > gain.ci95_delivered[1]
     d = replace(diagnosis("named"), gain=(gain, replace(gain, channel="dx", ci95_delivered=(-1e-6, 1e-6))))
     (line,) = gain_lines(d)
+    assert " extended (root mean square" in line
+    (refused,) = gain_lines(replace(d, notes=("withdrawn: heat source at bed. It explains nothing",)))
+    assert " with what was withdrawn (root mean square" in refused
     assert line.endswith("better beyond chance in 2, worse in 0; worse than as delivered: dz.")
     assert gain_table(d).count("better, worse than as delivered") == 1
 

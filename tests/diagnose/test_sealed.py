@@ -59,6 +59,14 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     assert (
         told.note == f"{note}. Not asked of the sealed run, and nearly as likely in the others: joint at contacts.rail"
     )
+    none = dict.fromkeys(found.steps[0].parts, 0.0)  # no heat of any history, and a name that has just passed
+    faint = replace(
+        found, steps=(replace(found.steps[0], parts=none),),
+        accepted=tuple(replace(a, statistic=1.2 * a.threshold) for a in found.accepted),
+    )  # fmt: skip
+    told = judged(faint, y, verdict, causes, FAMILIES, sealed, 1)
+    assert (told.verdict, told.causes, told.refuted) == ("nothing", (), True)
+    assert told.note.startswith("withdrawn: ")
     kept, extension, note = opened(-0.5, smaller=0.2)  # the cause predicts the sealed run, and its size does not
     assert (kept, extension) == (verdict, 0)
     assert note.startswith("not written")

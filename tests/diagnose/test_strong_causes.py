@@ -80,7 +80,13 @@ def test_a_strong_cause_is_fitted_to_the_noise(seed):
 
 @pytest.mark.parametrize(
     ("place", "film", "below"),
-    [("jacket", 200.0, 8.0), ("nut", 800.0, 15.0), ("screw", 200.0, 8.0), ("slide", 200.0, 8.0)],
+    [
+        ("jacket", 200.0, 8.0),
+        ("nut", 800.0, 15.0),
+        ("screw", 200.0, 8.0),
+        ("slide", 200.0, 8.0),
+        pytest.param("housing", 800.0, 15.0, marks=pytest.mark.xfail(strict=True, reason="25 K: docs/campaign.md")),
+    ],
 )
 def test_a_coolant_of_many_kelvins_is_named_in_its_hours(place, film, below):
     """The fit without it bends parameters by five to ten of their standard deviations, and scores beside those like it
