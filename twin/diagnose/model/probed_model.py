@@ -113,9 +113,9 @@ def make_probed_model(
 ) -> ProbedModel:  # fmt: skip
     """The probed model of a machine and the loads of runs, cached by both; mesh: of which elements it is; step [s].
 
-    nominal_alone: it knows these runs at nominal values, and nothing of other values and of heat at places.
+    nominal_alone: it knows these runs at nominal values, and nothing of other values; it has no places.
     """
-    rich = rich_probed_model(machine, progress, mesh)
+    rich = rich_probed_model(machine, progress, mesh, probed=not nominal_alone)
     rich = replace(rich, rich=at_positions(rich.rich, tcp_positions(rich.rich, runs)))
     base = pruned(rich.rich)
     load = base.load_model
@@ -194,7 +194,7 @@ def _assembled(
     ]  # fmt: skip
     return ProbedModel(
         base, prepared.layout, prepared.system, ContactPlaces.of(load), tuple(parameters), rich.places,
-        B=body.B[:, n_sources:].T.copy(), A=np.array(body.A[n_films : n_films + n_places]),
+        B=body.B[:, n_sources:].T.copy(), A=np.reshape(body.A[n_films : n_films + n_places], (n_places, body.n, body.n)),
         M=body.M[:, n_films : n_films + n_places].T.copy(), H=H, displaced=body.C[aside], runs=tuple(made),
         reduction=reduction,
     )  # fmt: skip
