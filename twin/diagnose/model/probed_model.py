@@ -194,7 +194,8 @@ def _assembled(
     ]  # fmt: skip
     return ProbedModel(
         base, prepared.layout, prepared.system, ContactPlaces.of(load), tuple(parameters), rich.places,
-        B=body.B[:, n_sources:].T.copy(), A=np.reshape(body.A[n_films : n_films + n_places], (n_places, body.n, body.n)),
+        B=body.B[:, n_sources:].T.copy(),
+        A=np.reshape(body.A[n_films : n_films + n_places], (n_places, body.n, body.n)),
         M=body.M[:, n_films : n_films + n_places].T.copy(), H=H, displaced=body.C[aside], runs=tuple(made),
         reduction=reduction,
     )  # fmt: skip
