@@ -15,7 +15,8 @@ from twin.diagnose.model.bank import Column, respond
 pytestmark = pytest.mark.long
 
 LITTLE = {"heat": 0.5, "film": 0.05, "joint": 2e-3, "contact": 5e-3, "capacity": 50.0, "group": 5e-3, "air": 0.02,
-          "zone": 0.02, "source": 0.5, "group_film": 0.05, "start": 0.05, "signal": 0.01}  # fmt: skip
+          "zone": 0.02, "source": 0.5, "group_film": 0.05, "start": 0.05, "signal": 0.01,
+          "warm": 1e-4, "loss": 5e-3}  # fmt: skip
 
 
 def history(key, elements, study):
@@ -40,6 +41,9 @@ KEYS = [
     ("contact", "x_screw", "block 2"),
     ("capacity", "housing", "always"),
     ("source", "front", "spindle_speed^2.67"),
+    ("warm", "front", "always"),
+    ("loss", "front", "block 1"),
+    ("loss", "nut", "block 2"),
     ("start", "", ""),  # the first of its kind
     ("signal", "", ""),
 ]

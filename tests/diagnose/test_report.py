@@ -274,6 +274,7 @@ def test_units_are_those_of_engineers():
     assert quantity(600.0, "s") == "10.0 min"
     assert quantity(12.0, "W/(m^2*K)") == quantity(12.0, "W/(m^2 K)") == quantity(12.0, "W/m^2/K") == "12.0 W/(m²·K)"
     assert quantity(11.5e-6, "1/K") == "11.5 µm/(m·K)"
+    assert quantity(-0.0123, "1/K") == "-1.23 %/K"
     assert quantity(5000.0, "J/K") == "5.00 kJ/K"
     assert quantity(1e-6 / 3600, "m/s") == "1.00 µm/h"
     assert quantity(0.5, "m/s") == "30.0 m/min"
@@ -303,7 +304,7 @@ def test_decimals_follow_the_interval():
             {"temperature": 14.0, "temperature_sigma": 0.5},
             "1.62 W/(m²·K), to a medium of 14.00 °C (95 % interval 13.02 to 14.98 °C)",
         ),
-        ("scale_expansion", "1/K", {"part": "bed"}, "1620000 µm/(m·K), with the temperature of bed"),
+        ("scale_expansion", "1/K", {"part": "bed"}, "162 %/K, with the temperature of bed"),
         ("heat_source", "W", {"reference": 8.0}, "1.62 W, where x_current is 8.00 in SI units"),
     ],
 )

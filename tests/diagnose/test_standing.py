@@ -11,7 +11,7 @@ from tests.diagnose import small_case
 from tests.diagnose.test_strong_causes import outputs
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.evidence.batch import Hypothesis
-from twin.diagnose.faults.acted import slots_with, units_of
+from twin.diagnose.faults.acted import lasts, slots_with, units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.forward import search
@@ -62,6 +62,27 @@ def test_the_last_one_is_withdrawn_as_a_whole():
     assert (told.verdict, told.causes, told.less) == ("unknown", (), "")
     assert told.note.startswith("withdrawn: heat source at slide")
     assert now is alone
+
+
+def test_what_ended_with_the_runs_that_were_looked_at_is_told_until_then():
+    """Heat from an hour of the first run on, which is gone in the sealed run."""
+    detector, rng = small_case.made_detector(), np.random.default_rng(6)
+    study = detector.study
+    batch = next(b for b in detector.columns.batches if b.family == "heat_source")
+    when = next(w for w in batch.histories if w.name == "from 2.0 h of run_0 on")
+    true = Hypothesis(batch, batch.places.index("housing"), when, 1.0, (400.0,))
+    y = outputs(true, np.zeros(len(study.probed.parameters)))
+    found = search(detector, y + detector.whiten.colour(rng.standard_normal(len(y))))
+    assert [lasts(study, a.hypothesis.when.windows) for a in found.accepted] == [True]
+    T, w = study.runs[2].split(study.outputs(2, np.zeros(len(study.probed.parameters))))
+    opened = [replace(study.runs[2].measured, temperature=T, tcp=w)]
+    now, told = standing(found, y, FAMILIES, (), opened, 1)
+    assert (told.verdict, [c.place for c in told.causes], told.note) == ("named", ["housing"], "")
+    assert told.less.startswith("told until the end of the runs that were looked at: heat source at housing")
+    (one,) = now.accepted
+    assert not lasts(study, one.hypothesis.when.windows)
+    assert not one.units[0].shapes[2].any()
+    assert told.causes[0].history == "from 2.0 h of run_0 to the end of run_1"
 
 
 def test_what_is_not_refuted_stays_as_it_was_found():

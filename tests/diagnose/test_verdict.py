@@ -121,9 +121,8 @@ def test_of_equal_misfits_the_data_have_decided_nothing(statistic, less, wanted)
 def test_limits_of_factors_are_factors():
     detector = small_case.made_detector()
     gain = next(b for b in detector.columns.batches if b.kind == "gain")
-    at = sorted(
-        size for (family, unit, _, _), size in limits_at(detector).items() if (family, unit) == (gain.family, "1")
-    )
+    of_gains = (gain.family, "1", False)  # and of none that switches
+    at = sorted(size for (family, unit, _, w), size in limits_at(detector).items() if (family, unit, w) == of_gains)
     (limit,) = (x for x in limits_of(detector) if (x.family, x.unit) == (gain.family, "1"))
     assert limit.smallest == pytest.approx(OF_KIND["gain"].curve.told(at[0])) == pytest.approx(np.exp(at[0]))
     assert limit.largest == pytest.approx(np.exp(at[-1]))

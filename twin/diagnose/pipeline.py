@@ -42,6 +42,7 @@ from twin.diagnose.search.look import Search
 from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.poor import poor_note
+from twin.diagnose.search.sealed_alone import sealed_alone
 from twin.diagnose.search.standing import beside_sensors, standing
 from twin.diagnose.search.support import support_of
 from twin.diagnose.search.verdict import CALIBRATED, pulls_of, rival_of, unknown_of, verdict_of
@@ -226,6 +227,7 @@ def diagnose(
             gains = (*(g for g in gains if g.unit == "K"), *missing.gains)
             notes.insert(0, missing.note)
     series, traces = _compared(shown, plans, [*runs, *sealed], judgement)
+    notes += sealed_alone(series, settings.policy)
     pulls = pulls_of(shown)
     first = found.steps[0]
     heat = unknown_of(found) if verdict == "unknown" else None

@@ -123,7 +123,7 @@ def null(
         forcing = np.zeros((n, body.n))
         for j, vector in enumerate(split):
             if vector is not None:
-                forcing += _power(study, k, j)[:, None] * vector
+                forcing += power_of(study, k, j)[:, None] * vector
         for first, end in run.unlogged:
             for j in sources_of_surfaces(study):
                 lost = swing(study, k, j) * rng.standard_normal()
@@ -197,7 +197,7 @@ def convection(drive: Drive, films: int) -> np.ndarray:
     return result
 
 
-def _power(study: Study, k: int, source: int) -> np.ndarray:
+def power_of(study: Study, k: int, source: int) -> np.ndarray:
     """(n,) W of a source in a run, at a winding of 30 degC where its law follows one."""
     drive = study.runs[k].run.drive
     if source in drive.losses.index:
@@ -214,7 +214,7 @@ def sources_of_surfaces(study: Study) -> list[int]:
 
 def swing(study: Study, k: int, source: int) -> float:
     """W, by which the heat of a source differs from time to time in a run: a standard deviation."""
-    return float(np.std(_power(study, k, source)))
+    return float(np.std(power_of(study, k, source)))
 
 
 def lump_of(study: Study, place: int, form: Form) -> float:

@@ -5,6 +5,7 @@ run.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.slots import Slots
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Window
+
+AT_THE_END = 1.0  # s before the end of a run, which is none of its own: rounding
 
 
 def units_of(study: Study, h: Hypothesis) -> tuple[Unit, ...]:
@@ -39,7 +42,7 @@ def _shape(study: Study, when: History, which: int, k: int) -> np.ndarray:
     if when.signal:
         values = run.signals.get(when.signal)
         return np.zeros(n) if values is None else np.asarray(np.abs(values / when.reference) ** when.exponent)
-    if not when.windows or (not fitted and _lasts(study, when.windows)):
+    if not when.windows or (not fitted and lasts(study, when.windows)):
         return np.ones(n)
     shape = np.zeros(n)
     for w in when.windows:
@@ -49,12 +52,23 @@ def _shape(study: Study, when: History, which: int, k: int) -> np.ndarray:
     return shape
 
 
-def _lasts(study: Study, windows: Sequence[Window]) -> bool:
+def lasts(study: Study, windows: Sequence[Window]) -> bool:
     """Whether windows end with the last fitted run: the cause has come to stay."""
     last = study.runs[study.fitted[-1]].run
     end = last.drive.time[-1] - last.drive.time[0]
-    to_the_end = any(w.run == last.name and w.end >= end - 1.0 for w in windows)
+    to_the_end = any(w.run == last.name and w.end > end - AT_THE_END for w in windows)
     return to_the_end and all(w.level == 1.0 for w in windows)
+
+
+def ended(study: Study, h: Hypothesis) -> Hypothesis:
+    """A hypothesis that no longer acts after the fitted runs; unchanged where it does not last."""
+    if not lasts(study, h.when.windows):
+        return h
+    name = study.runs[study.fitted[-1]].run.name
+    windows = tuple(replace(w, end=w.end - AT_THE_END) if w.run == name else w for w in h.when.windows)
+    told = h.when.name
+    told = f"{told.removesuffix(' on')} to the end of {name}" if told.endswith(" on") else told
+    return replace(h, when=replace(h.when, name=told, windows=windows))
 
 
 def slots_with(study: Study, elements: Elements, units: Sequence[Unit], k: int) -> Slots:

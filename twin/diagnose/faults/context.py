@@ -116,9 +116,16 @@ def stretches(context: Context) -> list[Stretch]:
     return [w for w in windows_of(context) if not w[1].all()]
 
 
-def lasting(context: Context) -> list[Stretch]:
-    """From an hour on: to the end of the last run."""
-    return [w for w in stretches(context) if w[1][-1] == 1.0]
+def to_the_end(context: Context) -> list[Stretch]:
+    """From an hour on: to the end of its run, or to that of the last one."""
+    runs = [i for i, _, _ in context.elements.histories.blocks]
+    ends = [b for b, (own, after) in enumerate(zip(runs, [*runs[1:], -1], strict=True)) if own != after]
+    return [w for w in stretches(context) if np.flatnonzero(w[1])[-1] in ends]
+
+
+def of_whole_runs(context: Context) -> list[Stretch]:
+    """All of a run, or of it and all after it."""
+    return [w for w in to_the_end(context) if all(window.start == 0.0 for window in w[2])]
 
 
 def of_stretches(found: Sequence[Stretch], before: int = 0) -> list[History]:

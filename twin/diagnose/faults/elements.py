@@ -11,6 +11,8 @@ Kinds by what they do to the model x' = A(theta) x + B(theta) u, y = C x:
     joint    j, contact c                                     100 % more conductance
     capacity p          -b_p b_p^T x'                         1 J/K
     source   j          s(t) B_j                              1 W of another history at a source
+    warm     j          P_j(t) b_j b_j^T x                    100 % more of a source per kelvin of its own surface
+    loss     j          P_j(t) B_j                            100 % more of a source, by blocks
     moved    j>p        P_j(t) (B_p - B_j)                    all of a source's heat elsewhere
     signal   q*f                                              a load channel times a factor
     start    m          T(0) of a member                      1 K
@@ -26,7 +28,7 @@ import numpy as np
 
 from twin.build.places import beside
 from twin.diagnose.evidence.film_laws import SPEEDS
-from twin.diagnose.evidence.nulls import convection, sources_of_surfaces
+from twin.diagnose.evidence.nulls import convection, power_of, sources_of_surfaces
 from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.probed_loads import gammas
 from twin.diagnose.model.study import Study, own_place
@@ -77,7 +79,7 @@ class Elements:
         return {place: own for (kind, place), own in self.block_of.items() if kind == "heat"}
 
 
-FORCINGS = frozenset({"zone", "gradient", "signal"})  # kinds whose vectors exact refits step; others have slots
+FORCINGS = frozenset({"zone", "gradient", "signal", "loss"})  # kinds whose vectors exact refits step; others have slots
 
 
 def slim(elements: Elements) -> Elements:
@@ -121,14 +123,19 @@ def histories_of(study: Study) -> Histories:
             add(signals, name if e == 1.0 else f"{name}^{e:.3g}", name, e, top)
         if signal.unit in SPEEDS:
             add(speeds, f"{name}^{EXPONENT:g}", name, EXPONENT, top)
-    blocks = []
-    for i, run in enumerate(runs[: len(study.fitted)]):
-        per = round(BLOCK / run.step)
-        edges = list(range(0, run.drive.n_steps, per))
-        if run.drive.n_steps - edges[-1] < per / 2 and len(edges) > 1:
+    return Histories(signals, speeds, blocks_of(study), unit)
+
+
+def blocks_of(study: Study) -> tuple[tuple[int, int, int], ...]:
+    """(fitted run, first step, end) of blocks of about an hour."""
+    blocks: list[tuple[int, int, int]] = []
+    for i, k in enumerate(study.fitted):
+        run = study.runs[k].run
+        edges = list(range(0, run.drive.n_steps, round(BLOCK / run.step)))
+        if run.drive.n_steps - edges[-1] < BLOCK / run.step / 2 and len(edges) > 1:
             edges.pop()
         blocks += [(i, a, b) for a, b in zip(edges, [*edges[1:], run.drive.n_steps], strict=True)]
-    return Histories(signals, speeds, tuple(blocks), unit)
+    return tuple(blocks)
 
 
 def _of_drives(load: LoadModel) -> list[Signal]:
@@ -205,9 +212,14 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     powers = [_power_of(system, run.drive, own) for run, own in zip(runs, nominal, strict=True)]
     for j, source in enumerate(load.sources):
         if source.contact:
+            s = load.contact_sources.index(j)
+            add("loss", source.name, [run.drive.contact_heat[:, s] @ body.P.T for run in runs], {}, True)
             continue
         B = body.B[:, body.sources.index(j)]
         add("source", source.name, [B] * len(runs), _law_histories(study, j, histories))
+        power = [power_of(study, k, j) for k in range(len(runs))]
+        add("loss", source.name, [np.outer(q, B) for q in power], {}, True)
+        add("warm", source.name, [np.outer(q * (x @ B), B) for q, x in zip(power, z, strict=True)], always)
         own_at = own_place(study, j)
         for p in beside(probed.places, own_at) if own_at is not None else ():
             moved, power = [probed.B[p] - B] * len(runs), [q[:, j] for q in powers]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, always, lasting, of_stretches
+from twin.diagnose.faults.context import Context, always, of_stretches, to_the_end
 from twin.diagnose.faults.fault import Curve, Family, Fault, Slot
 
 RANGE = 9.0  # conductances of joints scatter by a decade with pressure and roughness
@@ -32,7 +32,7 @@ FAULTS = tuple(
 
 def batches(context: Context) -> list[Batch]:
     """Every contact: always, and from every hour on."""
-    histories = of_stretches([always(context), *lasting(context)])
+    histories = of_stretches([always(context), *to_the_end(context)])
     return [batch for fault in FAULTS for batch in fault.batches(context.blocks(fault), histories)]
 
 

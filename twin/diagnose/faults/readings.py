@@ -1,7 +1,8 @@
 """Elementary causes that act on what is read, not on the machine: columns (m,) over the measured numbers.
 
 gain      parameter    one prior standard deviation of a declared parameter in ln or its unit
-offset    sensor       1 K;   drift  1 K/day;   lag  1 s;   detached  all of it;   swapped a<>b  all of it
+offset    sensor       1 K;   shift  the same, by blocks;   drift  1 K/day;   lag  1 s;   detached  all of it
+swapped   a<>b         all of it
 clock     run          1 s later than stated, to first order; exactly by `late`
 scale     axis<part    1 m/m/K of an encoder scale as warm as a part, from the middle of the stroke
 expansion part         100 % more
@@ -22,7 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.signal import lfilter
 
-from twin.diagnose.faults.elements import Key
+from twin.diagnose.faults.elements import Key, blocks_of
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import COMPONENTS, Planned, Study
 from twin.physics.play import play as follower
@@ -122,6 +123,11 @@ def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarra
         add(("drift", name, "always"), column([(name, [t / DAY for t in time])]))
         add(("lag", name, "always"), column([(name, [-_rate(T, t) for T, t in zip(read[name], time, strict=True)])]))
         add(("detached", name, "always"), column([(name, [a - T for a, T in zip(air, read[name], strict=True)])]))
+        for b, (i, begin, end) in enumerate(blocks_of(study)):
+            edges = plans[i].run.drive.time[[begin, end]] - plans[i].run.drive.time[0]
+            inside = (time[i] >= edges[0]) & (time[i] < edges[1])
+            of_block = [inside.astype(float) if r == i else np.zeros(len(t)) for r, t in enumerate(time)]
+            add(("shift", name, f"{b}"), column([(name, of_block)]))
     for a, first in enumerate(names if swaps else ()):
         for second in names[a + 1 :]:
             change = [y - x for x, y in zip(read[first], read[second], strict=True)]

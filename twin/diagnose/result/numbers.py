@@ -13,7 +13,6 @@ _CUSTOMARY: dict[str, tuple[float, str]] = {
     "K/s": (86400.0, "K/day"),
     "1/s": (60.0, "1/min"),
     "m/K": (1e6, "µm/K"),
-    "1/K": (1e6, "µm/(m·K)"),
     "J/K": (1e-3, "kJ/K"),
     "degC": (1.0, "°C"),
     "rad": (1e6, "µrad"),
@@ -23,13 +22,17 @@ _CUSTOMARY: dict[str, tuple[float, str]] = {
     "W/m^2K": (1.0, "W/(m²·K)"),
 }
 _DRIFT = 1e-5  # m/s: slower than this is a drift, in µm/h; faster an axis, in m/min
+_EXPANSION = 1e-3  # 1/K: no solid expands by more (rubber by a fifth of it); more is a coefficient of a law
 
 
 def customary(unit: str, size: float = math.nan) -> tuple[float, str]:
-    """Factor from SI and the unit engineers use. `size` (SI) tells a drift in m/s from a speed."""
+    """Factor from SI and the unit engineers use. `size` (SI) tells a drift in m/s from a speed, and expansion from what
+    else is per kelvin."""
     plain = unit.replace(" K", "*K").replace(" ", "").replace("·", "*").replace("²", "^2")
     if plain == "m/s":
         return (60.0, "m/min") if abs(size) >= _DRIFT else (3.6e9, "µm/h")
+    if plain == "1/K":
+        return (100.0, "%/K") if abs(size) >= _EXPANSION else (1e6, "µm/(m·K)")
     if plain in _CUSTOMARY:
         return _CUSTOMARY[plain]
     return 1.0, plain.replace("*", "·").replace("^2", "²").replace("^3", "³")

@@ -75,18 +75,22 @@ def channels_of(found: Search, k: int, sealed: Measured, sigma: tuple[np.ndarray
     """Of the sealed run k, whose measurements are opened here. sigma: noise of sensors (s,) and TCP (3,).
 
     A channel is moved that causes move, and that the extended model predicts otherwise than the recalibrated one: an
-    expansion is not judged by temperatures that a calibration beside it has shifted.
+    expansion is not judged by temperatures that a calibration beside it has shifted. Causes that do not act in this run
+    are judged by these alone: with a false one calibration goes astray, and predicts the run worse.
     """
     study, policy = found.detector.study, found.detector.policy
     planned = study.runs[k]
     models = [planned.split(v) for v in vars(predicted(found, k)).values()]
     bare = planned.split(study.outputs(k, found.x if found.accepted else found.x0))  # without its causes
     readings = sealed.temperature, sealed.temperature, in_place(sealed.temperature, sealed.sensors, found.accepted)
+    inside = [a for a in found.accepted if a.units or fault_of(a.hypothesis).parameter]
+    absent = bool(inside) and all(a.units and not any(unit.shapes[k].any() for unit in a.units) for a in inside)
 
     def channel(
         name: str, unit: str, time: np.ndarray, errors: list[np.ndarray], alone: np.ndarray, noise: float
     ) -> Channel:
-        moved = _least_rms([errors[2] - alone, errors[2] - errors[1]]) > policy.noticed * noise
+        changes = [errors[2] - errors[1], *([] if absent else [errors[2] - alone])]
+        moved = _least_rms(changes) > policy.noticed * noise
         return Channel(sealed.name, name, unit, time, errors, moved, noise)
 
     result = []

@@ -118,7 +118,8 @@ def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
 
 def limits_of(detector: Detector) -> tuple[Limit, ...]:
     """Per family and unit `limits_at` its places, for what always acts where there is such; factors as factors."""
-    curves = {(batch.family, batch.unit): fault_of(batch).curve for batch in detector.columns.batches}
+    batches = detector.columns.batches
+    curves = {(batch.family, batch.unit): fault_of(batch).curve for batch in reversed(batches)}  # of what always acts
     at = limits_at(detector)
     found: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for (family, unit, place, windowed), size in at.items():

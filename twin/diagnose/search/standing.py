@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
+from twin.diagnose.faults.acted import ended, units_of
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import Accepted, settled
@@ -18,6 +19,8 @@ from twin.diagnose.search.refit import refit
 from twin.diagnose.search.sealed import Judged, judged
 from twin.diagnose.search.verdict import verdict_of, with_faults
 
+REFUTED_LATER = "In the sealed run it is not at work, which is less likely with it beyond chance"
+
 
 def standing(
     found: Search, y: np.ndarray, families: Sequence[Family], faults: Sequence[Cause], opened: Sequence[Measured],
@@ -26,7 +29,8 @@ def standing(
     """A search in y (m,) and its headline, held against the measurements of the sealed runs.
 
     Where these refute several causes in the machine together, the weakest goes and the others are fitted and judged
-    again. If they are refuted down to the last one, so is all that was found.
+    again. If they are refuted down to the last one, so is all that was found. Where they refute what has come to stay,
+    and it may have ended with the runs that were looked at, they refute that it stays.
     """
 
     def held_against(now: Search) -> Judged:
@@ -36,6 +40,9 @@ def standing(
         return judged(now, y, *with_faults(verdict, causes, faults), families, opened, seed)
 
     whole = held_against(found)
+    if whole.refuted and (over := _ended(found)) is not found and not (told := held_against(over)).refuted:
+        names = " and ".join(f"{c.family.replace('_', ' ')} at {c.place}" for c in told.causes if c.windows)
+        return over, replace(told, less=f"told until the end of the runs that were looked at: {names}. {REFUTED_LATER}")
     now, told, gone = found, whole, list[Accepted]()
     while told.refuted and (weakest := _weakest(now, families)):
         gone.append(weakest)
@@ -48,6 +55,16 @@ def standing(
     names = " and ".join(f"{a.hypothesis.family.replace('_', ' ')} at {a.hypothesis.name}" for a in gone)
     less = f"withdrawn: {names}, with which the other causes predict the sealed run worse beyond chance"
     return now, replace(told, less=less)
+
+
+def _ended(found: Search) -> Search:
+    """The search with causes that have come to stay ended with the fitted runs; itself where there is none."""
+    study, accepted = found.detector.study, list[Accepted]()
+    for a in found.accepted:
+        h = ended(study, a.hypothesis)
+        accepted.append(a if h is a.hypothesis else replace(a, hypothesis=h, units=units_of(study, h)))
+    changed = any(a is not b for a, b in zip(accepted, found.accepted, strict=True))
+    return replace(found, accepted=tuple(accepted)) if changed else found
 
 
 def _weakest(found: Search, families: Sequence[Family]) -> Accepted | None:

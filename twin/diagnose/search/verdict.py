@@ -148,7 +148,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         return "named", causes
     if entry.group == "signal":
         return "signal", causes
-    whole = entry.declared and not first.windows and not first.signal and Spot.read(first.place).declared
+    whole = entry.declared and first.history == "always" and Spot.read(first.place).declared
     return ("out_of_tolerance" if whole else "named"), causes
 
 
