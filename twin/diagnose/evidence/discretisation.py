@@ -80,7 +80,9 @@ def differences(
     apart = np.zeros(len(J), dtype=int) if machine.lumped else np.unique(channel_of(study), return_inverse=True)[1]
 
     step = study.runs[0].run.step
-    known = _Known(tuple(parameters), tuple(runs), tuple(plans), tuple(study.fitted), machine.lumped, step)
+    fitted = study.fitted
+    own = tuple(runs[k] for k in fitted), tuple(plans[k] for k in fitted)
+    known = _Known(tuple(parameters), *own, machine.lumped, step)
     found, every = [], list(_others(machine))
     with progress("other discretisations", sum(map(len, every))) as advance:
         # two windows made alike are off alike
@@ -109,8 +111,7 @@ class _Known:
 
     parameters: tuple[Parameter, ...]
     runs: tuple[Run, ...]
-    plans: tuple[Measured, ...]
-    fitted: tuple[int, ...]
+    plans: tuple[Measured, ...]  # of these runs, which are the fitted ones
     lumped: bool
     step: float  # s
 
@@ -119,7 +120,7 @@ class _Known:
         probed = make_probed_model(
             other.machine, acting, self.runs, silent, other.mesh, not self.lumped, step=self.step
         )
-        return make_study(probed, self.plans, self.fitted)
+        return make_study(probed, self.plans, range(len(self.runs)))
 
 
 def _outputs(known: _Known, other: _Other) -> np.ndarray:
