@@ -16,7 +16,7 @@ pytestmark = pytest.mark.long
 
 LITTLE = {"heat": 0.5, "film": 0.05, "joint": 2e-3, "contact": 5e-3, "capacity": 50.0, "group": 5e-3, "air": 0.02,
           "zone": 0.02, "source": 0.5, "group_film": 0.05, "start": 0.05, "signal": 0.01,
-          "warm": 1e-4, "loss": 5e-3}  # fmt: skip
+          "warm": 1e-4, "loss": 5e-3, "wear": 5e-3}  # fmt: skip
 
 
 def history(key, elements, study):
@@ -44,6 +44,7 @@ KEYS = [
     ("warm", "front", "always"),
     ("loss", "front", "block 1"),
     ("loss", "nut", "block 2"),
+    ("wear", "front", "wearing in over 2 h of running"),
     ("start", "", ""),  # the first of its kind
     ("signal", "", ""),
 ]

@@ -1,4 +1,6 @@
-"""What began with an event: a loss or a film that is larger in one run, a sensor that reads otherwise from then on."""
+"""What began with an event, or ends by and by: a loss or a film of one run, a sensor that reads otherwise from an hour
+on, a bearing that wears in.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.nulls import power_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Cause, Verdict
 from twin.diagnose.search.forward import search
@@ -41,6 +44,25 @@ def test_a_number_that_is_another_one_in_one_run_is_that_number_in_that_run(path
     assert (f"{first.place}.gain", first.unit) == (path, "1")
     assert {w.run for w in first.windows} == {run}
     assert first.amplitude == pytest.approx(factor, rel=0.2)
+
+
+def test_a_bearing_that_wears_in_is_its_loss():
+    """Twice the described friction when new, and over four hours of running, which no column has, ever less of that."""
+    study = small_case.study()
+    (body,), load = study.probed.base.bodies, study.probed.base.load_model
+    j = [source.name for source in load.sources].index("front")
+    ran, parts = 0.0, []
+    for k in study.fitted:
+        slots, q, step = study.slots(k), power_of(study, k, j), study.runs[k].run.step
+        hours = (ran + step * np.cumsum(q > 0.01 * q.max())) / 3600.0
+        ran = 3600.0 * hours[-1]
+        slots.forcing[:, 0] = np.outer(q * np.exp(-hours / 4.0), body.B[:, body.sources.index(j)])
+        parts.append(study.outputs(k, np.zeros(len(study.probed.parameters)), slots, (1.0,)))
+    verdict, first = said(np.concatenate(parts), 3)
+    assert verdict in ("named", "ambiguous")
+    assert (first.family, first.place) == ("loss_law", "sources.front")
+    assert first.history.startswith("wearing in")
+    assert first.amplitude == pytest.approx(2.0, abs=0.3)
 
 
 @pytest.mark.parametrize("start", [0.0, 2.0])

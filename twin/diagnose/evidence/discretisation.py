@@ -17,6 +17,7 @@ import numpy as np
 
 from twin.build.mesh import load_body_meshes
 from twin.build.mesh_error import LARGEST, OF_FINER, OF_LINEAR, refined_bytes, refined_unknowns
+from twin.build.workers import LONG as WORTH_HELP
 from twin.build.workers import each
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.evidence.leading import channel_of, leading_of_each
@@ -81,14 +82,17 @@ def differences(
 
     step = study.runs[0].run.step
     fitted = study.fitted
-    own = tuple(runs[k] for k in fitted), tuple(plans[k] for k in fitted)
-    known = _Known(tuple(parameters), *own, machine.lumped, step)
-    found, every = [], list(_others(machine))
-    with progress("other discretisations", sum(map(len, every))) as advance:
-        # two windows made alike are off alike
-        y = surrogate.y0 if machine.lumped else _outputs(known, _Other(machine))
-        shown = [each(_outputs, known, others, lambda _: advance("")) for others in every]
-    for others, outputs in zip(every, shown, strict=True):
+    measured = tuple(runs[k] for k in fitted), tuple(plans[k] for k in fitted)
+    known = _Known(tuple(parameters), *measured, machine.lumped, step)
+    every = list(_others(machine))
+    # two windows made alike are off alike: as described it is made once more
+    asked = [*(o for others in every for o in others), *([] if machine.lumped else [_Other(machine)])]
+    with progress("other discretisations", len(asked)) as advance:
+        # at once, as the first one is the finest, and takes as long as all others
+        shown = each(_outputs, known, asked, lambda _: advance(""), long=WORTH_HELP if machine.lumped else 0.0)
+    y, found, first = surrogate.y0 if machine.lumped else shown[-1], list[Difference](), 0
+    for others in every:
+        outputs, first = shown[first : first + len(others)], first + len(others)
         d = np.stack([o.share * (own - y) for o, own in zip(others, outputs, strict=True)], axis=1)
         D = others[0].share * (jacobian_of(known.study(others[0]), x) - J) if machine.lumped else np.zeros_like(J)
         real = np.arange(len(others)) % 3 == 1

@@ -13,6 +13,7 @@ Kinds by what they do to the model x' = A(theta) x + B(theta) u, y = C x:
     source   j          s(t) B_j                              1 W of another history at a source
     warm     j          P_j(t) b_j b_j^T x                    100 % more of a source per kelvin of its own surface
     loss     j          P_j(t) B_j                            100 % more of a source, by blocks
+    wear     j          P_j(t) exp(-h_j(t) / tau) B_j         100 % more of a source at first, h_j hours that it has run
     moved    j>p        P_j(t) (B_p - B_j)                    all of a source's heat elsewhere
     signal   q*f                                              a load channel times a factor
     start    m          T(0) of a member                      1 K
@@ -48,6 +49,9 @@ MISREAD = {
 }
 EXPONENT = 0.6  # of speeds in forced convection
 HEATING = {"A": (2.0,), "m/s": (1.0,), "1/s": (1.0, 5.0 / 3.0), "W": (1.0,), "1": (1.0,)}  # exponents by unit, of heat
+# s of running in which a bearing or a guide wears in: a judgement, of what shows in runs of a day
+WEARING = 7200.0, 21600.0
+RUNS = 0.01  # of its largest heat: a source that emits more runs
 LAWS = (1.0, 5.0 / 3.0, 2.0, 8.0 / 3.0)  # exponents of speeds in losses
 
 Key = tuple[str, str, str]  # kind, place, history
@@ -79,7 +83,9 @@ class Elements:
         return {place: own for (kind, place), own in self.block_of.items() if kind == "heat"}
 
 
-FORCINGS = frozenset({"zone", "gradient", "signal", "loss"})  # kinds whose vectors exact refits step; others have slots
+FORCINGS = frozenset(
+    {"zone", "gradient", "signal", "loss", "wear"}
+)  # kinds whose vectors exact refits step; others have slots
 
 
 def slim(elements: Elements) -> Elements:
@@ -213,12 +219,19 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
     for j, source in enumerate(load.sources):
         if source.contact:
             s = load.contact_sources.index(j)
-            add("loss", source.name, [run.drive.contact_heat[:, s] @ body.P.T for run in runs], {}, True)
+            emitted = [run.drive.contact_heat[:, s] @ body.P.T for run in runs]
+        else:
+            B = body.B[:, body.sources.index(j)]
+            power = [power_of(study, k, j) for k in range(len(runs))]
+            emitted = [np.outer(q, B) for q in power]
+        add("loss", source.name, emitted, {}, True)
+        for tau in WEARING:
+            fresh = worn(powers, j, [run.step for run in runs], tau)
+            acting = {f"wearing in over {tau / 3600.0:g} h of running": histories.signals["always"]}
+            add("wear", source.name, [q * left[:, None] for q, left in zip(emitted, fresh, strict=True)], acting)
+        if source.contact:
             continue
-        B = body.B[:, body.sources.index(j)]
         add("source", source.name, [B] * len(runs), _law_histories(study, j, histories))
-        power = [power_of(study, k, j) for k in range(len(runs))]
-        add("loss", source.name, [np.outer(q, B) for q in power], {}, True)
         add("warm", source.name, [np.outer(q * (x @ B), B) for q, x in zip(power, z, strict=True)], always)
         own_at = own_place(study, j)
         for p in beside(probed.places, own_at) if own_at is not None else ():
@@ -278,6 +291,16 @@ def _power_of(system: System, drive: Drive, nominal: Nominal) -> np.ndarray:
         winding = float(system.reference_temperature) + nominal.states[:-1] @ np.asarray(system.source_rows).T
         power[:, list(drive.losses.index)] = read_table(np, drive.losses.value, temperature_place(np, winding))
     return np.asarray(power)
+
+
+def worn(powers: Sequence[np.ndarray], j: int, steps: Sequence[float], tau: float) -> list[np.ndarray]:
+    """Per run (n,): exp(-h / tau) of the time h [s] that source j has run before, in all runs one after the other."""
+    top, before, result = max(float(q[:, j].max(initial=0.0)) for q in powers), 0.0, []
+    for q, step in zip(powers, steps, strict=True):
+        ran = before + step * np.cumsum(q[:, j] > RUNS * top)
+        result.append(np.exp(-ran / tau))
+        before = float(ran[-1])
+    return result
 
 
 def _law_histories(study: Study, j: int, histories: Histories) -> dict[str, tuple[np.ndarray, ...]]:

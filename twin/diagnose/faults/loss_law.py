@@ -14,6 +14,7 @@ from twin.diagnose.faults.fault import Curve, Family, Fault, Slot, as_found
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
+from twin.errors import DescriptionError
 from twin.machine.effects.effect import Effect
 from twin.rom.parameter import Parameter
 
@@ -50,15 +51,23 @@ WARM = Warm(
     largest=0.05,  # 1/K: viscosity of a mineral oil at room temperature (ISO 3448 grades, index 100)
 )  # fmt: skip
 SINCE = Since("loss_law", "loss", "1", "sources.", 0, 0.3, 4.0, own=0.1, curve=Curve.RELATIVE, grows=False)
-FAULTS = (GAIN, SHAPE, WARM, SINCE)
+WEAR = Since("loss_law", "wear", "1", "sources.", 0, 0.3, 4.0, own=0.1, curve=Curve.RELATIVE)
+FAULTS = (GAIN, SHAPE, WARM, SINCE, WEAR)
 
 
 def batches(context: Context) -> list[Batch]:
-    """Gains of sources, always and from every hour on; other shapes at their places; what follows their own warmth."""
+    """Gains of sources, always and from every hour on; other shapes at their places; what follows their own warmth, and
+    what wears in."""
     gains = [(path.removesuffix(".gain"), c) for path, c in context.rows(GAIN) if path.startswith("sources.")]
     since = SINCE.batches(context.blocks(SINCE), of_stretches(to_the_end(context)))
     shapes = single(context, SHAPE, most_heat(context))
-    return [*GAIN.batches(gains, (alone(context, "always"),)), *shapes, *single(context, WARM), *since]
+    return [
+        *GAIN.batches(gains, (alone(context, "always"),)),
+        *shapes,
+        *single(context, WARM),
+        *since,
+        *single(context, WEAR),
+    ]
 
 
 def is_source(parameter: Parameter) -> bool:
@@ -67,7 +76,15 @@ def is_source(parameter: Parameter) -> bool:
 
 
 def edit(cause: Cause, study: Study) -> Effect:
-    """A shape of its own is beside what calibration leaves of the described source."""
+    """A shape of its own is beside what calibration leaves of the described source.
+
+    Raises DescriptionError for what follows the source's own temperature or wears in.
+    """
+    if cause.history != "always" and not (cause.signal or cause.windows):
+        raise DescriptionError(
+            f"no law takes '{cause.history}' beside any other", cause.place,
+            "describe a bearing with bearing_friction_warm, a motor with motor_winding",
+        )  # fmt: skip
     effect = as_found(cause, study)
     return replace(effect, settings={**effect.settings, "gain": 1.0}) if cause.signal else effect
 
@@ -75,11 +92,11 @@ def edit(cause: Cause, study: Study) -> Effect:
 FAMILY = Family(
     4, "loss_law", "Loss law or coefficient wrong",
     "Friction, winding resistance, preload or wear differ from the described law, in size or in shape; or since an "
-    "event; or friction falls with the temperature of its lubricant, or grows with a preload.",
-    "(a - 1) g(t) P_j(t), or b_j s_alt(t) beside any share of P_j(t), or a P_j(t) b_j b_j^T x",
+    "event; or friction falls with the temperature of its lubricant, grows with a preload, or wears in.",
+    "(a - 1) g(t) P_j(t); b_j s_alt(t) beside any share of P_j(t); a P_j(t) b_j b_j^T x; a P_j(t) exp(-h/tau)",
     "goes with the power of one drive; or bends with its speed; or goes with the warmth of its own surface",
     "15 % of a source, 30 % from an hour on, 0.3 %/K", "either",
-    "every source: its gain, always and from every hour on; other exponents of its speed; its own temperature",
+    "every source: its gain, always, from every hour on, less with its hours; other exponents; its own temperature",
     "machine",
     batches, what="a loss other than declared", times="times the declared", declared=True, edit=edit,
 )  # fmt: skip

@@ -29,11 +29,6 @@ def loss_law(site: Site, effect: Effect) -> Change:
     """A source heats more or less than its law says, or by another power of its speed."""
     _, name = named(site, effect.place, "sources")
     source = site.machine.sources[name]
-    if effect.unit == "1/K":
-        raise DescriptionError(
-            "a loss that follows its own temperature has a law of its own", effect.place,
-            "describe a bearing with bearing_friction_warm, a motor with motor_winding",
-        )  # fmt: skip
     if not effect.signal:
         return Change(values={f"sources.{name}.gain": source.gain * effect.amplitude})
     heat, switch = _heat(site, effect)
