@@ -185,10 +185,11 @@ def simulated(machine: Machine, seed: int, folder: Path) -> Run:
 def test_a_machine_of_parts_knows_its_mesh_and_its_rails_at_every_sensor(tmp_path):
     """Of a division that nothing was made with the known ones tell some."""
     machine = load_machine(Path(__file__).parents[1] / "machines" / "slide")
-    known, runs = parameters(machine), [simulated(machine, seed, tmp_path / f"{seed}") for seed in (1, 2)]
+    # the third is sealed, and has positions of its own
+    known, runs = parameters(machine), [simulated(machine, seed, tmp_path / f"{seed}") for seed in (1, 2, 3)]
     probed = make_probed_model(machine, known, runs)
     plans = [measured(probed.base, run, b.drive, b.name) for run, b in zip(runs, probed.runs, strict=True)]
-    study = make_study(probed, plans, range(len(runs)))
+    study = make_study(probed, plans, range(2))
     mesh, rails = differences(machine, study, make_surrogate(study), known, runs, plans)
     x = np.zeros(len(known))
     base = make_study(make_probed_model(machine, known, runs, nominal_alone=True), plans, study.fitted).all_outputs(x)

@@ -81,9 +81,8 @@ def differences(
     apart = np.zeros(len(J), dtype=int) if machine.lumped else np.unique(channel_of(study), return_inverse=True)[1]
 
     step = study.runs[0].run.step
-    fitted = study.fitted
-    measured = tuple(runs[k] for k in fitted), tuple(plans[k] for k in fitted)
-    known = _Known(tuple(parameters), *measured, machine.lumped, step)
+    # sealed ones too: the plans count positions of the TCP that any run has
+    known = _Known(tuple(parameters), tuple(runs), tuple(plans), tuple(study.fitted), machine.lumped, step)
     every = list(_others(machine))
     # two windows made alike are off alike: as described it is made once more
     asked = [*(o for others in every for o in others), *([] if machine.lumped else [_Other(machine)])]
@@ -115,7 +114,8 @@ class _Known:
 
     parameters: tuple[Parameter, ...]
     runs: tuple[Run, ...]
-    plans: tuple[Measured, ...]  # of these runs, which are the fitted ones
+    plans: tuple[Measured, ...]
+    fitted: tuple[int, ...]
     lumped: bool
     step: float  # s
 
@@ -124,7 +124,7 @@ class _Known:
         probed = make_probed_model(
             other.machine, acting, self.runs, silent, other.mesh, not self.lumped, step=self.step
         )
-        return make_study(probed, self.plans, range(len(self.runs)))
+        return make_study(probed, self.plans, self.fitted)
 
 
 def _outputs(known: _Known, other: _Other) -> np.ndarray:

@@ -65,7 +65,7 @@ def ended(study: Study, h: Hypothesis) -> Hypothesis:
     if not lasts(study, h.when.windows):
         return h
     name = study.runs[study.fitted[-1]].run.name
-    windows = tuple(replace(w, end=w.end - AT_THE_END) if w.run == name else w for w in h.when.windows)
+    windows = tuple(replace(w, end=w.end - 2.0 * AT_THE_END) if w.run == name else w for w in h.when.windows)
     told = h.when.name
     told = f"{told.removesuffix(' on')} to the end of {name}" if told.endswith(" on") else told
     return replace(h, when=replace(h.when, name=told, windows=windows))

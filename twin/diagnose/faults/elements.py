@@ -83,9 +83,8 @@ class Elements:
         return {place: own for (kind, place), own in self.block_of.items() if kind == "heat"}
 
 
-FORCINGS = frozenset(
-    {"zone", "gradient", "signal", "loss", "wear"}
-)  # kinds whose vectors exact refits step; others have slots
+# kinds whose vectors exact refits step; others have slots
+FORCINGS = frozenset({"zone", "gradient", "signal", "loss", "wear"})
 
 
 def slim(elements: Elements) -> Elements:

@@ -34,7 +34,7 @@ class Warm(Fault):
 
 @dataclass(frozen=True)
 class Since(Fault):
-    """A source that emits more, or less, for some hours, or from an event on."""
+    """A source that emits more, or less, from an event on, or until it has worn in."""
 
     def lowest(self, study: Study, nominal: Sequence[Nominal], h: Hypothesis) -> np.ndarray:
         """Not less than nothing."""
@@ -50,8 +50,13 @@ WARM = Warm(
     "loss_law", "warm", "1/K", "sources.", least=0.003, own=0.15, bent=True, called="with its own temperature",
     largest=0.05,  # 1/K: viscosity of a mineral oil at room temperature (ISO 3448 grades, index 100)
 )  # fmt: skip
-SINCE = Since("loss_law", "loss", "1", "sources.", 0, 0.3, 4.0, own=0.1, curve=Curve.RELATIVE, grows=False)
-WEAR = Since("loss_law", "wear", "1", "sources.", 0, 0.3, 4.0, own=0.1, curve=Curve.RELATIVE)
+SINCE, WEAR = (
+    Since(
+        "loss_law", kind, "1", "sources.", least=0.3, largest=4.0, own=0.1, curve=Curve.RELATIVE, grows=False,
+        beside=True,
+    )
+    for kind in ("loss", "wear")
+)  # fmt: skip
 FAULTS = (GAIN, SHAPE, WARM, SINCE, WEAR)
 
 

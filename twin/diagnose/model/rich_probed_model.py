@@ -45,7 +45,7 @@ def rich_probed_model(
 ) -> RichProbedModel:  # fmt: skip
     """The rich model with places, cached by description and meshes; mesh: lumped machines have that described alone.
 
-    probed: False leaves out the places, which take two thirds of the time, for who asks what the described loads do.
+    probed: False leaves out the places, for who asks what the described loads do.
     """
     linear = mesh is Mesh.LINEAR
 

@@ -106,6 +106,8 @@ def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
     """(family, unit, place, whether it switches) -> `limits_in`, `over_histories`, the least of batches."""
     result: dict[tuple[str, str, str, bool], float] = {}
     for batch, sizes in limits_in(detector):
+        if fault_of(batch).beside:
+            continue
         for windowed in (False, True):
             chosen = [i for i, h in enumerate(batch.histories) if bool(h.windows) == windowed]
             if chosen:
@@ -118,8 +120,8 @@ def limits_at(detector: Detector) -> dict[tuple[str, str, str, bool], float]:
 
 def limits_of(detector: Detector) -> tuple[Limit, ...]:
     """Per family and unit `limits_at` its places, for what always acts where there is such; factors as factors."""
-    batches = detector.columns.batches
-    curves = {(batch.family, batch.unit): fault_of(batch).curve for batch in reversed(batches)}  # of what always acts
+    told = [batch for batch in detector.columns.batches if not fault_of(batch).beside]
+    curves = {(batch.family, batch.unit): fault_of(batch).curve for batch in told}
     at = limits_at(detector)
     found: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for (family, unit, place, windowed), size in at.items():

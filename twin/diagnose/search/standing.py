@@ -19,7 +19,7 @@ from twin.diagnose.search.refit import refit
 from twin.diagnose.search.sealed import Judged, judged
 from twin.diagnose.search.verdict import verdict_of, with_faults
 
-REFUTED_LATER = "In the sealed run it is not at work, which is less likely with it beyond chance"
+REFUTED_LATER = "With it the sealed run is less likely, beyond chance"
 
 
 def standing(
