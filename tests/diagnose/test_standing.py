@@ -16,7 +16,10 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import Search
+from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.sealed import judged
 from twin.diagnose.search.standing import standing
+from twin.diagnose.search.verdict import cause_of
 
 pytestmark = pytest.mark.long
 
@@ -83,6 +86,26 @@ def test_what_ended_with_the_runs_that_were_looked_at_is_told_until_then():
     assert not lasts(study, one.hypothesis.when.windows)
     assert not one.units[0].shapes[2].any()
     assert told.causes[0].history == "from 2.0 h of run_0 to the end of run_1"
+
+
+@pytest.mark.parametrize(("bent", "refuted"), [(0.0, False), (3.0, True)])
+def test_a_cause_that_ends_before_the_sealed_run_is_judged_there_by_the_calibration_beside_it(bent, refuted):
+    """Heat for an hour of the first run: a false one would have led a source's number astray."""
+    found, y, opened = found_beside()
+    study = found.detector.study
+    batch = found.accepted[0].hypothesis.batch
+    when = next(w for w in batch.histories if w.name == "from 1.0 h to 2.0 h of run_0")
+    h = Hypothesis(batch, batch.places.index("housing"), when, 500.0, (50.0,))
+    one = replace(
+        found.accepted[0], hypothesis=h, units=units_of(study, h), amplitude=np.array([50.0]), statistic=500.0
+    )
+    T, w = study.runs[2].split(study.outputs(2, found.x0))
+    x = found.x0.copy()
+    x[next(j for j, p in enumerate(study.probed.parameters) if p.kind == "source")] += bent
+    measured = [replace(opened[0], temperature=T, tcp=w)]
+    told = judged(replace(found, accepted=(one,), x=x), y, "named", [cause_of(one, study, POLICY)], FAMILIES,
+                  measured, 1)  # fmt: skip
+    assert told.refuted is refuted
 
 
 def test_what_is_not_refuted_stays_as_it_was_found():

@@ -234,8 +234,8 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         add("warm", source.name, [np.outer(q * (x @ B), B) for q, x in zip(power, z, strict=True)], always)
         own_at = own_place(study, j)
         for p in beside(probed.places, own_at) if own_at is not None else ():
-            moved, power = [probed.B[p] - B] * len(runs), [q[:, j] for q in powers]
-            add("moved", f"{source.name}>{probed.places[p].name}", moved, {"always": power})
+            moved, own = [probed.B[p] - B] * len(runs), [q[:, j] for q in powers]
+            add("moved", f"{source.name}>{probed.places[p].name}", moved, {"always": own})
     for name, factor, of in _signals(study, nominal, powers):
         add("signal", f"{name}*{factor:.6g}", of, always)
     for i in range(len(study.fitted)):

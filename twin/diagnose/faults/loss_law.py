@@ -52,8 +52,8 @@ WARM = Warm(
 )  # fmt: skip
 SINCE, WEAR = (
     Since(
-        "loss_law", kind, "1", "sources.", least=0.3, largest=4.0, own=0.1, curve=Curve.RELATIVE, grows=False,
-        beside=True,
+        "loss_law", kind, "1", "sources.", least=0.3, own=0.1, curve=Curve.RELATIVE, grows=False, beside=True,
+        largest=4.0,  # more than described: as much as a gain may be
     )
     for kind in ("loss", "wear")
 )  # fmt: skip
@@ -88,7 +88,7 @@ def edit(cause: Cause, study: Study) -> Effect:
     if cause.history != "always" and not (cause.signal or cause.windows):
         raise DescriptionError(
             f"no law takes '{cause.history}' beside any other", cause.place,
-            "describe a bearing with bearing_friction_warm, a motor with motor_winding",
+            "bearing_friction_warm and motor_winding follow a temperature; calibrate again what has worn in",
         )  # fmt: skip
     effect = as_found(cause, study)
     return replace(effect, settings={**effect.settings, "gain": 1.0}) if cause.signal else effect
