@@ -44,7 +44,7 @@ KEYS = [
     ("warm", "front", "always"),
     ("loss", "front", "block 1"),
     ("loss", "nut", "block 2"),
-    ("wear", "front", "wearing in over 2 h of running"),
+    ("wear", "front", "running-in over 2 h"),
     ("start", "", ""),  # the first of its kind
     ("signal", "", ""),
 ]

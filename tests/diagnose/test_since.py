@@ -1,5 +1,5 @@
 """What began with an event, or ends by and by: a loss or a film of one run, a sensor that reads otherwise from an hour
-on, a bearing that wears in.
+on, a bearing that runs in.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def test_a_number_that_is_another_one_in_one_run_is_that_number_in_that_run(path
     assert first.amplitude == pytest.approx(factor, rel=0.2)
 
 
-def test_a_bearing_that_wears_in_is_its_loss():
+def test_a_bearing_that_runs_in_is_its_loss():
     """Twice the described friction when new, and over four hours of running, which no column has, ever less of that."""
     study = small_case.study()
     (body,), load = study.probed.base.bodies, study.probed.base.load_model
@@ -61,7 +61,7 @@ def test_a_bearing_that_wears_in_is_its_loss():
     verdict, first = said(np.concatenate(parts), 3)
     assert verdict in ("named", "ambiguous")
     assert (first.family, first.place) == ("loss_law", "sources.front")
-    assert first.history.startswith("wearing in")
+    assert first.history.startswith("running-in")
     assert first.amplitude == pytest.approx(2.0, abs=0.3)
 
 

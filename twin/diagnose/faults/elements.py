@@ -49,8 +49,8 @@ MISREAD = {
 }
 EXPONENT = 0.6  # of speeds in forced convection
 HEATING = {"A": (2.0,), "m/s": (1.0,), "1/s": (1.0, 5.0 / 3.0), "W": (1.0,), "1": (1.0,)}  # exponents by unit, of heat
-# s of running in which a bearing or a guide wears in: a judgement, of what shows in runs of a day
-WEARING = 7200.0, 21600.0
+# s of running of running-in of a bearing or a guide: a judgement, of what shows in runs of a day
+RUNNING_IN = 7200.0, 21600.0
 RUNS = 0.01  # of its largest heat: a source that emits more runs
 LAWS = (1.0, 5.0 / 3.0, 2.0, 8.0 / 3.0)  # exponents of speeds in losses
 
@@ -224,9 +224,9 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
             power = [power_of(study, k, j) for k in range(len(runs))]
             emitted = [np.outer(q, B) for q in power]
         add("loss", source.name, emitted, {}, True)
-        for tau in WEARING:
+        for tau in RUNNING_IN:
             fresh = worn(powers, j, [run.step for run in runs], tau)
-            acting = {f"wearing in over {tau / 3600.0:g} h of running": histories.signals["always"]}
+            acting = {f"running-in over {tau / 3600.0:g} h": histories.signals["always"]}
             add("wear", source.name, [q * left[:, None] for q, left in zip(emitted, fresh, strict=True)], acting)
         if source.contact:
             continue

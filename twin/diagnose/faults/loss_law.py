@@ -34,7 +34,7 @@ class Warm(Fault):
 
 @dataclass(frozen=True)
 class Since(Fault):
-    """A source that emits more, or less, from an event on, or until it has worn in."""
+    """A source that emits more, or less, from an event on, or until it has run in."""
 
     def lowest(self, study: Study, nominal: Sequence[Nominal], h: Hypothesis) -> np.ndarray:
         """Not less than nothing."""
@@ -62,7 +62,7 @@ FAULTS = (GAIN, SHAPE, WARM, SINCE, WEAR)
 
 def batches(context: Context) -> list[Batch]:
     """Gains of sources, always and from every hour on; other shapes at their places; what follows their own warmth, and
-    what wears in."""
+    what runs in."""
     gains = [(path.removesuffix(".gain"), c) for path, c in context.rows(GAIN) if path.startswith("sources.")]
     since = SINCE.batches(context.blocks(SINCE), of_stretches(to_the_end(context)))
     shapes = single(context, SHAPE, most_heat(context))
@@ -83,12 +83,12 @@ def is_source(parameter: Parameter) -> bool:
 def edit(cause: Cause, study: Study) -> Effect:
     """A shape of its own is beside what calibration leaves of the described source.
 
-    Raises DescriptionError for what follows the source's own temperature or wears in.
+    Raises DescriptionError for what follows the source's own temperature or runs in.
     """
     if cause.history != "always" and not (cause.signal or cause.windows):
         raise DescriptionError(
             f"no law takes '{cause.history}' beside any other", cause.place,
-            "bearing_friction_warm and motor_winding follow a temperature; calibrate again what has worn in",
+            "bearing_friction_warm and motor_winding follow a temperature; calibrate again what has run in",
         )  # fmt: skip
     effect = as_found(cause, study)
     return replace(effect, settings={**effect.settings, "gain": 1.0}) if cause.signal else effect
@@ -97,7 +97,7 @@ def edit(cause: Cause, study: Study) -> Effect:
 FAMILY = Family(
     4, "loss_law", "Loss law or coefficient wrong",
     "Friction, winding resistance, preload or wear differ from the described law, in size or in shape; or since an "
-    "event; or friction falls with the temperature of its lubricant, grows with a preload, or wears in.",
+    "event; or friction falls with the temperature of its lubricant, grows with a preload, or runs in.",
     "(a - 1) g(t) P_j(t); b_j s_alt(t) beside any share of P_j(t); a P_j(t) b_j b_j^T x; a P_j(t) exp(-h/tau)",
     "goes with the power of one drive; or bends with its speed; or goes with the warmth of its own surface",
     "15 % of a source, 30 % from an hour on, 0.3 %/K", "either",
