@@ -15,6 +15,7 @@ from skfem import MeshTet1, MeshTet2
 
 from twin.build.elasticity import Elasticity
 from twin.build.mesh import BodyMesh, PartMesh, body_mesh, part_mesh
+from twin.build.project import rows_times
 from twin.rom.model import AffineBody
 
 
@@ -65,19 +66,13 @@ def linear_body(mesh: BodyMesh, body: AffineBody) -> AffineBody:
         H=None if body.H is None else V.T @ body.H,
         raised=None if body.raised is None else np.array([V.T @ columns for columns in body.raised]),
         C=body.C @ V,
-        G=_right(body.G, V),
-        W=None if body.W is None else _right(body.W, V),
+        G=rows_times(body.G, V),
+        W=None if body.W is None else rows_times(body.W, V),
         F=None if body.F is None else body.F @ V,
         one=body.one[keep],
         energy=V.T @ body.energy,
         first=(*ends[:-1].tolist(), *(int(ends[-1]) + i for i in range(body.n - mesh.n))),
     )
-
-
-def _right(table: np.ndarray, V: csr_array) -> np.ndarray:
-    """table @ V for a table (..., n)."""
-    flat = table.reshape(-1, table.shape[-1]) @ V
-    return np.asarray(flat).reshape(*table.shape[:-1], V.shape[1])
 
 
 def _straight(part: PartMesh) -> PartMesh:

@@ -53,13 +53,19 @@ def project(body: AffineBody, V: np.ndarray, W: np.ndarray | None = None) -> Aff
         H=None if body.H is None else left.T @ body.H,
         raised=None if body.raised is None else left.T @ body.raised,
         C=body.C @ V,
-        G=body.G @ V,
-        W=None if body.W is None else body.W @ V,
+        G=rows_times(body.G, V),
+        W=None if body.W is None else rows_times(body.W, V),
         one=one,
         energy=V.T @ body.energy,
         F=None if body.F is None else body.F @ V,
         V=None if body.V is None else body.V @ V,
     )
+
+
+def rows_times(table: np.ndarray, V: Matrix) -> np.ndarray:
+    """table @ V for a table (..., n) by one product: of one per pose each would read V (n, r) again."""
+    flat = table.reshape(-1, table.shape[-1]) @ V
+    return np.asarray(flat).reshape(*table.shape[:-1], V.shape[1])
 
 
 def _members(
@@ -69,15 +75,15 @@ def _members(
     if not body.members:
         return None, None, None
     if body.E_members is not None and body.G_members is not None:
-        W_members = None if body.W_members is None else body.W_members @ V
-        return np.array([congruent(E) for E in body.E_members]), body.G_members @ V, W_members
+        W_members = None if body.W_members is None else rows_times(body.W_members, V)
+        return np.array([congruent(E) for E in body.E_members]), rows_times(body.G_members, V), W_members
     E, G, W = [], [], []
     for m in range(len(body.members)):
         own = body.member_states(m)
         E.append(left[own].T @ (body.E[own, own] @ V[own]))  # members share no states, E couples none of them
-        G.append(body.G[:, :, own] @ V[own])
+        G.append(rows_times(body.G[:, :, own], V[own]))
         if body.W is not None:
-            W.append(body.W[:, own] @ V[own])
+            W.append(rows_times(body.W[:, own], V[own]))
     return np.array(E), np.array(G), np.array(W) if W else None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,11 +30,12 @@ def standing(
 
     Where these refute several causes in the machine together, the weakest goes and the others are fitted and judged
     again. If they are refuted down to the last one, so is all that was found. Where they refute what has come to stay,
-    and it may have ended with the runs that were looked at, they refute that it stays.
+    and it may have ended with the runs that were looked at, they refute that it stays. What comes in every run that was
+    looked at may come in a sealed one, too: it is refuted only where that run has it at no hours of the others either.
     """
 
-    def held_against(now: Search) -> Judged:
-        verdict, causes = verdict_of(now, families)
+    def held_against(now: Search, told_of: Search | None = None) -> Judged:
+        verdict, causes = verdict_of(told_of or now, families)
         if verdict == "unknown":  # judged is the calibration beside faulty channels then, not what was tried
             now = beside_sensors(now, y, families)
         return judged(now, y, *with_faults(verdict, causes, faults), families, opened, seed)
@@ -43,6 +44,9 @@ def standing(
     if whole.refuted and (over := _ended(found)) is not found and not (told := held_against(over)).refuted:
         names = " and ".join(f"{c.family.replace('_', ' ')} at {c.place}" for c in told.causes if c.windows)
         return over, replace(told, less=f"told until the end of the runs that were looked at: {names}. {REFUTED_LATER}")
+    for run, again in _recurring(found, opened) if whole.refuted or whole.size else ():
+        if (told := held_against(again, found)).extension:
+            return again, replace(told, less=f"the sealed run is predicted with what switches, at its hours of {run}")
     now, told, gone = found, whole, list[Accepted]()
     while told.refuted and (weakest := _weakest(now, families)):
         gone.append(weakest)
@@ -65,6 +69,24 @@ def _ended(found: Search) -> Search:
         accepted.append(a if h is a.hypothesis else replace(a, hypothesis=h, units=units_of(study, h)))
     changed = any(a is not b for a, b in zip(accepted, found.accepted, strict=True))
     return replace(found, accepted=tuple(accepted)) if changed else found
+
+
+def _recurring(found: Search, opened: Sequence[Measured]) -> Iterator[tuple[str, Search]]:
+    """The search with causes that switch, where all of them do so in every fitted run, at the hours of one of these in
+    the sealed runs as well."""
+    study = found.detector.study
+    runs = {name for name, _ in study.fitted_runs}
+    switching = [a for a in found.accepted if a.units and a.hypothesis.when.windows and not a.hypothesis.when.bell]
+    if not switching or any({w.run for w in a.hypothesis.when.windows} != runs for a in switching):
+        return
+    for run in sorted(runs):
+        accepted = list[Accepted]()
+        for a in found.accepted:
+            h, own = a.hypothesis, [w for w in a.hypothesis.when.windows if w.run == run and a in switching]
+            more = [replace(w, run=sealed.name) for sealed in opened for w in own]
+            h = replace(h, when=replace(h.when, windows=(*h.when.windows, *more)))
+            accepted.append(replace(a, hypothesis=h, units=units_of(study, h)) if more else a)
+        yield run, replace(found, accepted=tuple(accepted))
 
 
 def _weakest(found: Search, families: Sequence[Family]) -> Accepted | None:
