@@ -62,11 +62,14 @@ def test_a_leap_is_named_with_its_size_and_set_aside(runs, size, start):
     assert f"'{name}' reads" in words(found, ["monday", "tuesday"])
 
 
-def test_what_rises_as_far_within_minutes_is_no_leap(runs):
-    """As a sensor on a screw does that a warm nut comes to: by all others alone it would be one."""
+@pytest.mark.parametrize("elsewhere", [0.0, 7.0])
+def test_what_rises_as_far_within_minutes_is_no_leap(runs, elsewhere):
+    """As a sensor on a screw does that a warm nut comes to: by all others alone it would be one. Nor is it where two
+    readings of another hour are as far from each other."""
     name, size, start = "column_front_middle", 6.0, 4 * HOUR
     table = runs[0].temperatures
     rise = size * np.clip((table.time - start) / 1200.0, 0.0, 1.0)
+    rise[np.searchsorted(table.time, 8 * HOUR)] += elsewhere
     warm = replace(runs[0], temperatures=replace(table, columns=table.columns | {name: table.columns[name] + rise}))
     assert {(f.what, f.channels) for f in refuted(readings([warm, runs[1]]))} == {("leap", (name,))}
     assert judge([warm, runs[1]]).findings == ()

@@ -16,12 +16,10 @@ from functools import cache
 import numpy as np
 
 from twin.calibrate.channels.finding import Finding
-from twin.calibrate.channels.judge import Judgement, judge
+from twin.calibrate.channels.judge import BESIDE, Judgement, judge
 from twin.logs.run import Run
 from twin.rom.artefact import Artefact
 from twin.run.results import Result
-
-BESIDE = 3600.0  # s before and after a leap that are compared: bins in which leaps are found last 10 min to 1 h
 
 
 def judge_beside(artefact: Artefact, runs: Sequence[Run]) -> Judgement:

@@ -20,6 +20,7 @@ from twin.logs.stuck import frozen_throughout
 _DEPARTS = 0.6745 * 1.5**0.5
 KNOWN = 0.5  # K, half of a 95 % interval: the tolerance of a good sensor (class B of IEC 60751 at 40 degC)
 NEAR = 1200.0  # s about the start of a swap: two bins of the judgement
+BESIDE = 3600.0  # s before and after a leap that are compared: bins in which leaps are found last 10 min to 1 h
 
 
 @dataclass(frozen=True)
@@ -89,13 +90,15 @@ def _own(faults: Sequence[tuple[int, Fault]]) -> list[Finding]:
 
 
 def _shown(runs: Sequence[Run], f: Finding) -> bool:
-    """Whether a finding is no leap, or its channel moves from one reading to the next as far as the nearer end of what
-    all others say, to KNOWN: a sensor that a warm nut comes to rises as far, but takes its time."""
+    """Whether a finding is no leap, or its channel moves there from one reading to the next as far as the nearer end of
+    what all others say, to KNOWN: a sensor that a warm nut comes to rises as far, but takes its time. Elsewhere in the
+    run it may have cooled as far while nothing was logged."""
     table = runs[f.runs[0]].temperatures
     if f.what != "leap" or table is None:
         return True
     values, sign = table.columns[f.channels[0]], np.sign(f.size)
-    steps = sign * np.diff(values[np.isfinite(values)])
+    there = np.isfinite(values) & (np.abs(table.time - f.start) <= BESIDE)
+    steps = sign * np.diff(values[there])
     return bool(steps.max(initial=0.0) >= min(sign * end for end in f.interval) - KNOWN)
 
 
