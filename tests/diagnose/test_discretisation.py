@@ -192,12 +192,11 @@ def test_a_machine_of_parts_knows_its_mesh_and_its_rails_at_every_sensor(tmp_pat
     study = make_study(probed, plans, range(2))
     mesh, rails = differences(machine, study, make_surrogate(study), known, runs, plans)
     x = np.zeros(len(known))
-    base = make_study(make_probed_model(machine, known, runs, nominal_alone=True), plans, study.fitted).all_outputs(x)
+    fitted = study.fitted
+    base = make_study(make_probed_model(machine, known, runs, nominal_of=fitted), plans, fitted).all_outputs(x)
     np.testing.assert_allclose(base, study.all_outputs(x), atol=0.1)  # noise of a single reading; it rises by 30 K
     other = with_segments(machine, 3.0)
-    more = (
-        make_study(make_probed_model(other, known, runs, nominal_alone=True), plans, study.fitted).all_outputs(x) - base
-    )
+    more = make_study(make_probed_model(other, known, runs, nominal_of=fitted), plans, fitted).all_outputs(x) - base
     for own in np.unique(rails.share):
         rows = rails.share == own
         if np.sqrt(np.mean(more[rows] ** 2)) > 0.02:

@@ -121,9 +121,8 @@ class _Known:
 
     def study(self, other: _Other) -> Study:
         acting = [_acting(p, other.machine) for p in self.parameters]
-        probed = make_probed_model(
-            other.machine, acting, self.runs, silent, other.mesh, not self.lumped, step=self.step
-        )
+        alone = () if self.lumped else self.fitted
+        probed = make_probed_model(other.machine, acting, self.runs, silent, other.mesh, alone, self.step)
         return make_study(probed, self.plans, self.fitted)
 
 

@@ -109,13 +109,14 @@ def drive_arrays(drive: Drive) -> tuple[np.ndarray, ...]:
 
 def make_probed_model(
     machine: Machine, parameters: Sequence[Parameter], runs: Sequence[Run], progress: Progress = silent,
-    mesh: Mesh = Mesh.DESCRIBED, nominal_alone: bool = False, step: float = STEP,
+    mesh: Mesh = Mesh.DESCRIBED, nominal_of: Sequence[int] = (), step: float = STEP,
 ) -> ProbedModel:  # fmt: skip
     """The probed model of a machine and the loads of runs, cached by both; mesh: of which elements it is; step [s].
 
-    nominal_alone: it knows these runs at nominal values, and nothing of other values; it has no places.
+    nominal_of: the runs, by number, that it knows at nominal values, and nothing else; it has no places. Without
+    them it knows all runs, and other values.
     """
-    rich = rich_probed_model(machine, progress, mesh, probed=not nominal_alone)
+    rich = rich_probed_model(machine, progress, mesh, probed=not nominal_of)
     rich = replace(rich, rich=at_positions(rich.rich, tcp_positions(rich.rich, runs)))
     base = pruned(rich.rich)
     load = base.load_model
@@ -128,14 +129,15 @@ def make_probed_model(
     def make() -> tuple[np.ndarray, tuple[float, float]]:
         coarse = tuple(drive_of(base, run, TRAINING_STEP) for run in runs)
         shared = Shared(rich.rich, base, tuple(parameters), rich.places, coarse, starts)
-        if nominal_alone:
-            train = held = nominal(shared)
+        if nominal_of:
+            drives, begin = tuple(coarse[k] for k in nominal_of), tuple(starts[k] for k in nominal_of)
+            train = held = nominal(replace(shared, drives=drives, starts=begin))
         else:
             described, drawn, heated = snapshots(shared, progress=progress)
             held = drawn[-len(runs) :]
             train = [*described, *drawn[: -len(runs)], *heated]
         rows = _rows(rich.rich)
-        tail = OF_NOMINAL if nominal_alone else TAIL
+        tail = OF_NOMINAL if nominal_of else TAIL
         V = window_basis(rich.rich, train, np.zeros((rich.rich.n, 0)), 0.05, rows, tail, LARGEST)
         X = np.column_stack(held)
         left = rows @ (X - V @ (V.T @ X))
@@ -147,7 +149,7 @@ def make_probed_model(
         V, reduction = np.eye(rich.rich.n), (0.0, 0.0)
     else:
         logged = (*_logged(load, runs), rich.rich.poses)
-        inputs = (machine_hash(machine), mesh.name, nominal_alone, known, starts, arrays_hash(logged))
+        inputs = (machine_hash(machine), mesh.name, tuple(nominal_of), known, starts, arrays_hash(logged))
         V, reduction = cached("window", __name__, inputs, make)
     return _assembled(rich, V, parameters, runs, names, drives, begins, reduction)
 
