@@ -39,7 +39,9 @@ def test_what_a_source_emits_as_described_is_free_beside_a_law_of_another_shape(
     assert found[j] == pytest.approx(x[j], abs=1.0)
     guess = replace(one, amplitude=np.array([1.2 * SIZE]))
     fitted, (again,) = refit(detector, y, np.zeros(len(x)), [guess])
-    assert again.amplitude[0] == pytest.approx(SIZE, rel=0.1)
+    # the exponent of what is described is not known either
+    assert again.amplitude[0] == pytest.approx(SIZE, abs=2.0 * np.sqrt(again.covariance[0, 0]))
+    assert again.amplitude[0] == pytest.approx(SIZE, rel=0.4)
     assert fitted.x[j] < -3.0
 
 

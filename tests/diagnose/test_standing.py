@@ -48,6 +48,13 @@ def found_beside(*others: Accepted) -> tuple[Search, np.ndarray, list[Measured]]
     return replace(found, accepted=(*found.accepted, *others)), y, opened
 
 
+def test_causes_that_are_alike_are_told_apart():
+    """One of two in the same windows is dropped."""
+    one, other = always("slide", 50.0, 40.0), always("slide", 50.0, 40.0)
+    assert one not in [other]
+    assert [one, other].index(other) == 1
+
+
 def test_the_weakest_is_withdrawn_alone():
     """5 kW at the slide that are not there: without them the other cause predicts the sealed run."""
     found, y, opened = found_beside(always("slide", 5000.0, 40.0))

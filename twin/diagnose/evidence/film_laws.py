@@ -21,6 +21,7 @@ import numpy as np
 from scipy.special import xlogy
 
 from twin.diagnose.evidence.nulls import Form, convection
+from twin.diagnose.evidence.speeds import relative_speed
 from twin.diagnose.model.integration import LITTLE
 from twin.diagnose.model.study import Study, make_study
 from twin.rom.parameter import Kind, Parameter
@@ -35,7 +36,6 @@ FORCED = 2.0
 # hidden had a film of 2.5 times
 STATED = 5.0
 LEAST = 1.0  # W/(m^2 K), of a film at rest
-SPEEDS = ("m/s", "1/s")  # units
 # bounds, standard deviations: as far as synthetic measurements draw
 MOST = 2.5
 
@@ -77,17 +77,10 @@ def with_film_laws(study: Study, form: Form) -> Study:
 def _relative_speeds(study: Study) -> list[np.ndarray]:
     """Per run (n, n_films) the speed that the law of each film reads, of the largest in the fitted runs; 0 where it
     reads none."""
-    load, runs = study.probed.base.load_model, study.probed.runs
-    units = {s.name: s.unit for s in load.signals}
-    result = [np.zeros((run.drive.n_steps, len(load.films))) for run in runs]
-    for f, film in enumerate(load.films):
-        for signal in film.use.signals.values():
-            values = [np.abs(run.signals.get(signal, np.zeros(run.drive.n_steps))) for run in runs]
-            top = max(float(values[k].max()) for k in study.fitted)
-            if units.get(signal) in SPEEDS and top > 0.0:
-                for own, v in zip(result, values, strict=True):
-                    own[:, f] = v / top
-    return result
+    films = study.probed.base.load_model.films
+    of_films = [relative_speed(study, film.use.signals.values()) for film in films]
+    none = [np.zeros((run.drive.n_steps, 0)) for run in study.probed.runs]
+    return [np.stack(own, axis=1) for own in zip(*of_films, strict=True)] or none
 
 
 def _of(film: str, kind: Kind, sigma: float) -> Parameter:

@@ -42,6 +42,9 @@ class Form:
     # ball-screw axis and the ram borer of even seeds
     speed: float = 0.5
     speed_exponent: float = 0.15  # of that speed in the coefficient: half of 0.8 - 0.5, turbulent and laminar flow
+    # of the exponent of a speed in the heat of a source: rectangular distribution between 1, friction by load, and 5/3,
+    # by the lubricant (`twin.diagnose.evidence.loss_exponents`)
+    loss_exponent: float = 0.19
     # of the logarithm of a film's coefficient beyond its tolerance: laws of the rise to the power 0 and 0.3 that agree
     # at one rise differ by 0.3 ln 5 at five times and at a fifth of it (three times had a film of the table of the
     # ball-screw axis, seed 0, before a loss). In synthetic measurements alone: what a calibration makes of it is what a
@@ -205,6 +208,15 @@ def power_of(study: Study, k: int, source: int) -> np.ndarray:
         place = int(np.searchsorted(drive.losses.grid, 30.0))
         return drive.losses.value[:, i, place]
     return drive.power[:, source]
+
+
+def emitted(study: Study, k: int, source: int) -> np.ndarray:
+    """(n, r) W of a source in a run, where it enters."""
+    (body,) = study.probed.base.bodies
+    load, drive = study.probed.base.load_model, study.runs[k].run.drive
+    if load.sources[source].contact:
+        return np.asarray(drive.contact_heat[:, load.contact_sources.index(source)] @ body.P.T)
+    return np.outer(power_of(study, k, source), body.B[:, body.sources.index(source)])
 
 
 def sources_of_surfaces(study: Study) -> list[int]:

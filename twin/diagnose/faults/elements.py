@@ -28,8 +28,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.places import beside
-from twin.diagnose.evidence.film_laws import SPEEDS
-from twin.diagnose.evidence.nulls import convection, power_of, sources_of_surfaces
+from twin.diagnose.evidence.nulls import convection, emitted, sources_of_surfaces
+from twin.diagnose.evidence.speeds import SPEEDS
 from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.probed_loads import gammas
 from twin.diagnose.model.study import Study, own_place
@@ -216,22 +216,17 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         add("contact", name, [_contact_flow(study, k, c, x) for k, x in enumerate(z)], {}, True)
     powers = [_power_of(system, run.drive, own) for run, own in zip(runs, nominal, strict=True)]
     for j, source in enumerate(load.sources):
-        if source.contact:
-            s = load.contact_sources.index(j)
-            emitted = [run.drive.contact_heat[:, s] @ body.P.T for run in runs]
-        else:
-            B = body.B[:, body.sources.index(j)]
-            power = [power_of(study, k, j) for k in range(len(runs))]
-            emitted = [np.outer(q, B) for q in power]
-        add("loss", source.name, emitted, {}, True)
+        heat = [emitted(study, k, j) for k in range(len(runs))]
+        add("loss", source.name, heat, {}, True)
         for tau in RUNNING_IN:
             fresh = worn(powers, j, [run.step for run in runs], tau)
             acting = {f"running-in over {tau / 3600.0:g} h": histories.signals["always"]}
-            add("wear", source.name, [q * left[:, None] for q, left in zip(emitted, fresh, strict=True)], acting)
+            add("wear", source.name, [q * left[:, None] for q, left in zip(heat, fresh, strict=True)], acting)
         if source.contact:
             continue
+        B = body.B[:, body.sources.index(j)]
         add("source", source.name, [B] * len(runs), _law_histories(study, j, histories))
-        add("warm", source.name, [np.outer(q * (x @ B), B) for q, x in zip(power, z, strict=True)], always)
+        add("warm", source.name, [q * (x @ B)[:, None] for q, x in zip(heat, z, strict=True)], always)
         own_at = own_place(study, j)
         for p in beside(probed.places, own_at) if own_at is not None else ():
             moved, own = [probed.B[p] - B] * len(runs), [q[:, j] for q in powers]

@@ -38,13 +38,23 @@ def moved_words(d: Diagnosis) -> str:
 
 
 def left_words(d: Diagnosis) -> str:
-    """What is left, where it is no white noise; empty where it is."""
+    """What is left, and where most, if it is no white noise; empty where it is."""
     after = np.array([w[2] for w in d.whiteness], dtype=float)
     if not np.isfinite(after).any() or np.nanmedian(after) < WHITE:
         return ""
+    left = [(0.0, "", "")]
+    for s in (s for s in d.series if not s.sealed):
+        for names, values, of, unit in (
+            (s.sensors, s.extended, KELVIN, "K"),
+            (COMPONENTS, s.tcp_extended, METRES, "m"),
+        ):
+            sizes = np.nan_to_num(rms(values)).tolist() if np.size(values) else ()
+            left += [(v / of, quantity(v, unit), name) for v, name in zip(sizes, names, strict=False)]
+    weight, size, name = max(left)
+    most = f", the most {name}, {size} (rms)" if weight >= 1.0 else ""
     return (
         f"what is left is no noise (correlated by {np.nanmedian(after):.2f} from bin to bin), but no more than "
-        "simulated machines without an effect leave"
+        f"simulated machines without an effect leave{most}"
     )
 
 

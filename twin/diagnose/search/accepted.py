@@ -25,7 +25,7 @@ from twin.diagnose.search.detector import Derivatives, Detector
 OWN = ("gain", "conductance", "total")  # how parameters of sources, films, contacts and joints are called there
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # two are the same if they are one: arrays have no truth value
 class Accepted:
     """A cause with its amplitudes after the last refit."""
 

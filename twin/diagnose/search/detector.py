@@ -20,6 +20,7 @@ from twin.calibrate.fit.noise import Channels, estimated
 from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.evidence.fitter import Fitted, Fitter
 from twin.diagnose.evidence.formal import known_forms
+from twin.diagnose.evidence.loss_exponents import other_exponents
 from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, null
 from twin.diagnose.evidence.pulls import Pulls, tails
 from twin.diagnose.evidence.settled import settled_nearly
@@ -175,7 +176,7 @@ def make_detector(
 ) -> Detector:
     """The detector of a study; differ: what other discretisations measure otherwise."""
     surrogate = make_surrogate(study, progress)
-    other = differ(surrogate)
+    other = (*differ(surrogate), *other_exponents(study, form))
     J = surrogate.J * surrogate.rate(np.zeros(len(study.probed.parameters)))
     J_of, y_of = ([values[own] for own in study.rows] for values in (J, surrogate.y0))
     with progress("responses of elementary causes", 2) as advance:

@@ -273,6 +273,11 @@ def _rivals(
 ) -> tuple[tuple[Hypothesis, float], ...]:
     """Other explanations nearly as likely, with their cosines."""
     near = max(detector.policy.rival, detector.policy.misfit * chosen.statistic)
-    likely = [h for h in ranked if h.statistic > max(chosen.statistic - near, 0.5 * detector.thresholds[h.family])]
+    worthy = partial(worth, policy=detector.policy)  # by which it was chosen
+    likely = [
+        h for h in ranked
+        if h.statistic > 0.5 * detector.thresholds[h.family]
+        and (h.statistic > chosen.statistic - near or worthy(h) > worthy(chosen) - near)
+    ]  # fmt: skip
     others = distinct([chosen, *sorted(likely, key=lambda h: -h.statistic)])[1:9]
     return with_cosines(detector, fitted, chosen, others)

@@ -9,13 +9,14 @@ import numpy as np
 
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import bounds
+from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.unknown import history
 from twin.diagnose.faults.fault import Described, Family
 from twin.diagnose.faults.table import family_of_parameter, fault_of
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause, Pull, Rival, Unknown, Verdict
 from twin.diagnose.result.spot import Spot
-from twin.diagnose.search.accepted import Accepted, freed, parameter_of
+from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -88,7 +89,7 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
     if wrong is not None:
         return _reading(wrong)
     if a.name != b.name and a.when.name == b.when.name:
-        return f"a temperature sensor between {a.name} and {b.name}, nearer to one of them"
+        return sensor_between(a.name, b.name)
     if a.name == b.name and fault_of(a).read and fault_of(b).read:
         return f"a longer run, measured twice as often: {a.when.name} and {b.when.name} differ there"
     signals = [h.when.signal for h in (a, b) if h.when.signal]
@@ -100,6 +101,10 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
         both = f"{a.family} and {b.family}"
         return f"a run in which the air is 5 K colder, and one that cools from standstill: {both} differ there"
     return f"temperature sensors at {a.name} and at {b.name}"
+
+
+def sensor_between(a: str, b: str) -> str:
+    return f"a temperature sensor between {a} and {b}, nearer to one of them"
 
 
 def _reading(h: Hypothesis) -> str:
@@ -165,8 +170,10 @@ def _more_alike(found: Search, left: float) -> bool:
 
 def strained_of(found: Search) -> tuple[Cause, ...]:
     """Declared parameters that calibration alone moved out of their tolerance, at their values without one. Of one that
-    has come near a bound of the calibration, the interval reaches as far as physics allows."""
+    has come near a bound of the calibration, the interval reaches as far as physics allows. What passes its threshold
+    beside them and could not be named is their rival."""
     result, detector = [], found.detector
+    unnamed = [h for h in found.steps[-1].ranked if h.statistic > detector.thresholds[h.family]]
     sure, ends = detector.policy.sure, detector.policy.nearly * np.array(bounds(detector.study))
     for own in found.loose:
         p = detector.study.probed.parameters[own.index]
@@ -175,12 +182,21 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
             far = _farthest(detector, own.index, own.x)
             low, high = (low, max(high, far)) if own.x > 0.0 else (min(low, far), high)
         place = ".".join(p.path.split(".")[:2])
+        rivals = [rival_of(h, cosine, _reading(h)) for h, cosine in own.rivals]
+        others = (h for h in unnamed if h.name != place)
+        rivals += [rival_of(h, _cosine(detector, own, h), sensor_between(place, h.name)) for h in others]
         result.append(Cause(
             family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
-            statistic=own.strain**2, threshold=1.0, history=CALIBRATED,
-            rivals=tuple(rival_of(h, cosine, _reading(h)) for h, cosine in own.rivals),
+            statistic=own.strain**2, threshold=1.0, history=CALIBRATED, rivals=tuple(rivals),
         ))  # fmt: skip
     return tuple(sorted(result, key=lambda c: -c.statistic))
+
+
+def _cosine(detector: Detector, own: Loose, h: Hypothesis) -> float:
+    """Of what a declared number out of its tolerance and a hypothesis do."""
+    a = np.sign(own.x) * detector.whiten(detector.fitter.linear(np.zeros(len(detector.study.scale)))[1][:, own.index])
+    b = readings_columns(detector, h) @ np.array(h.amplitude)
+    return float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-30)
 
 
 def _farthest(detector: Detector, j: int, x: float) -> float:
