@@ -38,7 +38,7 @@ def rich(shared: Shared, place: str) -> np.ndarray:
     """(N, m) states of the rich model, with heat at a place, or at none ("")."""
     drive = shared.drives[RUN]
     acting = Acting({place: history(drive.n_steps)}) if place else Acting()
-    return stepped(shared, drive, shared.starts[RUN], {}, acting, np.zeros(len(shared.rich.bodies)))
+    return stepped(shared, drive, shared.starts[RUN], {}, acting, np.zeros(shared.rich.n))
 
 
 def window(study: Study, place: int) -> np.ndarray:

@@ -49,7 +49,7 @@ def test_heat_at_all_places_at_once_does_what_it_does_at_each_alone():
     found = alone(shared)
     assert len(found) == len(known.places) > 3
 
-    still = np.zeros(len(known.rich.bodies))
+    still = np.zeros(known.rich.n)
     without = stepped(shared, drive, 20.0, {}, Acting(), still)
     for place, X in zip(known.places, found, strict=True):
         alone_there = stepped(shared, drive, 20.0, {}, Acting({place.name: heat_alone(drive)}), still) - without

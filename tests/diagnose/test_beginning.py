@@ -14,7 +14,9 @@ from twin.diagnose.evidence.nulls import Form, start_of
 from twin.diagnose.faults.elements import elements_of
 from twin.diagnose.model.bank import nominal_run, respond
 from twin.diagnose.model.beginning import Beginning, beginning_of
+from twin.diagnose.model.first_field import FirstField, _network, first_field
 from twin.diagnose.model.probed_model import make_probed_model
+from twin.diagnose.model.study import start_of as start_of_run
 from twin.logs.read import read_run
 from twin.logs.run import Run, Table
 from twin.logs.write import write_run
@@ -34,7 +36,7 @@ def probed(tmp_path_factory):
 def begins(probed, temperatures: Table | None, **more: object) -> Beginning:
     model, day = probed
     run = replace(day, temperatures=temperatures, initial_temperature=None, **more)
-    return beginning_of(model.base.load_model, model.base.sensors, run, model.runs[0].drive)
+    return beginning_of(model.base, run, model.runs[0].drive)
 
 
 def table(**first: float) -> Table:
@@ -46,8 +48,8 @@ def table(**first: float) -> Table:
 def test_a_run_begins_as_it_says_else_as_its_sensors_read_first_else_as_its_air(probed):
     model, day = probed
     assert model.runs[0].begins == Beginning(20.0, stated=True)
-    found = begins(probed, table(motor=26.0, head=23.0, column=22.0, air=19.0))
-    assert found == Beginning(23.0, apart=pytest.approx((10.0 / 3.0) ** 0.5))
+    found = begins(probed, table(motor=24.0, head=23.0, column=22.0, air=19.0))
+    assert found == Beginning(23.0, apart=pytest.approx((2.0 / 3.0) ** 0.5))
     air = day.loads.columns["air"][0]
     assert begins(probed, None) == begins(probed, table(foreign=40.0)) == Beginning(pytest.approx(air, abs=0.1))
     rested = begins(probed, table(motor=26.0), steady_start=True)
@@ -57,9 +59,45 @@ def test_a_run_begins_as_it_says_else_as_its_sensors_read_first_else_as_its_air(
 
 def test_what_is_not_known_of_a_beginning_is_left_open():
     form = Form(start=0.1, start_apart=0.03)
-    assert start_of(Beginning(20.0, stated=True), form) == (0.03, 0.03)
-    assert start_of(Beginning(20.0), form) == (0.1, 0.03)
-    assert start_of(Beginning(23.0, apart=1.5), form) == (1.5, 1.5)
+    for begins, whole, part in (
+        (Beginning(20.0, stated=True), 0.03, 0.03),
+        (Beginning(20.0), 0.1, 0.03),
+        (Beginning(23.0, apart=0.5), 0.5, 0.5),
+        (Beginning(23.0, apart=7.0, field=FirstField(("motor", "head"), (9.0, 0.0), (1.5, 7.0))), 0.1, 1.5),
+    ):
+        assert start_of(begins, form) == whole
+        assert start_of(begins, form, "motor") == part
+
+
+def test_parts_of_a_warm_machine_begin_where_their_sensors_read_and_others_between(probed):
+    """Nodes of motor, head and column read by sensors; what has none is beside them or near the air."""
+    model, _ = probed
+    found = begins(probed, table(motor=46.0, head=33.0, column=22.0))
+    field = found.field
+    assert found.temperature == 33.0
+    told = {m: found.temperature + o for m, o in zip(field.members, field.offset, strict=True)}
+    assert told == pytest.approx(told | {"motor": 46.0, "head": 33.0, "column": 22.0}, abs=0.01)
+    others = [m for m in field.members if m not in ("motor", "head", "column")]
+    assert all(15.0 < told[m] < 46.0 for m in others)
+    assert all(found.spread(m) == found.apart for m in others)
+    assert max(found.spread(m) for m in ("motor", "head", "column")) < found.apart
+    z = start_of_run(model.base, replace(model.runs[0], begins=found))
+    (body,) = model.base.bodies
+    read = dict(zip(model.base.sensors, model.base.reference_temperature + body.C @ z, strict=True))
+    assert read["motor"] == pytest.approx(46.0, abs=0.01)
+
+
+def test_a_part_without_a_sensor_is_where_heat_balances(probed):
+    """All but the head of a machine at rest are read, of which a heater keeps the motor warm: it is as they say."""
+    model, drive = probed[0].base, probed[0].runs[0].drive
+    K, b, C = _network(model, drive, 20.0)
+    members = [m for body in model.bodies for m in body.members]
+    true = np.linalg.solve(K, b + 300.0 * np.eye(len(K))[members.index("motor")])
+    rest = {name: 20.0 + float(row @ true) for name, row in zip(model.sensors, C, strict=True) if name != "head"}
+    found = first_field(model, drive, rest, 20.0)
+    assert found.members == tuple(members)
+    np.testing.assert_allclose(found.offset, true, atol=0.01)
+    assert np.ptp(true) > 5.0
 
 
 def test_another_temperature_at_the_start_is_in_the_first_row():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.evidence.nulls import convection, shared_by_film
+from twin.diagnose.evidence.nulls import shared_by_film
+from twin.diagnose.model.probed_loads import convection
 
 
 @pytest.mark.parametrize("seed", range(5))

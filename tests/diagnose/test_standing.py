@@ -48,7 +48,7 @@ def found_beside(*others: Accepted) -> tuple[Search, np.ndarray, list[Measured]]
     return replace(found, accepted=(*found.accepted, *others)), y, opened
 
 
-def test_causes_that_are_alike_are_told_apart():
+def test_two_causes_that_are_alike_are_two():
     """One of two in the same windows is dropped."""
     one, other = always("slide", 50.0, 40.0), always("slide", 50.0, 40.0)
     assert one not in [other]

@@ -41,6 +41,7 @@ class Shared:
     drives: tuple[Drive, ...]  # per run, of the description
     starts: tuple[float, ...]  # degC
     every: int = EVERY
+    fields: tuple[np.ndarray, ...] = ()  # (N,) K beside where each run starts; none: uniform
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,9 @@ def trajectory(shared: Shared, draw: Draw) -> np.ndarray:
     drive = shared.drives[draw.run]
     acting = drawn(shared.places, drive, drive.environment.mean(axis=1), draw.seed)
     warmer = np.random.default_rng([draw.seed, 3, draw.run]).standard_normal(len(shared.rich.bodies))
-    return stepped(shared, drive, shared.starts[draw.run], values, acting, warmer * (draw.seed > 0))
+    beside = np.concatenate([(draw.seed > 0) * by * b.one for by, b in zip(warmer, shared.rich.bodies, strict=True)])
+    beside = beside + shared.fields[draw.run] if shared.fields else beside
+    return stepped(shared, drive, shared.starts[draw.run], values, acting, beside)
 
 
 def alone(shared: Shared) -> list[np.ndarray]:
@@ -116,9 +119,9 @@ def heat_alone(drive: Drive) -> np.ndarray:
 
 
 def stepped(
-    shared: Shared, drive: Drive, start: float, values: Mapping[str, float], acting: Acting, warmer: np.ndarray
+    shared: Shared, drive: Drive, start: float, values: Mapping[str, float], acting: Acting, beside: np.ndarray
 ) -> np.ndarray:
-    """States (N, m) from a uniform temperature, of every body so many K more.
+    """States (N, m) from a temperature and a field beside it (N,) [K].
 
     By implicit Euler: directions of a basis need not the accuracy of the runtime's step, at a sixth of its solves.
     """
@@ -127,7 +130,8 @@ def stepped(
     base = with_values(shared.base, shared.parameters, values)
     own = rescaled(drive, shared.base.load_model, base.load_model)
     stepper = CoupledStepper(there, TRAINING_KEEP, TRAINING_FOLLOW, IMPLICIT_EULER)
-    first = [x + by * b.one for x, b, by in zip(stepper.uniform(start), there.bodies, warmer, strict=True)]
+    parts = np.split(beside, np.cumsum([b.n for b in there.bodies])[:-1])
+    first = [x + own for x, own in zip(stepper.uniform(start), parts, strict=True)]
     states = [np.concatenate(first)]
     for k, x, _ in stepper.run(with_acting(own, there.load_model, acting), first):
         if k % shared.every == shared.every - 1:

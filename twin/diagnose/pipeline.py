@@ -128,9 +128,10 @@ def prepare(
     instruments = instruments_of(study, settings.temperature_sigma, settings.tcp_sigma)
     parts = []
     for planned in study.runs:
-        m, drive, signals = planned.measured, planned.run.drive, planned.run.signals
+        m, drive, signals, begins = planned.measured, planned.run.drive, planned.run.signals, planned.run.begins
         parts += [m.mean_of, m.column, np.nan_to_num(m.count), m.tcp_step, m.tcp_share, m.pose, planned.z0,
-                  np.array(planned.run.begins.apart), np.array(planned.run.unlogged, dtype=int),
+                  np.array([begins.apart, *(begins.field.spread if begins.field else ())]),
+                  np.array(planned.run.unlogged, dtype=int),
                   np.zeros(0) if m.tcp_sigma is None else m.tcp_sigma, *drive_arrays(drive),
                   *(signals[name] for name in sorted(signals))]  # fmt: skip
     # the window's coordinates: made anew on other cores they may be others, and z0 is zero at the reference temperature
@@ -278,7 +279,13 @@ def diagnose(
 def _left_open(run: ProbedRun) -> Iterator[str]:
     """What a run does not say of itself."""
     begins, dt = run.begins, run.step
-    if not begins.stated and begins.apart > 0.0:
+    if begins.field is not None:
+        yield (
+            f"it does not state its initial temperature: parts begin where their sensors read first, in the median at "
+            f"{begins.temperature:.1f} degC, others where their neighbours and the air would have them, within "
+            f"{begins.apart:.2g} K (standard deviation)"
+        )
+    elif not begins.stated and begins.apart > 0.0:
         yield (
             f"it does not state its initial temperature, and begins at the median of what its sensors read first, "
             f"{begins.temperature:.1f} degC, every part within {begins.apart:.2g} K (standard deviation)"

@@ -20,9 +20,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import xlogy
 
-from twin.diagnose.evidence.nulls import Form, convection
+from twin.diagnose.evidence.nulls import Form
 from twin.diagnose.evidence.speeds import relative_speed
 from twin.diagnose.model.integration import LITTLE
+from twin.diagnose.model.probed_loads import convection
 from twin.diagnose.model.study import Study, make_study
 from twin.rom.parameter import Kind, Parameter
 

@@ -16,10 +16,10 @@ from scipy.signal import lfilter
 from twin.build.places import beside
 from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.model.beginning import Beginning
+from twin.diagnose.model.probed_loads import convection
 from twin.diagnose.model.study import Study, heated_places, own_place
 from twin.diagnose.result.spot import Spot
 from twin.machine.description import Machine
-from twin.rom.drive import Drive
 from twin.rom.parameter import OF_LAWS
 
 # of parameters, in prior standard deviations: all that lies within the stated tolerance is alike likely, and nothing
@@ -132,9 +132,9 @@ def null(
                 lost = swing(study, k, j) * rng.standard_normal()
                 forcing[first:end] += lost * body.B[:, body.sources.index(j)]
         fluctuation = _ornstein(rng, n, len(load.environments), form.air_time / 60.0) * form.air
-        whole, part = start_of(run.begins, form)
+        whole = start_of(run.begins, form)
         initial = np.zeros(body.n) if run.begins.stated else whole * rng.standard_normal() * body.one
-        initial = initial + part * _body_starts(study, rng)
+        initial = initial + _body_starts(study, run.begins, form, rng)
         slots.A[0], slots.M[0], slots.E[0], slots.gate[:, 0], slots.rise[:, 0] = A, M, E, 1.0, rise
         slots.film[:, 0], slots.joint[:, 0], slots.contact[:, 0], slots.initial[0] = wobble, joint, contact, initial
         slots.forcing[:, 0], slots.environment[:, 0] = forcing, fluctuation
@@ -192,14 +192,6 @@ def shared_by_film(study: Study, local: np.ndarray) -> tuple[np.ndarray, np.ndar
     return mean, apart
 
 
-def convection(drive: Drive, films: int) -> np.ndarray:
-    """(n_steps, films) W/(m^2 K) of a drive, at a rise of a few kelvin where it follows the surface."""
-    result = np.array(drive.theta[:, :films])
-    middle = drive.films.value.shape[2] // 2 + 15
-    result[:, list(drive.films.index)] = drive.films.value[:, :, middle]
-    return result
-
-
 def power_of(study: Study, k: int, source: int) -> np.ndarray:
     """(n,) W of a source in a run, at a winding of 30 degC where its law follows one."""
     drive = study.runs[k].run.drive
@@ -236,11 +228,13 @@ def lump_of(study: Study, place: int, form: Form) -> float:
     return float(min(form.lump, 0.5 / (b @ np.linalg.solve(body.E, b))))
 
 
-def start_of(begins: Beginning, form: Form) -> tuple[float, float]:
-    """K by which a machine, and each of its parts beside that, may begin otherwise: standard deviations. Where a run
+def start_of(begins: Beginning, form: Form, member: str = "") -> float:
+    """K by which a machine, or one of its members beside that, may begin otherwise: a standard deviation. Where a run
     does not say where it begins, as much at least as its sensors differ in what they read first."""
-    part = max(form.start_apart, begins.apart)
-    return part if begins.stated else max(form.start, part), part
+    if member:
+        return max(form.start_apart, begins.spread(member))
+    whole = max(form.start_apart, begins.apart if begins.field is None else 0.0)
+    return whole if begins.stated else max(form.start, whole)
 
 
 def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> np.ndarray | None:
@@ -261,12 +255,12 @@ def _beside(study: Study, source: int, rng: np.random.Generator, form: Form) -> 
     return np.asarray(share * (probed.B[near[chosen]] - B))
 
 
-def _body_starts(study: Study, rng: np.random.Generator) -> np.ndarray:
-    """(r,) the members by a random kelvin each."""
+def _body_starts(study: Study, begins: Beginning, form: Form, rng: np.random.Generator) -> np.ndarray:
+    """(r,) the members by random kelvins each."""
     (body,) = study.probed.base.bodies
     if body.E_members is None:
         return np.zeros(body.n)
-    weights = rng.standard_normal(len(body.members))
+    weights = rng.standard_normal(len(body.members)) * [start_of(begins, form, m) for m in body.members]
     return np.asarray(np.tensordot(weights, body.E_members @ body.one, 1))
 
 

@@ -28,10 +28,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.build.places import beside
-from twin.diagnose.evidence.nulls import convection, emitted, sources_of_surfaces
+from twin.diagnose.evidence.nulls import emitted, sources_of_surfaces
 from twin.diagnose.evidence.speeds import SPEEDS
 from twin.diagnose.model.bank import Column, Nominal
-from twin.diagnose.model.probed_loads import gammas
+from twin.diagnose.model.probed_loads import convection, gammas
 from twin.diagnose.model.study import Study, own_place
 from twin.rom.drive import Drive, evaluate
 from twin.rom.following import read_table, temperature_place

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from twin.diagnose.evidence.formal import Described
-from twin.diagnose.evidence.nulls import Form, convection, lump_of, start_of, swing
+from twin.diagnose.evidence.nulls import Form, lump_of, start_of, swing
 from twin.diagnose.faults.elements import Elements, Key
 from twin.diagnose.faults.signal import CLOCK
+from twin.diagnose.model.probed_loads import convection
 from twin.diagnose.model.study import Study, heated_places
 
 # Kinds that `described_forms` makes nuisances of: with every history, or the one named
@@ -43,8 +44,8 @@ def described_forms(study: Study, elements: Elements, raw: np.ndarray, form: For
             add((kind, source, history), form.beside)
         elif kind == "start":
             run = next(p.run for p in study.runs if source.startswith(f"{p.run.name}."))
-            whole, part = start_of(run.begins, form)
-            add((kind, source, history), whole if source == f"{run.name}.machine" else part)
+            member = source.removeprefix(f"{run.name}.")
+            add((kind, source, history), start_of(run.begins, form, "" if member == "machine" else member))
         elif kind == "unlogged":
             i, _, j = map(int, source.split("."))
             add((kind, source, history), swing(study, study.fitted[i], j))

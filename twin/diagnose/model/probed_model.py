@@ -122,16 +122,18 @@ def make_probed_model(
     load = base.load_model
     names = run_names(runs)
     drives = [drive_of(base, run, step) for run in runs]
-    begins = [beginning_of(load, base.sensors, run, drive) for run, drive in zip(runs, drives, strict=True)]
+    begins = [beginning_of(base, run, drive) for run, drive in zip(runs, drives, strict=True)]
     starts = tuple(own.temperature for own in begins)
+    fields = tuple(own.of(base) for own in begins)
     known = tuple((p.path, p.nominal, p.sigma, p.low, p.high) for p in parameters)
 
     def make() -> tuple[np.ndarray, tuple[float, float]]:
         coarse = tuple(drive_of(base, run, TRAINING_STEP) for run in runs)
-        shared = Shared(rich.rich, base, tuple(parameters), rich.places, coarse, starts)
+        shared = Shared(rich.rich, base, tuple(parameters), rich.places, coarse, starts, fields=fields)
         if nominal_of:
             drives, begin = tuple(coarse[k] for k in nominal_of), tuple(starts[k] for k in nominal_of)
-            train = held = nominal(replace(shared, drives=drives, starts=begin))
+            apart = tuple(fields[k] for k in nominal_of)
+            train = held = nominal(replace(shared, drives=drives, starts=begin, fields=apart))
         else:
             described, drawn, heated = snapshots(shared, progress=progress)
             held = drawn[-len(runs) :]
@@ -149,7 +151,7 @@ def make_probed_model(
         V, reduction = np.eye(rich.rich.n), (0.0, 0.0)
     else:
         logged = (*_logged(load, runs), rich.rich.poses)
-        inputs = (machine_hash(machine), mesh.name, tuple(nominal_of), known, starts, arrays_hash(logged))
+        inputs = (machine_hash(machine), mesh.name, tuple(nominal_of), known, starts, arrays_hash((*logged, *fields)))
         V, reduction = cached("window", __name__, inputs, make)
     return _assembled(rich, V, parameters, runs, names, drives, begins, reduction)
 

@@ -189,7 +189,8 @@ def start_of(model: MachineModel, run: ProbedRun) -> np.ndarray:
     """State (N,) in which a run of a model begins, in the model's own coordinates."""
     if run.begins.rested:
         return at_rest(model, run.drive, run.begins.temperature)
-    return np.concatenate([(run.begins.temperature - model.reference_temperature) * b.one for b in model.bodies])
+    middle = [(run.begins.temperature - model.reference_temperature) * b.one for b in model.bodies]
+    return np.concatenate(middle) + run.begins.of(model)
 
 
 def with_measured(study: Study, measured: Sequence[Measured]) -> Study:
