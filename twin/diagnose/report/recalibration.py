@@ -4,7 +4,7 @@ of nothing, because a tolerance swallows what lies within it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -25,16 +25,21 @@ def moved_words(d: Diagnosis) -> str:
         T, w = (np.nan_to_num(rms(change)).tolist() for change in changes)
         of_sensors += [(v, f"sensors.{name}", s.run) for v, name in zip(T, s.sensors, strict=True)]
         of_tcp += [(v, name, s.run) for v, name in zip(w, COMPONENTS, strict=True)]
-    said = []
-    for moved, least, factor, unit in ((of_sensors, KELVIN, 1.0, "K"), (of_tcp, METRES, 1e6, "um")):
+    said = list[tuple[str, list[Pull]]]()
+    for moved, least, factor, unit, of in (
+        (of_sensors, KELVIN, 1.0, "K", _temperature), (of_tcp, METRES, 1e6, "um", _displacement)
+    ):  # fmt: skip
         size, channel, run = max(moved, key=lambda m: m[0])
         if size > least:
-            said.append(f"{channel} by {number(factor * size)} {unit} in {run}")
+            said.append((f"{channel} by {number(factor * size)} {unit} (rms) in {run}", _large(d.pulls, of, least)))
     if not said:
         return ""
-    most = large(d.pulls) or [p for p in sorted(d.pulls, key=_weight)[-1:] if _weight(p) > 0.0]
-    by = f", most of it by {' and by '.join(map(_value, most))}" if most else ""
-    return f"first of all, the description as delivered is not right: calibration moved {' and '.join(said)} (rms){by}"
+    alike = all(most == said[0][1] for _, most in said)
+    told = [(" and ".join(words for words, _ in said), said[0][1])] if alike else said
+    clauses = [
+        words + (f", most of it by {' and by '.join(map(_value, most))}" if most else "") for words, most in told
+    ]
+    return f"first of all, the description as delivered is not right: calibration moved {'; and '.join(clauses)}"
 
 
 def left_words(d: Diagnosis) -> str:
@@ -58,13 +63,18 @@ def left_words(d: Diagnosis) -> str:
     )
 
 
-def large(pulls: Sequence[Pull]) -> list[Pull]:
-    """Those that move a channel by KELVIN or METRES (rms), LARGE at most, the largest first."""
-    return sorted((p for p in pulls if _weight(p) >= 1.0), key=_weight, reverse=True)[:LARGE]
+def _large(pulls: Sequence[Pull], of: Callable[[Pull], float], least: float) -> list[Pull]:
+    """Those that move a channel by so much (rms), LARGE at most, the largest first; the largest where none does."""
+    ordered = sorted((p for p in pulls if of(p) > 0.0), key=of, reverse=True)
+    return [p for p in ordered if of(p) >= least][:LARGE] or ordered[:1]
 
 
-def _weight(pull: Pull) -> float:
-    return max(pull.temperature_change / KELVIN, pull.displacement_change / METRES)
+def _temperature(pull: Pull) -> float:
+    return pull.temperature_change
+
+
+def _displacement(pull: Pull) -> float:
+    return pull.displacement_change
 
 
 def _value(pull: Pull) -> str:
