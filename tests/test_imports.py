@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -41,3 +42,19 @@ def test_imports_stay_on_their_side(folder):
 def test_an_import_within_a_function_is_found():
     text = "def f():\n    from benchmarks.pymor import clock\n\nimport tests.hidden as h\nimport testscripts\n"
     assert offences(text, ("benchmarks", "tests")) == ["line 4: tests.hidden", "line 2: benchmarks.pymor"]
+
+
+@pytest.mark.parametrize("folder", ["benchmarks", "models"])
+def test_what_no_test_runs_finds_its_names_in_the_package(folder):
+    """A benchmark of hours would end at its first line."""
+    missing = []
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "twin":
+                module = importlib.import_module(str(node.module))
+                names = (alias.name for alias in node.names)
+                missing += [
+                    f"{path.name}:{node.lineno} {n}" for n in names
+                    if not hasattr(module, n) and importlib.util.find_spec(f"{node.module}.{n}") is None
+                ]  # fmt: skip
+    assert not missing

@@ -63,6 +63,12 @@ def left_words(d: Diagnosis) -> str:
     )
 
 
+def large(pulls: Sequence[Pull]) -> list[Pull]:
+    """Those that a headline names: what moves temperatures or the TCP far."""
+    named = [*_large(pulls, _temperature, KELVIN), *_large(pulls, _displacement, METRES)]
+    return [p for p in dict.fromkeys(named) if _temperature(p) >= KELVIN or _displacement(p) >= METRES]
+
+
 def _large(pulls: Sequence[Pull], of: Callable[[Pull], float], least: float) -> list[Pull]:
     """Those that move a channel by so much (rms), LARGE at most, the largest first; the largest where none does."""
     ordered = sorted((p for p in pulls if of(p) > 0.0), key=of, reverse=True)
