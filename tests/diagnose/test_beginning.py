@@ -100,6 +100,14 @@ def test_a_part_without_a_sensor_is_where_heat_balances(probed):
     assert np.ptp(true) > 5.0
 
 
+def test_a_sensor_says_where_its_own_part_begins_and_no_other(probed):
+    """In a basis of few states its row has some of other parts, which would make up for it without bound."""
+    model, drive = probed[0].base, probed[0].runs[0].drive
+    read = {"motor": 46.0, "head": 33.0, "column": 22.0}
+    bodies = tuple(replace(body, C=body.C + 0.02 * np.abs(body.C).max()) for body in model.bodies)
+    assert first_field(replace(model, bodies=bodies), drive, read, 33.0) == first_field(model, drive, read, 33.0)
+
+
 def test_another_temperature_at_the_start_is_in_the_first_row():
     """Of rows that count from the first one, the others had a step: it was heat of the first step."""
     study = small_case.study()

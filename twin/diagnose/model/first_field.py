@@ -1,13 +1,14 @@
 """Where the parts of a machine begin that ran before a log does: from what its sensors read first.
 
-A part with sensors is as warm as they read. One without is where as much heat would flow to it as leaves it, between
+A part with sensors is as warm as their median. One without is where as much heat would flow to it as leaves it, between
 the parts that are known and the air,
 
     (K + w G^T G) o = b + w G^T d
 
-with the heat flows K between members and b to the air, what sensors read of the members G, their first readings d, and
-w so large that these are met. How far it may be from there is known from the parts with sensors: each is told by all
-others (leave one out; Stone, J. R. Stat. Soc. B 36, 1974). A sensor that reads otherwise than they say may be off.
+with the heat flows K between members and b to the air, the parts with sensors G, their medians d, and w so large that
+these are met. How far a part may be from there is known from the parts with sensors: each is told by all others (leave
+one out; Stone, J. R. Stat. Soc. B 36, 1974). A sensor that reads otherwise than they say may be off, and where those of
+one part differ it may be as far from their median.
 """
 
 from __future__ import annotations
@@ -50,21 +51,25 @@ def first_field(model: MachineModel, drive: Drive, read: Mapping[str, float], te
     """Of a model whose sensors read so first [degC], beside a temperature [degC]."""
     members = tuple(m for body in model.bodies for m in body.members)
     K, b, C = _network(model, drive, temperature)
-    sensors = [model.sensors.index(name) for name in read]
-    G, d = C[sensors], np.array([read[name] - temperature for name in read])
-    at = np.argmax(np.abs(G), axis=1)  # the member that a sensor is on
-    w = MET * float(np.diag(K).max()) / max(float((G**2).sum(axis=0).max()), 1e-30)
+    every = np.array([read[name] - temperature for name in read])
+    # the member that a sensor is on, and no share of others: in a basis of few states it has some of each, and parts
+    # without a sensor would make up for what its own part differs by from place to place
+    at = np.argmax(np.abs(C[[model.sensors.index(name) for name in read]]), axis=1)
+    own = np.unique(at)
+    d = np.array([np.median(every[at == m]) for m in own])
+    within = np.array([np.sqrt(np.mean((every[at == m] - middle) ** 2)) for m, middle in zip(own, d, strict=True)])
+    G, w = np.eye(len(members))[own], MET * float(np.diag(K).max())
 
     def told(of: np.ndarray) -> np.ndarray:
-        """(members,) from these readings (sensors,) bool."""
+        """(members,) from those of `own` that `of` (own,) says."""
         A = K + w * G[of].T @ G[of] + 1e-12 * np.diag(K).max() * np.eye(len(K))
         return np.asarray(np.linalg.solve(A, b + w * G[of].T @ d[of]))
 
-    offset, own = told(np.ones(len(d), dtype=bool)), np.unique(at)
-    missed = np.array([d[at == m].mean() - G[at == m].mean(axis=0) @ told(at != m) for m in own])
+    offset = told(own >= 0)
+    missed = np.array([d[i] - told(own != m)[m] for i, m in enumerate(own)])
     unsure = float(np.sqrt(np.mean(missed**2)))
     spread = np.full(len(members), unsure)
-    spread[own] = np.maximum(INSIDE * unsure, np.minimum(np.abs(missed), OFF))
+    spread[own] = np.maximum(np.maximum(INSIDE * unsure, within), np.minimum(np.abs(missed), OFF))
     return FirstField(members, tuple(offset.tolist()), tuple(spread.tolist()))
 
 
