@@ -53,7 +53,7 @@ def test_a_declared_number_is_seen_from_its_limit_on(place):
 
 
 def test_losses_are_seen_by_calibration_where_their_statistics_say_at_no_size():
-    """The figures of docs/diagnosis.md: as factors, of which a source may have 5."""
+    """As factors, of which a source may have 5."""
     detector = small_case.made_detector()
     alone, seen = [], []
     for name in ("nut", "motor", "front", "rear"):

@@ -1,11 +1,11 @@
 """What another exponent of its speed would make of the heat of every source that rubs.
 
-    P = P_described v^l,      l ~ N(0, loss_exponent^2)
+    P = P_described (v / v_mean)^l,      l ~ N(0, loss_exponent^2)
 
 Friction warms as a power of the speed. Of a bearing's torque the part that its load makes does not depend on the speed,
 and the part that its lubricant makes goes with it to the power 2/3 (Palmgren; Harris, Kotzalas, Rolling bearing
 analysis, 5th ed. 2007, chapter 10): the exponent of its heat is between 1 and 5/3, and one that is stated belongs to
-the speeds that it was measured at.
+the speeds that it was measured at. v_mean: `speeds.log_speed`.
 
 It is known to first order, at the description. Rejected, on the tests' machine: a parameter that is fitted as those of
 films, which strong causes bend to its bounds; and synthetic measurements by the exact model, of which much is left that

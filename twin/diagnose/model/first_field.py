@@ -41,7 +41,7 @@ class FirstField:
     spread: tuple[float, ...]  # standard deviations of what is not known
 
 
-def fields_of(model: MachineModel) -> np.ndarray:
+def _fields(model: MachineModel) -> np.ndarray:
     """(N, members) states in which one member is 1 K warm."""
     blocks = [np.stack([member_field(b, i) for i in range(len(b.members))], axis=1) for b in model.bodies]
     return np.asarray(scipy.linalg.block_diag(*blocks))
@@ -76,7 +76,7 @@ def first_field(model: MachineModel, drive: Drive, read: Mapping[str, float], te
 def _network(model: MachineModel, drive: Drive, temperature: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Heat flows [W/K] between members K (M, M) and b (M,) [W] from the air, in the first step of a drive; sensors by
     members C (s, M)."""
-    small, load = merged(model, fields_of(model)), model.load_model
+    small, load = merged(model, _fields(model)), model.load_model
     (body,) = small.bodies
     n = len(load.films)
     h = convection(drive, n)[0] + RADIATION * np.array([film.emissivity for film in load.films])
