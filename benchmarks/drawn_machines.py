@@ -45,7 +45,9 @@ NODES = Path(__file__).parents[1] / "models" / "ball_screw_axis" / "nodes.toml"
 SCREW = {"screw_speed": "x"}  # its drive, which the name does not tell
 TRUTHS = 2  # real machines with nothing hidden, per description
 # family -> size; places are drawn among those that the machine has
-IN_MACHINE = {"heat_source": "", "loss_law": "1.6", "joint": "0.3", "film_gain": "2", "expansion": "1.3"}
+IN_MACHINE = {
+    "heat_source": "", "loss_law": "1.6", "joint": "0.3", "film_gain": "2", "expansion": "1.3", "capacity": "1.6",
+}  # fmt: skip
 IN_LOG = {"offset": "1 K", "drift": "2 K", "swapped": "", "factor": "1.4142135623730951"}
 SHARE = 0.25  # of the mean power of all sources: hidden heat
 
@@ -57,6 +59,7 @@ def trials(drawn: DrawnMachine, machine: Machine, power: float) -> list[tuple[st
     """
     rng = np.random.default_rng([drawn.seed, 77])
     sizes = IN_MACHINE | IN_LOG | {"heat_source": f"{max(SHARE * power, 5.0):.3g} W"}
+    sizes |= {"expansion": "1.6"} if machine.lumped else {}  # whose tolerance is 30 %
     found = []
     for family, known in places(machine).items():
         if known:
@@ -77,7 +80,8 @@ def places(machine: Machine) -> dict[str, list[str]]:
         "loss_law": [f"sources.{s}" for s in machine.sources],
         "joint": [f"contacts.{c}" for c in machine.contacts],
         "film_gain": [f"films.{f}" for f in machine.films],
-        "expansion": [f"parts.{p}" for p in machine.parts],
+        "expansion": [f"parts.{p}" for p in machine.parts] or [f"tcp.expansion.{n}" for n in machine.tcp.expansion],
+        "capacity": [n for n, node in machine.nodes.items() if machine.lumped and node.capacity is not None],
         "offset": sensors,
         "drift": sensors,
         "swapped": sensors if len(sensors) > 2 else [],

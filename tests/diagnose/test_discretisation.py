@@ -19,7 +19,6 @@ from twin.diagnose.evidence.discretisation import (
     with_inside,
     with_segments,
 )
-from twin.diagnose.evidence.pulls import Pulls
 from twin.diagnose.model.probed_model import make_probed_model
 from twin.diagnose.model.rich_probed_model import Mesh
 from twin.diagnose.model.study import make_study
@@ -141,38 +140,6 @@ def test_an_inside_takes_half_of_a_node_and_nothing_is_lost():
         assert np.sum(both, axis=0) == pytest.approx(machine.tcp.expansion.get(name, (0.0, 0.0, 0.0)))
     light = {n: v.model_copy(update={"capacity": 50.0}) for n, v in machine.nodes.items()}
     assert not heavy(machine.model_copy(update={"nodes": light}))
-
-
-def test_a_parameter_is_out_of_its_tolerance_where_few_synthetic_measurements_move_one_so_far():
-    known = parameters(small_case.machine())
-    rng = np.random.default_rng(1)
-    spread = rng.uniform(0.3, 2.0, len(known))
-    fitted, settled = (spread * rng.standard_normal((2000, len(known))) for _ in range(2))
-    pulls = Pulls.of(known, fitted, settled)
-    passing = np.mean([(pulls.fitted.strain(x) >= 1.0).any() for x in spread * rng.standard_normal((2000, len(known)))])
-    assert 0.01 < passing < 0.06
-    named = next(i for i, p in enumerate(known) if p.kind == "source")
-    other = next(i for i, p in enumerate(known) if p.kind == "capacity")
-    far = np.zeros(len(known))
-    far[[named, other]] = 20.0
-    strain = pulls.strain(far, far)
-    assert strain[named] > 1.0
-    assert strain[other] == 0.0  # a capacity is no cause
-    assert pulls.strain(far, 0.0 * far)[named] > 1.0  # by either calibration
-    assert pulls.strain(0.0 * far, far)[named] > 1.0
-
-
-def test_the_limit_of_losses_does_not_follow_the_discrepancy_of_films():
-    """Losses of a healthy machine lie within their tolerance; films pass theirs in one of ten measurements."""
-    known = parameters(small_case.machine())
-    kinds = np.array([p.kind for p in known])
-    rng = np.random.default_rng(2)
-    x = rng.uniform(-1.0, 1.0, (400, len(known)))
-    far = kinds == "film"
-    x[:, far] *= np.where(rng.random((400, far.sum())) < 0.1, 3.0, 1.0)
-    spread = Pulls.of(known, x, x).fitted
-    assert spread.limit[kinds == "source"].max() < 1.4
-    assert spread.limit[far].min() > 2.0
 
 
 def simulated(machine: Machine, seed: int, folder: Path) -> Run:

@@ -239,6 +239,23 @@ def test_expansions_change_one_material_part_or_scale():
     assert (scale.axis, scale.surface) == ("x", "bed.y_min")
 
 
+def test_numbers_of_a_node_are_multiplied_in_place():
+    before = load_machine(FILES["spindle"], TEXTS["spindle"])
+    machine = extended("spindle", effect("expansion", "tcp.expansion.shaft", 1.5), effect("capacity", "bed", 1.6))
+    assert machine.tcp.expansion["shaft"] == pytest.approx([1.5 * v for v in before.tcp.expansion["shaft"]])
+    assert machine.nodes["bed"].capacity == pytest.approx(1.6 * before.nodes["bed"].capacity)
+    assert machine.tanks == before.tanks
+    heavier = extended("spindle", effect("capacity", "bed", 5e3, "J/K"))
+    assert heavier.tanks["found_1"].capacity == 5e3
+    assert heavier.nodes == before.nodes
+    for wrong, told in (
+        (effect("expansion", "tcp.expansion.shaf", 1.5), "did you mean 'shaft'"),
+        (effect("capacity", "bde", 1.6), "did you mean 'bed'"),
+    ):
+        with pytest.raises(DescriptionError, match=told):
+            extended("spindle", wrong)
+
+
 def test_a_tank_and_a_source_elsewhere():
     tank = extended("slide", effect("capacity", "bed.z_max", 5e3, "J/K", settings={"conductance": 10.0})).tanks[
         "found_1"

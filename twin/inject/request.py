@@ -20,7 +20,7 @@ PROFILE = 12  # windows that draw the half sine of the sun
 UNITS: dict[str, tuple[str, ...]] = {  # of the size, by family; the first that fits
     "film_gain": ("1", "W/(m^2*K)"), "forced_convection": ("W/(m^2*K)",), "heat_source": ("W",),
     "loss_law": ("1", "W"), "joint": ("1",), "zone": ("K", "K/m"), "sun": ("W",), "coolant": ("W/(m^2*K)",),
-    "scale_expansion": ("1/K",), "expansion": ("1",), "capacity": ("J/K",), "misplaced_source": (),
+    "scale_expansion": ("1/K",), "expansion": ("1",), "capacity": ("J/K", "1"), "misplaced_source": (),
 }  # fmt: skip
 SETTINGS: dict[str, dict[str, str | None]] = {  # by family: name and unit; "": that of the signal, None: a name
     "heat_source": {"reference": ""}, "loss_law": {"reference": "", "gain": "1"}, "zone": {"height": "m"},

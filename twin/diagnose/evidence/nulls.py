@@ -86,11 +86,9 @@ def null(
 
     J: nominal Jacobians by run.
     """
-    rng = np.random.default_rng([seed, 17])
+    rng = _generator(seed)
     probed = study.probed
-    of_laws = np.array([p.kind in OF_LAWS for p in probed.parameters], dtype=bool)
-    within = rng.uniform(-1.0, 1.0, len(of_laws))
-    x = np.where(of_laws, np.clip(rng.standard_normal(len(of_laws)), -2.5, 2.5), within)
+    x = _parameters(study, rng)
     (body,) = probed.base.bodies
     load = probed.base.load_model
     local = np.clip(form.local_film * rng.standard_normal(len(probed.places)), -0.8, 0.8)
@@ -154,6 +152,21 @@ def null(
     for difference in differences:
         y = y + difference.drawn(rng, x)
     return y
+
+
+def drawn(study: Study, seed: int) -> np.ndarray:
+    """(n,) the parameters of the measurements of a seed, in prior standard deviations."""
+    return _parameters(study, _generator(seed))
+
+
+def _generator(seed: int) -> np.random.Generator:
+    return np.random.default_rng([seed, 17])
+
+
+def _parameters(study: Study, rng: np.random.Generator) -> np.ndarray:
+    of_laws = np.array([p.kind in OF_LAWS for p in study.probed.parameters], dtype=bool)
+    within = rng.uniform(-1.0, 1.0, len(of_laws))
+    return np.where(of_laws, np.clip(rng.standard_normal(len(of_laws)), -2.5, 2.5), within)
 
 
 def _ornstein(rng: np.random.Generator, n: int, columns: int, memory: float) -> np.ndarray:

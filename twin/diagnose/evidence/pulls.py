@@ -1,8 +1,14 @@
 """How far calibration moves each parameter of a machine that has nothing but its tolerances: what is far beyond that.
 
-Whether a loss 1.6 times as large is news follows from this machine's own synthetic measurements without a cause: each
-parameter's moves there have their own spread, and the farthest of a kind its own distribution. Two calibrations tell:
-the one that finds causes is sure of fast and local effects, the settled one of slow ones.
+Whether a loss 1.6 times as large is news follows from this machine's own synthetic measurements without a cause. Of a
+number that they have at t, -1 <= t <= 1 in tolerances, a calibration makes
+
+    x = b t + s z,    t ~ U(-1, 1),    z ~ N(0, 1),
+
+with b near 1 where data tell it and near 0 where they do not. How rare an x is, as the normal deviate that is as rare,
+is alike for all numbers then, but for what model discrepancy does to each kind: the farthest of a kind has its own
+distribution. Two calibrations tell: the one that finds causes is sure of fast and local effects, the settled one of
+slow ones.
 """
 
 from __future__ import annotations
@@ -11,11 +17,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.rom.parameter import Parameter
 
-NAMED = ("source", "film", "joint", "contact", "expansion")  # kinds whose number may be named out of its tolerance
+# kinds whose number may be named out of its tolerance
+NAMED = ("source", "film", "joint", "contact", "capacity", "expansion")
 # prior standard deviations: no limit is lower; three times a spread of a quarter of a tolerance (before any result)
 LEAST = 0.75
 TAIL = 0.03  # of synthetic measurements that may have a parameter farther off: as of all other causes together
@@ -28,17 +36,19 @@ class Spread:
     limit: np.ndarray  # (n,) prior standard deviations, beyond which one is out; infinite for those that are not named
 
     @classmethod
-    def of(cls, parameters: Sequence[Parameter], x: np.ndarray) -> Spread:
-        """From parameters (nulls, n) of synthetic measurements.
+    def of(cls, parameters: Sequence[Parameter], drawn: np.ndarray, x: np.ndarray) -> Spread:
+        """From parameters of synthetic measurements, drawn (nulls, n), and as calibrated, x (nulls, n).
 
         One limit per kind: model discrepancy biases joints and films by more than their tolerances, losses by less.
         """
-        kinds = np.array([p.kind if p.scale == "log" else "" for p in parameters])
+        b = np.clip((drawn * x).sum(axis=0) / np.maximum((drawn**2).sum(axis=0), 1e-9), 0.0, 1.0)
+        s = np.maximum(np.sqrt(np.mean((x - b * drawn) ** 2, axis=0)), 1e-9)
+        kinds = np.array([p.kind for p in parameters])
         named = [kind for kind in NAMED if (kinds == kind).any()]
-        limit, sigma = np.full(len(kinds), np.inf), np.maximum(np.sqrt(np.mean(x**2, axis=0)), 1e-9)
-        farthest = [np.abs(x / sigma)[:, kinds == kind].max(axis=1) for kind in named]
+        limit, deviates = np.full(len(kinds), np.inf), deviate(np.abs(x), b, s)
+        farthest = [deviates[:, kinds == kind].max(axis=1) for kind in named]
         for kind, most in zip(named, tails(np.array(farthest).T, TAIL) if named else (), strict=True):
-            limit[kinds == kind] = np.maximum(most * sigma[kinds == kind], LEAST)
+            limit[kinds == kind] = np.maximum(as_rare(float(most), b, s)[kinds == kind], LEAST)
         return cls(limit)
 
     def strain(self, x: np.ndarray) -> np.ndarray:
@@ -54,9 +64,9 @@ class Pulls:
     settled: Spread
 
     @classmethod
-    def of(cls, parameters: Sequence[Parameter], fitted: np.ndarray, settled: np.ndarray) -> Pulls:
-        """From parameters (nulls, n) of synthetic measurements, by both calibrations."""
-        return cls(Spread.of(parameters, fitted), Spread.of(parameters, settled))
+    def of(cls, parameters: Sequence[Parameter], drawn: np.ndarray, fitted: np.ndarray, settled: np.ndarray) -> Pulls:
+        """From parameters (nulls, n) of synthetic measurements, as drawn and by both calibrations."""
+        return cls(Spread.of(parameters, drawn, fitted), Spread.of(parameters, drawn, settled))
 
     def strain(self, fitted: np.ndarray, settled: np.ndarray) -> np.ndarray:
         """(n,) 1 at the limit of how far parameters (n,) are moved, by either calibration."""
@@ -73,6 +83,27 @@ class Loose:
     strain: float  # times the limit
     rivals: tuple[tuple[Hypothesis, float], ...] = ()  # what does the same, with its cosine
     settled: bool = True  # x and sigma are those of the settled calibration
+
+
+def deviate(x: np.ndarray, b: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """The normal deviate that |b t + s z| reaches as rarely as x >= 0 (..., n); b, s (n,).
+
+    P(b t + s z > x) = s / (2 b) (K((x - b) / s) - K((x + b) / s)),    K(u) = phi(u) - u (1 - Phi(u))
+    """
+    b = np.maximum(b, 1e-3 * s)
+    low, high = ((x + sign * b) / s for sign in (-1.0, 1.0))
+    beyond = s / (2.0 * b) * ((norm.pdf(low) - low * norm.sf(low)) - (norm.pdf(high) - high * norm.sf(high)))
+    return np.asarray(norm.isf(np.clip(beyond, 1e-300, 0.5)))
+
+
+def as_rare(most: float, b: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """(n,) the inverse: x of that deviate, by bisection."""
+    low, high = np.zeros(len(b)), b + most * s
+    for _ in range(50):
+        middle = (low + high) / 2.0
+        nearer = deviate(middle, b, s) < most
+        low, high = np.where(nearer, middle, low), np.where(nearer, high, middle)
+    return high
 
 
 def tails(values: np.ndarray, share: float) -> np.ndarray:

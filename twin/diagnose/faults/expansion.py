@@ -50,7 +50,7 @@ def edit(cause: Cause, study: Study) -> Effect:
 FAMILY = Family(
     12, "expansion", "Expansion coefficient wrong",
     "A part grows more or less per kelvin than its material says: other alloy, other reference temperature.",
-    "a C_part x", "displacements scale while temperatures fit", "5 %", "either", "every part, every material",
-    "machine", batches, what="thermal expansion other than declared", times="times the declared", declared=True,
-    edit=edit,
+    "a C_part x", "displacements scale while temperatures fit", "5 %", "either",
+    "every part, every material, every node", "machine", batches,
+    what="thermal expansion other than declared", times="times the declared", declared=True, edit=edit,
 )  # fmt: skip

@@ -50,7 +50,8 @@ def family_of(name: str) -> Family | None:
 
 # Of kinds of declared parameters, see `twin.rom.parameter`
 _OF_PARAMETER = {
-    "source": loss_law, "film": film_gain, "contact": joint, "joint": joint, "expansion": expansion,
+    "source": loss_law, "film": film_gain, "contact": joint, "joint": joint, "capacity": capacity,
+    "expansion": expansion,
 }  # fmt: skip
 
 

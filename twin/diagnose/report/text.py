@@ -121,11 +121,10 @@ def beyond(pulls: Sequence[Pull], sigmas: float) -> list[Pull]:
     return sorted((p for p in pulls if abs(p.pull) > sigmas), key=lambda p: -abs(p.pull))
 
 
-def pull_words(pull: Pull, factors: tuple[float, float] = (math.nan, math.nan)) -> str:
-    """`factors`: 95 % interval of value over nominal, where it is known."""
-    low, high = sorted(pull.nominal * f for f in factors)
+def pull_words(pull: Pull, ci95: tuple[float, float] = (math.nan, math.nan)) -> str:
+    """`ci95`: 95 % interval of its value, where it is known."""
     return (
-        f"{pull.path} is {size_words(pull.value, (low, high), pull.unit)} instead of "
+        f"{pull.path} is {size_words(pull.value, ci95, pull.unit)} instead of "
         f"{quantity(pull.nominal, pull.unit)} ({pull.pull:+.1f} standard deviations of what was declared)"
     )
 
@@ -194,14 +193,17 @@ def follows(d: Diagnosis) -> str:
 
 
 def _strained_words(d: Diagnosis) -> str:
-    numbers = {
-        c.place: pull_words(replace(p, value=p.nominal * c.amplitude), c.ci95)
-        for c in d.causes if (p := pull_of(d, c))
-    }  # fmt: skip
-    besides = [cause_words(c) for c in d.causes if c.place not in numbers]
+    numbers, besides = list[str](), list[str]()
+    for c in d.causes:
+        if (p := pull_of(d, c)) is None:
+            besides.append(cause_words(c))
+            continue
+        one = p.nominal if c.unit == "1" else 1.0
+        low, high = sorted(one * end for end in c.ci95)
+        numbers.append(pull_words(replace(p, value=one * c.amplitude), (low, high)))
     if not numbers:
         return joined(besides or [pull_words(p) for p in beyond(d.pulls, 3.0)[:3]]) or "see the pulls"
-    return joined([*numbers.values()]) + (f"; besides: {joined(besides)}" if besides else "")
+    return joined(numbers) + (f"; besides: {joined(besides)}" if besides else "")
 
 
 def _unknown_words(d: Diagnosis) -> str:

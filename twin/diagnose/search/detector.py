@@ -21,7 +21,7 @@ from twin.diagnose.evidence.discretisation import Difference
 from twin.diagnose.evidence.fitter import Fitted, Fitter
 from twin.diagnose.evidence.formal import known_forms
 from twin.diagnose.evidence.loss_exponents import other_exponents
-from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, null
+from twin.diagnose.evidence.nulls import SPREAD, Form, Instruments, drawn, null
 from twin.diagnose.evidence.pulls import Pulls, tails
 from twin.diagnose.evidence.settled import settled_nearly
 from twin.diagnose.evidence.sight import Columns, sight
@@ -143,9 +143,10 @@ def _null_residual(shared: _Nulls, seed: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _OfNull:
-    """What is seen in a null: the largest statistic of every family, and what two calibrations say."""
+    """What is seen in a null: the largest statistic of every family, its parameters and what two calibrations say."""
 
     largest: dict[str, float]
+    drawn: np.ndarray  # (n,)
     fitted: np.ndarray  # (n,)
     settled: np.ndarray  # (n,)
 
@@ -154,7 +155,7 @@ def _of_null(shared: tuple[_Nulls, Columns], seed: int) -> _OfNull:
     (fitter, *_), columns = shared[0], shared[1]
     fitted = _fitted_null(shared[0], seed)
     seen = sight(columns, fitted.projector, fitter.whiten(fitted.residual))
-    return _OfNull(seen.largest(), fitted.x, settled_nearly(fitter, fitted))
+    return _OfNull(seen.largest(), drawn(fitter.study, seed), fitted.x, settled_nearly(fitter, fitted))
 
 
 def instruments_of(study: Study, temperature: float, tcp: float) -> Instruments:
@@ -219,7 +220,8 @@ def make_detector(
         seen = each(_of_null, (shared, columns), seeds, lambda _: advance(""))
     names = [*(f.name for f in families), "unknown"]
     nulls = {name: np.array([of_null.largest.get(name, 0.0) for of_null in seen]) for name in names}
-    pulls = Pulls.of(study.probed.parameters, np.array([o.fitted for o in seen]), np.array([o.settled for o in seen]))
+    told = np.array([(o.drawn, o.fitted, o.settled) for o in seen])  # (nulls, 3, n)
+    pulls = Pulls.of(study.probed.parameters, *told.transpose(1, 0, 2))
     small = tuple(replace(own, inverse=np.zeros((0, 0, 0))) for own in nominal)
     lost = lost_conductances(study, elements, whiten, progress)
     made = slim(elements), small, index, columns, nulls, thresholds_of(nulls), lost, pulls

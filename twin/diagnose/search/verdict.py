@@ -20,7 +20,7 @@ from twin.diagnose.search.accepted import Accepted, freed, parameter_of, reading
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import POLICY, SearchPolicy
-from twin.rom.parameter import OF_LAWS
+from twin.rom.parameter import OF_LAWS, Parameter
 
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
 
@@ -177,19 +177,28 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
     sure, ends = detector.policy.sure, detector.policy.nearly * np.array(bounds(detector.study))
     for own in found.loose:
         p = detector.study.probed.parameters[own.index]
-        gain, low, high = (float(np.exp(p.sigma * (own.x + z * own.sigma))) for z in (0.0, -sure, sure))
+        # a factor; of what is declared as nought the value itself
+        unit, one = ("1", p.nominal) if p.nominal else (p.unit, 1.0)
+        gain, *ends95 = (p.value(own.x + z * own.sigma) / one for z in (0.0, -sure, sure))
+        low, high = sorted(ends95)
         if own.settled and not ends[0, own.index] < own.x < ends[1, own.index]:
             far = _farthest(detector, own.index, own.x)
             low, high = (low, max(high, far)) if own.x > 0.0 else (min(low, far), high)
-        place = ".".join(p.path.split(".")[:2])
+        place = _place(p)
         rivals = [rival_of(h, cosine, _reading(h)) for h, cosine in own.rivals]
         others = (h for h in unnamed if h.name != place)
         rivals += [rival_of(h, _cosine(detector, own, h), sensor_between(place, h.name)) for h in others]
         result.append(Cause(
-            family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit="1",
+            family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit=unit,
             statistic=own.strain**2, threshold=1.0, history=CALIBRATED, rivals=tuple(rivals),
         ))  # fmt: skip
     return tuple(sorted(result, key=lambda c: -c.statistic))
+
+
+def _place(p: Parameter) -> str:
+    """What a declared number belongs to, as other causes call it: a node by its name alone."""
+    entry = p.path.split(".")[: 3 if p.component >= 0 else 2]  # of a table in a table, as [tcp.expansion]
+    return ".".join(entry).removeprefix("nodes.")
 
 
 def _cosine(detector: Detector, own: Loose, h: Hypothesis) -> float:

@@ -19,6 +19,7 @@ from twin.machine.effects.site import (
     surfaces_of,
     switch_of,
 )
+from twin.nearest import did_you_mean
 
 TANK_TIME = 3600.0  # s: time constant of a tank whose conductance is not known
 
@@ -115,7 +116,13 @@ def _own_air(site: Site, effect: Effect) -> Change:
 
 
 def capacity(site: Site, effect: Effect) -> Change:
-    """Something heavy hangs on a surface."""
+    """Something heavy hangs on a surface; as a factor, a node stores otherwise than declared."""
+    if effect.unit == "1":
+        own = {name: node.capacity for name, node in site.machine.nodes.items() if node.capacity is not None}
+        if (declared := own.get(effect.place)) is None:
+            remedy = f"{did_you_mean(effect.place, own, 'nodes with a capacity')}; or give a size in J/K"
+            raise DescriptionError(f"'{effect.place}' declares no capacity", effect.place, remedy)
+        return Change(values={f"nodes.{effect.place}.capacity": declared * effect.amplitude})
     (surface, *_) = surfaces_of(site, effect.place)
     conductance = float(effect.settings.get("conductance", effect.amplitude / TANK_TIME))
     entry = {

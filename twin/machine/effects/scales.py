@@ -45,11 +45,15 @@ def scale_expansion(site: Site, effect: Effect) -> Change:
 
 
 def expansion(site: Site, effect: Effect) -> Change:
-    """A material grows more or less than declared; that of one part is a material of its own."""
+    """A material grows more or less than declared; that of one part is a material of its own, a node has a row."""
     machine = site.machine
     if effect.place.startswith("tcp.expansion."):
-        remedy = f"multiply the row of '{effect.place}' by {effect.amplitude:.4g}, or give it a tolerance and calibrate"
-        raise DescriptionError("three numbers of a node, to be written by hand", effect.place, remedy)
+        name = effect.place.removeprefix("tcp.expansion.")
+        if name not in machine.tcp.expansion:
+            remedy = did_you_mean(name, list(machine.tcp.expansion), "nodes that move the tool")
+            raise DescriptionError(f"no '{name}' moves the tool", effect.place, remedy)
+        row = [quantity(effect.amplitude * value, "m/K") for value in machine.tcp.expansion[name]]
+        return Change(values={effect.place: row})
     section, name = named(site, effect.place, "materials", "parts", "bars")
     if section == "materials":
         return Change(values={f"materials.{name}.expansion": machine.materials[name].expansion * effect.amplitude})

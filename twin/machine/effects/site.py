@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,7 +19,7 @@ class Change:
     """What one effect adds to a description and what it changes there."""
 
     tables: tuple[tuple[str, Mapping[str, object]], ...] = ()
-    values: Mapping[str, float | str | bool] = field(default_factory=dict)
+    values: Mapping[str, float | str | bool | Sequence[str]] = field(default_factory=dict)
     signals: Mapping[str, tuple[Window, ...]] = field(default_factory=dict)
 
 

@@ -1,0 +1,113 @@
+"""How far calibrations move numbers that lie within their tolerances, and what is beyond that."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from tests.diagnose import small_case
+from twin.diagnose.evidence.pulls import Loose, Pulls, Spread, as_rare, deviate
+from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.look import Search
+from twin.diagnose.search.verdict import strained_of, verdict_of
+from twin.machine.parameters import parameters
+
+
+def test_a_number_is_out_where_few_synthetic_measurements_move_one_so_far():
+    known = parameters(small_case.machine())
+    rng = np.random.default_rng(1)
+    spread = rng.uniform(0.3, 2.0, len(known))
+    drawn = rng.uniform(-1.0, 1.0, (2000, len(known)))
+    fitted, settled = (spread * rng.standard_normal((2000, len(known))) for _ in range(2))
+    pulls = Pulls.of(known, drawn, fitted, settled)
+    passing = np.mean([(pulls.fitted.strain(x) >= 1.0).any() for x in spread * rng.standard_normal((2000, len(known)))])
+    assert 0.01 < passing < 0.06
+    named = next(i for i, p in enumerate(known) if p.kind == "source")
+    other = next(i for i, p in enumerate(known) if p.kind == "environment")
+    far = np.zeros(len(known))
+    far[[named, other]] = 20.0
+    strain = pulls.strain(far, far)
+    assert strain[named] > 1.0
+    assert strain[other] == 0.0  # air is told by a family of its own
+    assert pulls.strain(far, 0.0 * far)[named] > 1.0  # by either calibration
+    assert pulls.strain(0.0 * far, far)[named] > 1.0
+
+
+def test_the_limit_of_losses_does_not_follow_the_discrepancy_of_films():
+    """Losses of a healthy machine lie within their tolerance; films pass theirs in one of ten measurements."""
+    known = parameters(small_case.machine())
+    kinds = np.array([p.kind for p in known])
+    rng = np.random.default_rng(2)
+    drawn = rng.uniform(-1.0, 1.0, (400, len(known)))
+    x, far = drawn + 0.1 * rng.standard_normal(drawn.shape), kinds == "film"
+    x[:, far] *= np.where(rng.random((400, far.sum())) < 0.1, 3.0, 1.0)
+    spread = Spread.of(known, drawn, x)
+    assert spread.limit[kinds == "source"].max() < 1.3
+    assert spread.limit[far].min() > 2.0
+
+
+def test_what_data_tell_is_out_as_soon_as_it_leaves_its_tolerance():
+    """By more than a calibration errs; of what data do not tell, its prior says nothing."""
+    known = tuple(p for p in parameters(small_case.machine()) if p.kind == "source")
+    rng = np.random.default_rng(3)
+    drawn = rng.uniform(-1.0, 1.0, (400, len(known)))
+    b, s = np.resize([1.0, 0.9, 0.0], len(known)), np.resize([0.05, 0.2, 0.4], len(known))
+    x = b * drawn + s * rng.standard_normal(drawn.shape)
+    limit = Spread.of(known, drawn, x).limit
+    assert np.all(limit[b == 1.0] < 1.15)
+    assert np.all(limit[b == 1.0] > 1.0)
+    assert np.all(limit[b == 0.0] > 2.5 * 0.4)
+    new = rng.uniform(-1.0, 1.0, (4000, len(known)))
+    passing = (np.abs(b * new + s * rng.standard_normal(new.shape)) > limit).any(axis=1).mean()
+    assert 0.005 < passing < 0.08
+
+
+@pytest.mark.parametrize(("b", "s"), [(1.0, 0.1), (0.5, 0.5), (0.0, 2.0)])
+def test_deviates_are_normal_where_numbers_lie_anywhere_within_their_tolerances(b, s):
+    rng = np.random.default_rng(4)
+    x = np.abs(b * rng.uniform(-1.0, 1.0, 200_000) + s * rng.standard_normal(200_000))
+    found = deviate(x, np.array(b), np.array(s))
+    for most in (1.0, 2.0, 3.0):
+        assert (found > most).mean() == pytest.approx(2.0 * norm.sf(most), rel=0.1)
+        (back,) = as_rare(most, np.array([b]), np.array([s]))
+        assert deviate(np.array([back]), np.array([b]), np.array([s]))[0] == pytest.approx(most, abs=1e-4)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("component", "factor"), [("x", 1.7), ("x", 0.3), ("y", 2e-6)])
+def test_an_expansion_of_a_node_out_of_its_tolerance_is_told_with_its_size(component, factor):
+    """Of a node's row every number is calibrated by itself; one that is declared as nought has no factor."""
+    detector = small_case.made_detector()
+    study, path = detector.study, f"tcp.expansion.shaft.{component}"
+    j, p = next((i, p) for i, p in enumerate(study.probed.parameters) if p.path == path)
+    x = np.zeros(len(study.scale))
+    x[j] = p.coordinate(factor * (p.nominal or 1.0))
+    y = study.all_outputs(x)
+    y = y + detector.whiten.colour(np.random.default_rng(5).standard_normal(len(y)))
+    verdict, (cause, *_) = verdict_of(search(detector, y), FAMILIES)
+    assert verdict == "out_of_tolerance"
+    assert (cause.family, cause.place, cause.parameter) == ("expansion", "tcp.expansion.shaft", path)
+    assert cause.unit == ("1" if p.nominal else "m/K")
+    assert cause.ci95[0] < factor < cause.ci95[1]
+    assert cause.amplitude == pytest.approx(factor, rel=0.25)
+
+
+@pytest.mark.long
+def test_a_capacity_out_of_its_tolerance_is_one_of_its_node():
+    detector = small_case.made_detector()
+    paths = [p.path for p in detector.study.probed.parameters]
+    own = Loose(paths.index("nodes.bearing_front.capacity"), 3.0, 0.5, 1.5)
+    (cause,) = strained_of(replace(nothing(), loose=(own,)))
+    assert (cause.family, cause.place, cause.unit) == ("capacity", "bearing_front", "1")
+    assert cause.amplitude == pytest.approx(1.2**3)
+
+
+def nothing() -> Search:
+    """The search of measurements without a cause."""
+    detector = small_case.made_detector()
+    y = detector.study.all_outputs(np.zeros(len(detector.study.scale)))
+    return search(detector, y + detector.whiten.colour(np.random.default_rng(6).standard_normal(len(y))))
