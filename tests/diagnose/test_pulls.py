@@ -9,11 +9,15 @@ import pytest
 from scipy.stats import norm
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.pulls import Loose, Pulls, Spread, as_rare, deviate
+from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.search.by_calibration import strained_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.verdict import strained_of, verdict_of
+from twin.diagnose.search.loose import beside_free
+from twin.diagnose.search.verdict import verdict_of
 from twin.machine.parameters import parameters
 
 
@@ -111,3 +115,33 @@ def nothing() -> Search:
     detector = small_case.made_detector()
     y = detector.study.all_outputs(np.zeros(len(detector.study.scale)))
     return search(detector, y + detector.whiten.colour(np.random.default_rng(6).standard_normal(len(y))))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("told", "verdict"), [(20.0, "out_of_tolerance"), (33.0, "ambiguous")])
+def test_a_number_that_follows_the_farthest_is_its_doing_or_its_rival(told, verdict):
+    detector = small_case.made_detector()
+    paths = [p.path for p in detector.study.probed.parameters]
+    first, other, apart = (
+        paths.index(path) for path in ("tcp.expansion.shaft.x", "tcp.expansion.housing.x", "sources.front.gain")
+    )
+    loose = (
+        Loose(first, 4.0, 0.3, 2.0, told=35.0),
+        Loose(other, 3.0, 0.5, 1.4, told=told, follows=True),
+        Loose(apart, 3.0, 0.5, 1.3, told=told),
+    )
+    said, causes = verdict_of(replace(nothing(), loose=loose), FAMILIES)
+    assert said == verdict
+    assert [c.parameter for c in causes] == [paths[first], paths[apart]]
+    assert [r.place for r in causes[0].rivals] == ["tcp.expansion.housing"] * (verdict == "ambiguous")
+    assert not causes[1].rivals
+
+
+def test_others_beside_a_free_number_are_those_of_the_fit_without_its_prior():
+    rng = np.random.default_rng(8)
+    N, y, j = rng.standard_normal((40, 5)), rng.standard_normal(40), 2
+    projector = Projector.of(N)
+    fitted = Fitted(projector.most_likely(y), N, y, projector)
+    prior = np.eye(5)
+    prior[j, j] = 0.0
+    np.testing.assert_allclose(beside_free(fitted, j), np.linalg.solve(N.T @ N + prior, N.T @ y), rtol=1e-9)

@@ -17,12 +17,13 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.result.diagnosis import Rival
 from twin.diagnose.search.accepted import Accepted, settled
+from twin.diagnose.search.by_calibration import strained_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.gain import Channel, channels_of, likelihood_ratio
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.sealed import judged, other_sizes
-from twin.diagnose.search.verdict import strained_of, verdict_of
+from twin.diagnose.search.verdict import verdict_of
 
 pytestmark = pytest.mark.long
 

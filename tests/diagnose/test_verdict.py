@@ -16,13 +16,15 @@ from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, parameter_of
+from twin.diagnose.search.by_calibration import CALIBRATED, strained_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.limits import limits_at, limits_of, over_histories
 from twin.diagnose.search.loose import Freed
 from twin.diagnose.search.policy import POLICY
+from twin.diagnose.search.rivals import rival_of
 from twin.diagnose.search.start import begun
 from twin.diagnose.search.strained import strained
-from twin.diagnose.search.verdict import CALIBRATED, _more_alike, cause_of, rival_of, strained_of, verdict_of
+from twin.diagnose.search.verdict import _more_alike, cause_of, verdict_of
 
 
 @pytest.mark.parametrize(

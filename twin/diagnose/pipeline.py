@@ -34,6 +34,7 @@ from twin.diagnose.report.scene import scene_of
 from twin.diagnose.report.text import cause_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Pull, Series, Unknown, Verdict
 from twin.diagnose.result.place import Scene
+from twin.diagnose.search.by_calibration import CALIBRATED
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.dispersion import raised, searched, wrong_temperatures
 from twin.diagnose.search.gain import predicted
@@ -42,10 +43,11 @@ from twin.diagnose.search.look import Search
 from twin.diagnose.search.missing import missing_members
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.poor import poor_note
+from twin.diagnose.search.rivals import rival_of
 from twin.diagnose.search.sealed_alone import sealed_alone
 from twin.diagnose.search.standing import beside_sensors, standing
 from twin.diagnose.search.support import support_of
-from twin.diagnose.search.verdict import CALIBRATED, pulls_of, rival_of, unknown_of, verdict_of
+from twin.diagnose.search.verdict import pulls_of, unknown_of, verdict_of
 from twin.diagnose.search.witness import upheld
 from twin.errors import ArtefactError, LogError
 from twin.logs.run import Run

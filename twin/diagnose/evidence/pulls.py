@@ -83,6 +83,8 @@ class Loose:
     strain: float  # times the limit
     rivals: tuple[tuple[Hypothesis, float], ...] = ()  # what does the same, with its cosine
     settled: bool = True  # x and sigma are those of the settled calibration
+    told: float = 0.0  # likelihood-ratio units by which it explains more without its tolerance
+    follows: bool = False  # within its limit once the farthest one has no tolerance
 
 
 def deviate(x: np.ndarray, b: np.ndarray, s: np.ndarray) -> np.ndarray:

@@ -42,12 +42,15 @@ def loose_ones(
     another mesh makes of it. So where it alone is sure it is to be as sure as any cause has to be.
     """
     policy, strain, found = detector.policy, detector.pulls.strain(fitted.x, settled), list[Loose]()
+    beside = np.ones(len(strain))  # strain once the farthest is free
     for j in (int(j) for j in np.argsort(-strain) if strain[j] >= 1.0):
         if j not in known.settled:
             known.settled[j] = settled_alone(detector.fitter, y, (j,))
         x, covariance = known.settled[j]
-        robust = Loose(j, float(x[j]), float(np.sqrt(covariance[j, j])), float(strain[j]))
-        efficient = Loose(j, *untied(fitted, j), float(strain[j]), settled=False)
+        told, follows = float(fitted.x[j]) ** 2 / (1.0 - variance_of(fitted, j)), bool(beside[j] < 1.0)
+        sigma, (alone, spread) = float(np.sqrt(covariance[j, j])), untied(fitted, j)
+        robust = Loose(j, float(x[j]), sigma, float(strain[j]), told=told, follows=follows)
+        efficient = replace(robust, x=alone, sigma=spread, settled=False)
         sure = max(policy.sure, float(np.sqrt(detector.least)))
         out = [own for own in (robust, efficient) if np.sign(fitted.x[j]) * own.x > policy.outside]
         if robust in out and abs(robust.x) > sure * robust.sigma:
@@ -56,6 +59,8 @@ def loose_ones(
             found.append(replace(efficient, rivals=_signals(detector, efficient)))
         if len(found) == policy.far:
             break
+        if found and found[0].index == j:
+            beside = detector.pulls.strain(beside_free(fitted, j), x)
     return tuple(found)
 
 
@@ -93,9 +98,20 @@ def untied(fitted: Fitted, j: int) -> tuple[float, float]:
 
 def variance_of(fitted: Fitted, j: int) -> float:
     """Of a parameter beside all nuisances, in prior variances: below 1."""
+    return min(float(_covariance(fitted, j)[j]), 1.0 - 1e-12)
+
+
+def beside_free(fitted: Fitted, j: int) -> np.ndarray:
+    """(n,) parameters as the fit has them where one of them has no tolerance, to first order."""
+    covariance, x = _covariance(fitted, j)[: len(fitted.x)], untied(fitted, j)[0]
+    return fitted.x + covariance * (x - float(fitted.x[j])) / covariance[j]
+
+
+def _covariance(fitted: Fitted, j: int) -> np.ndarray:
+    """(n + q,) of a parameter with all nuisances."""
     unit = np.zeros(len(fitted.projector.factor[0]))
     unit[j] = 1.0
-    return min(float(scipy.linalg.cho_solve(fitted.projector.factor, unit)[j]), 1.0 - 1e-12)
+    return np.asarray(scipy.linalg.cho_solve(fitted.projector.factor, unit))
 
 
 def _signals(detector: Detector, own: Loose) -> tuple[tuple[Hypothesis, float], ...]:

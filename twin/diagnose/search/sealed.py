@@ -25,12 +25,12 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
 from twin.diagnose.result.numbers import quantity, rms
 from twin.diagnose.search.accepted import Accepted, freed, settled
+from twin.diagnose.search.by_calibration import CALIBRATED
 from twin.diagnose.search.declared import imitating, with_signal
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.gain import Channel, channels_of, gains, likelihood_ratio
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import SearchPolicy
-from twin.diagnose.search.verdict import CALIBRATED
 
 
 @dataclass(frozen=True)

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import bounds
-from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.unknown import history
 from twin.diagnose.faults.fault import Described, Family
-from twin.diagnose.faults.table import family_of_parameter, fault_of
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import Study
-from twin.diagnose.result.diagnosis import Cause, Pull, Rival, Unknown, Verdict
+from twin.diagnose.result.diagnosis import Cause, Pull, Unknown, Verdict
 from twin.diagnose.result.spot import Spot
-from twin.diagnose.search.accepted import Accepted, freed, parameter_of, readings_columns
-from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.accepted import Accepted, freed
+from twin.diagnose.search.by_calibration import strained_of
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import POLICY, SearchPolicy
-from twin.rom.parameter import OF_LAWS, Parameter
-
-CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
+from twin.diagnose.search.rivals import as_good, rival_beside
+from twin.rom.parameter import OF_LAWS
 
 
 def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
@@ -47,7 +43,7 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
         family=h.family, place=said.place, parameter="", amplitude=value, ci95=(low, high), unit=h.batch.unit,
         statistic=float(a.statistic), threshold=float(a.threshold), history=h.when.name, signal=h.when.signal,
         exponent=h.when.exponent, windows=said.windows, settings=settings,
-        rivals=tuple(_rival(a.hypothesis, other, cosine, policy) for other, cosine in a.rivals),
+        rivals=tuple(rival_beside(a.hypothesis, other, cosine, policy) for other, cosine in a.rivals),
     )  # fmt: skip
 
 
@@ -56,61 +52,6 @@ def _factors(a: Accepted) -> tuple[float, float]:
     told = [fault_of(h).factor(h.name) for h in (a.hypothesis, *(h for h, _ in a.rivals)) if fault_of(h).corrects]
     factors = [factor for signal, factor in told if signal == told[0][0]]
     return min(factors), max(factors)
-
-
-def rival_of(h: Hypothesis, cosine: float, remedy: str = "", policy: SearchPolicy = POLICY) -> Rival:
-    """A hypothesis in a row of a table. Its interval is that of an amplitude that enters linearly, of which the
-    statistic is (amplitude / sigma)^2; an exact factor has none."""
-    value, place, fault = h.amplitude[0], h.name, fault_of(h)
-    if fault.corrects:
-        place, factor = fault.factor(place)
-        return Rival(h.family, place, h.when.name, factor, h.batch.unit, h.statistic, cosine, remedy)
-    half = policy.sure * abs(value) / math.sqrt(h.statistic) if h.statistic > 0.0 and not h.batch.fixed else math.nan
-    told = fault.curve.told
-    ci95 = (told(value - half), told(value + half))
-    return Rival(h.family, place, h.when.name, told(value), h.batch.unit, h.statistic, cosine, remedy, ci95)
-
-
-def _rival(chosen: Hypothesis, other: Hypothesis, cosine: float, policy: SearchPolicy) -> Rival:
-    apart = min(chosen.statistic, other.statistic) * (1.0 - cosine**2) > policy.apart
-    return rival_of(other, cosine, "" if apart and not _as_good(other, chosen, policy) else remedy(chosen, other))
-
-
-def _as_good(other: Hypothesis, lead: Hypothesis, policy: SearchPolicy) -> bool:
-    """Whether another hypothesis explains what the leading one does, but for chance and the error of its response: the
-    data have decided nothing then, however unlike each other they are."""
-    price = policy.amplitude * (other.batch.q - lead.batch.q)
-    return other.statistic - price > lead.statistic - max(policy.close, policy.misfit * lead.statistic)
-
-
-def remedy(a: Hypothesis, b: Hypothesis) -> str:
-    """What would tell two causes apart that these data do not."""
-    wrong = next((h for h in (a, b) if fault_of(h).corrects), None)
-    if wrong is not None:
-        return _reading(wrong)
-    if a.name != b.name and a.when.name == b.when.name:
-        return sensor_between(a.name, b.name)
-    if a.name == b.name and fault_of(a).read and fault_of(b).read:
-        return f"a longer run, measured twice as often: {a.when.name} and {b.when.name} differ there"
-    signals = [h.when.signal for h in (a, b) if h.when.signal]
-    if a.name == b.name and a.when.signal and a.when.signal == b.when.signal:
-        return f"a run with {a.when.signal} held for 2 h each at a third, two thirds and all of its range"
-    if signals:
-        return f"a run in which {' and '.join(dict.fromkeys(signals))} work alone, and one in which they rest"
-    if a.name == b.name:
-        both = f"{a.family} and {b.family}"
-        return f"a run in which the air is 5 K colder, and one that cools from standstill: {both} differ there"
-    return f"temperature sensors at {a.name} and at {b.name}"
-
-
-def sensor_between(a: str, b: str) -> str:
-    return f"a temperature sensor between {a} and {b}, nearer to one of them"
-
-
-def _reading(h: Hypothesis) -> str:
-    """What tells whether a signal is declared rightly."""
-    signal, _ = fault_of(h).factor(h.name)
-    return f"one reading of {signal} beside an instrument, or what the drive's manual says it logs"
 
 
 def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tuple[Cause, ...]]:
@@ -141,7 +82,7 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         # two histories of one place, and two factors of one signal, are written otherwise into the description
         two = fault_of(lead).corrects or (lead.when.signal and other.when.name != lead.when.name)
         same = alike and not two
-        passes = _as_good(other, lead, policy) and other.statistic >= thresholds[other.family]
+        passes = as_good(other, lead, policy) and other.statistic >= thresholds[other.family]
         if not same and (unproved or passes):
             return "ambiguous", causes
     # a sensor at fault does not keep what is beside it out of the description
@@ -166,57 +107,6 @@ def _more_alike(found: Search, left: float) -> bool:
         len(found.accepted) >= policy.causes and best is not None and fault_of(best).several
         and alike == {(best.family, Spot.read(best.name).within)} and best.statistic > policy.covers * left
     )  # fmt: skip
-
-
-def strained_of(found: Search) -> tuple[Cause, ...]:
-    """Declared parameters that calibration alone moved out of their tolerance, at their values without one. Of one that
-    has come near a bound of the calibration, the interval reaches as far as physics allows. What passes its threshold
-    beside them and could not be named is their rival."""
-    result, detector = [], found.detector
-    unnamed = [h for h in found.steps[-1].ranked if h.statistic > detector.thresholds[h.family]]
-    sure, ends = detector.policy.sure, detector.policy.nearly * np.array(bounds(detector.study))
-    for own in found.loose:
-        p = detector.study.probed.parameters[own.index]
-        # a factor; of what is declared as nought the value itself
-        unit, one = ("1", p.nominal) if p.nominal else (p.unit, 1.0)
-        gain, *ends95 = (p.value(own.x + z * own.sigma) / one for z in (0.0, -sure, sure))
-        low, high = sorted(ends95)
-        if own.settled and not ends[0, own.index] < own.x < ends[1, own.index]:
-            far = _farthest(detector, own.index, own.x)
-            low, high = (low, max(high, far)) if own.x > 0.0 else (min(low, far), high)
-        place = _place(p)
-        rivals = [rival_of(h, cosine, _reading(h)) for h, cosine in own.rivals]
-        others = (h for h in unnamed if h.name != place)
-        rivals += [rival_of(h, _cosine(detector, own, h), sensor_between(place, h.name)) for h in others]
-        result.append(Cause(
-            family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=(low, high), unit=unit,
-            statistic=own.strain**2, threshold=1.0, history=CALIBRATED, rivals=tuple(rivals),
-        ))  # fmt: skip
-    return tuple(sorted(result, key=lambda c: -c.statistic))
-
-
-def _place(p: Parameter) -> str:
-    """What a declared number belongs to, as other causes call it: a node by its name alone."""
-    entry = p.path.split(".")[: 3 if p.component >= 0 else 2]  # of a table in a table, as [tcp.expansion]
-    return ".".join(entry).removeprefix("nodes.")
-
-
-def _cosine(detector: Detector, own: Loose, h: Hypothesis) -> float:
-    """Of what a declared number out of its tolerance and a hypothesis do."""
-    a = np.sign(own.x) * detector.whiten(detector.fitter.linear(np.zeros(len(detector.study.scale)))[1][:, own.index])
-    b = readings_columns(detector, h) @ np.array(h.amplitude)
-    return float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-30)
-
-
-def _farthest(detector: Detector, j: int, x: float) -> float:
-    """The factor of a declared number that physics allows, the largest for x > 0, the smallest for x < 0; 1 where no
-    range is known."""
-    for batch in detector.columns.batches:
-        fault = fault_of(batch)
-        for name, largest in zip(batch.places, batch.largest, strict=False) if fault.declared else ():
-            if parameter_of(detector.study, name) == j:
-                return fault.curve.told(float(np.sign(x)) * largest)
-    return 1.0
 
 
 def unknown_of(found: Search) -> Unknown | None:

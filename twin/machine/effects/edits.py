@@ -17,7 +17,7 @@ Per family one function, in the table EDITS. What `Effect.amplitude` means there
 | scale_expansion | axes.X, part.surface | 1/K; settings: surface or axis, fixed_at |
 | expansion | materials.X, parts.X, bars.X, tcp.expansion.NODE | factor |
 | capacity | part.surface | J/K behind settings["conductance"] W/K |
-| capacity | NODE | factor of its own, of unit "1" |
+| capacity | NODE, tanks.X, materials.X | factor of its own, of unit "1" |
 | misplaced_source | sources.X | none: settings["surface"] |
 
 Without settings["reference"] that is the largest size in the certified range of the signal. Other families change

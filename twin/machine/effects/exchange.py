@@ -116,13 +116,19 @@ def _own_air(site: Site, effect: Effect) -> Change:
 
 
 def capacity(site: Site, effect: Effect) -> Change:
-    """Something heavy hangs on a surface; as a factor, a node stores otherwise than declared."""
+    """Something heavy hangs on a surface; as a factor, a node, tank or material stores otherwise than declared."""
     if effect.unit == "1":
-        own = {name: node.capacity for name, node in site.machine.nodes.items() if node.capacity is not None}
-        if (declared := own.get(effect.place)) is None:
-            remedy = f"{did_you_mean(effect.place, own, 'nodes with a capacity')}; or give a size in J/K"
+        machine = site.machine
+        own = {n: (f"nodes.{n}.capacity", v.capacity) for n, v in machine.nodes.items() if v.capacity is not None}
+        own |= {f"tanks.{n}": (f"tanks.{n}.capacity", v.capacity) for n, v in machine.tanks.items()}
+        own |= {
+            f"materials.{n}": (f"materials.{n}.heat_capacity", v.heat_capacity) for n, v in machine.materials.items()
+        }
+        if effect.place not in own:
+            remedy = f"{did_you_mean(effect.place, own, 'places with a capacity')}; or give a size in J/K"
             raise DescriptionError(f"'{effect.place}' declares no capacity", effect.place, remedy)
-        return Change(values={f"nodes.{effect.place}.capacity": declared * effect.amplitude})
+        path, declared = own[effect.place]
+        return Change(values={path: declared * effect.amplitude})
     (surface, *_) = surfaces_of(site, effect.place)
     conductance = float(effect.settings.get("conductance", effect.amplitude / TANK_TIME))
     entry = {

@@ -1,0 +1,93 @@
+"""Declared numbers that calibration alone has moved out of their tolerance, as causes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.fitter import bounds
+from twin.diagnose.evidence.pulls import Loose
+from twin.diagnose.faults.table import family_of_parameter, fault_of
+from twin.diagnose.result.diagnosis import Cause, Rival
+from twin.diagnose.search.accepted import parameter_of, readings_columns
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.look import Search
+from twin.diagnose.search.rivals import reading_beside, rival_of, sensor_between
+from twin.rom.parameter import Parameter
+
+CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
+
+
+def strained_of(found: Search) -> tuple[Cause, ...]:
+    """Declared parameters that calibration alone moved out of their tolerance, at their values without one. Of one that
+    has come near a bound of the calibration, the interval reaches as far as physics allows. What passes its threshold
+    beside them and could not be named is their rival. One that is within its tolerance where the farthest has none is
+    that one's doing, or, where it explains as much without its own, its rival."""
+    result, detector = list[Cause](), found.detector
+    unnamed = [h for h in found.steps[-1].ranked if h.statistic > detector.thresholds[h.family]]
+    for own in found.loose:
+        if own.follows:
+            continue
+        p = detector.study.probed.parameters[own.index]
+        place, (gain, ci95, unit) = _place(p), _told(detector, own)
+        rivals = [rival_of(h, cosine, reading_beside(h)) for h, cosine in own.rivals]
+        others = (h for h in unnamed if h.name != place)
+        rivals += [rival_of(h, _cosine(detector, own, h), sensor_between(place, h.name)) for h in others]
+        as_likely = (o for o in found.loose if o.follows and not result and o.told >= own.told - detector.policy.close)
+        rivals += [_rival_number(detector, own, other) for other in as_likely]
+        result.append(Cause(
+            family=family_of_parameter(p), place=place, parameter=p.path, amplitude=gain, ci95=ci95, unit=unit,
+            statistic=own.strain**2, threshold=1.0, history=CALIBRATED, rivals=tuple(rivals),
+        ))  # fmt: skip
+    return tuple(sorted(result, key=lambda c: -c.statistic))
+
+
+def _told(detector: Detector, own: Loose) -> tuple[float, tuple[float, float], str]:
+    """A number without its tolerance, as a factor with its 95 % interval; of what is declared as nought the value."""
+    p, sure, ends = detector.study.probed.parameters[own.index], detector.policy.sure, bounds(detector.study)
+    unit, one = ("1", p.nominal) if p.nominal else (p.unit, 1.0)
+    gain, *both = (p.value(own.x + z * own.sigma) / one for z in (0.0, -sure, sure))
+    low, high = sorted(both)
+    lowest, highest = (detector.policy.nearly * float(end[own.index]) for end in ends)
+    if own.settled and not lowest < own.x < highest:
+        far = _farthest(detector, own.index, own.x)
+        low, high = (low, max(high, far)) if own.x > 0.0 else (min(low, far), high)
+    return gain, (low, high), unit
+
+
+def _rival_number(detector: Detector, first: Loose, other: Loose) -> Rival:
+    """Another number out of its tolerance as the rival of the farthest."""
+    p, (gain, ci95, unit) = detector.study.probed.parameters[other.index], _told(detector, other)
+    a, b = (np.sign(own.x) * _response(detector, own.index) for own in (first, other))
+    cosine = float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-30)
+    remedy = sensor_between(_place(detector.study.probed.parameters[first.index]), _place(p))
+    return Rival(family_of_parameter(p), _place(p), CALIBRATED, gain, unit, other.strain**2, cosine, remedy, ci95)
+
+
+def _place(p: Parameter) -> str:
+    """What a declared number belongs to, as other causes call it: a node by its name alone."""
+    entry = p.path.split(".")[: 3 if p.component >= 0 else 2]  # of a table in a table, as [tcp.expansion]
+    return ".".join(entry).removeprefix("nodes.")
+
+
+def _cosine(detector: Detector, own: Loose, h: Hypothesis) -> float:
+    """Of what a declared number out of its tolerance and a hypothesis do."""
+    a = np.sign(own.x) * _response(detector, own.index)
+    b = readings_columns(detector, h) @ np.array(h.amplitude)
+    return float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-30)
+
+
+def _response(detector: Detector, j: int) -> np.ndarray:
+    """(m,) white, to a declared number."""
+    return detector.whiten(detector.fitter.linear(np.zeros(len(detector.study.scale)))[1][:, j])
+
+
+def _farthest(detector: Detector, j: int, x: float) -> float:
+    """The factor of a declared number that physics allows, the largest for x > 0, the smallest for x < 0; 1 where no
+    range is known."""
+    for batch in detector.columns.batches:
+        fault = fault_of(batch)
+        for name, largest in zip(batch.places, batch.largest, strict=False) if fault.declared else ():
+            if parameter_of(detector.study, name) == j:
+                return fault.curve.told(float(np.sign(x)) * largest)
+    return 1.0
