@@ -38,5 +38,5 @@ FAMILY = Family(
     "An oil tank, a workpiece, a fixture takes part and is not described; or a body stores otherwise than declared.",
     "C_t x_t' = k (T_surface - x_t)", "an extra slow pole at one place", "2 kJ/K", "positive",
     "every surface; every declared capacity", "machine", Singly(FAULTS),
-    what="heat capacity other than declared", times="times the declared", edit=edit,
+    what="stored heat that the description lacks", times="times the declared", edit=edit,
 )  # fmt: skip

@@ -16,6 +16,7 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.evidence.whiten import Projector
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import settled
 from twin.diagnose.search.declared import (
     declared_candidates,
@@ -24,7 +25,7 @@ from twin.diagnose.search.declared import (
     swapped_candidates,
 )
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.exact import left_less, unbent
+from twin.diagnose.search.exact import bends, exact, left_less, unbent
 from twin.diagnose.search.hotter import hotter
 from twin.diagnose.search.look import Step, distinct, look, scored
 from twin.diagnose.search.loose import Freed, loose_ones
@@ -78,6 +79,8 @@ def begun(described: Detector, y: np.ndarray) -> Start:
             glance = _with((straight[0], _unfitted(straight[1], factors), straight[2]), declared)
         else:
             glance = look(detector, fitted, declared, (known[0], _unfitted(known[1], factors)))
+    if loose or bends(fitted.x, detector.policy):
+        glance = _with(glance, _saturated(detector, y, fitted, glance[1]))
     return Start(detector, fitted, x0, covariance, first, declared, glance, alone, loose, freed)
 
 
@@ -92,6 +95,16 @@ def _from_description(detector: Detector, y: np.ndarray, fitted: Fitted) -> Glan
     if not any(h.statistic > detector.thresholds[h.family] for h in own):
         return None
     return seen, own, replace(step, parts={part: evidence - less for part, evidence in step.parts.items()})
+
+
+def _saturated(detector: Detector, y: np.ndarray, fitted: Fitted, ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Exact fits of the most likely ones that saturate and whose scores are between half of their threshold and all of
+    it. A number that has taken most of what they do leaves them a score by the derivative that tells a part."""
+    likely = [
+        h for h in ranked
+        if fault_of(h).saturates and 0.5 < h.statistic / detector.thresholds[h.family] < 1.0
+    ]  # fmt: skip
+    return [exact(detector, y, fitted, h) for h in likely[: detector.policy.closely]]
 
 
 def _alone(detector: Detector, y: np.ndarray) -> Alone:
