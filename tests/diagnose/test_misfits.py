@@ -16,6 +16,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.accepted import Accepted, as_scored, possible
 from twin.diagnose.search.contest import bent
@@ -196,6 +197,28 @@ def test_another_cause_at_the_place_of_a_number_is_its_rival_by_what_it_removes(
         found = ended([there])
         assert found is not None
         assert ("forced_convection" in [h.family for h, _ in found.accepted[0].rivals]) == told
+
+
+def test_a_factor_is_no_rival_of_a_number_that_it_does_not_bring_back():
+    """Where freeing a number explains hardly more than its tolerance had let it, any factor explains as much."""
+    detector = small_case.made_detector()
+    _, y = small_case.source_off(4.5)
+    start = begun(detector, y)
+    relaxed = strained(start, y)
+    assert relaxed is not None
+    factors = [h for h in start.scored[1] if h.family == "signal" and fault_of(h).corrects]
+    every = [replace(h, statistic=1e9) for h in factors]
+    found = closed(replace(start, glance=(*start.glance[:1], [], start.glance[2]), declared=every), y, relaxed)
+    assert found is not None
+    (one,) = found.accepted
+    told = {fault_of(h).factor(h.name)[0] for h, _ in one.rivals if fault_of(h).corrects}
+    source = next(
+        s for s in detector.study.probed.base.load_model.sources if one.hypothesis.name == f"sources.{s.name}"
+    )
+    read = {f"signals.{name}" for name in source.use.signals.values()}
+    asked = {fault_of(h).factor(h.name)[0] for h in factors}
+    assert asked - read
+    assert told <= read
 
 
 def test_no_more_is_refitted_than_decides(monkeypatch):

@@ -305,7 +305,7 @@ def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unkno
 
 def _summary(verdict: Verdict, causes: Sequence[Cause], pulls: Sequence[Pull]) -> tuple[str, ...]:
     lines = [cause_words(c) for c in causes]
-    lines += ["no significant misfit"] if verdict == "nothing" else []
+    lines += ["nothing passes its threshold"] if verdict == "nothing" else []
     strong = [p.path for p in pulls if abs(p.pull) > 3.0]
     return (*lines, *([f"far from their nominal values: {', '.join(strong[:5])}"] if strong else []))
 

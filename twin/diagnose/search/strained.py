@@ -60,9 +60,14 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     instead = [i for i, h in enumerate(more if passing else ()) if not _stays(detector, there, one, h)]
     if any(map(leads, instead)) and any(map(removes_more, sorted(passing, key=lambda i: bent(detector, more[i])))):
         return None
-    # both begin at the declared number: what either explains is the same but for what is left
-    fits = {h.name for h in declared if h.statistic > removed - detector.policy.close}
+    # both begin at the declared number: what either explains is the same but for what is left. Where the
+    # tolerance holds most of the number that is so little that any factor would do: it has to bring the number back
     (j,) = freed(detector.study, one.hypothesis)
+    most = detector.policy.stands * abs(float(before.x[j]))
+    fits = {
+        h.name for h in declared
+        if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
+    }  # fmt: skip
     rivals = one.rivals + tuple(
         (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in factors_of(detector, j)
         if h.name in fits or _does_the_same(detector, one, cosine, heat)
@@ -70,7 +75,6 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     # a part that expands too much moves the expansion of its material, or of another: with the part's free it stays
     known = {one.hypothesis.name, *(h.name for h, _ in one.rivals)}
     family = [h for h in ranked if h.family == one.hypothesis.family and h.name not in known]
-    most = detector.policy.stands * abs(float(before.x[j]))
     near = [
         h for h in family
         if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
