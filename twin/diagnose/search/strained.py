@@ -60,13 +60,14 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     instead = [i for i, h in enumerate(more if passing else ()) if not _stays(detector, there, one, h)]
     if any(map(leads, instead)) and any(map(removes_more, sorted(passing, key=lambda i: bent(detector, more[i])))):
         return None
-    # both begin at the declared number: what either explains is the same but for what is left. Where the
-    # tolerance holds most of the number that is so little that any factor would do: it has to bring the number back
+    # both begin at the declared number: what either explains is the same but for what is left. Where the tolerance
+    # holds most of the number that is so little that any factor would do: beside it the number has to be another one
     (j,) = freed(detector.study, one.hypothesis)
-    most = detector.policy.stands * abs(float(before.x[j]))
+    off = abs(float(before.x[j]))
     fits = {
         h.name for h in declared
-        if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
+        if h.statistic > removed - detector.policy.close
+        and abs(_beside(detector, before, j, h)) < detector.policy.covers * off
     }  # fmt: skip
     rivals = one.rivals + tuple(
         (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in factors_of(detector, j)
@@ -77,7 +78,8 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     family = [h for h in ranked if h.family == one.hypothesis.family and h.name not in known]
     near = [
         h for h in family
-        if h.statistic > removed - detector.policy.close and abs(_beside(detector, before, j, h)) < most
+        if h.statistic > removed - detector.policy.close
+        and abs(_beside(detector, before, j, h)) < detector.policy.stands * off
     ]  # fmt: skip
     # nor is a number out of its tolerance for sure where a cause beside which it is not explains more: too little to be
     # named alone, but more than its family does by chance. At the same place, with no window to choose, it need not:
