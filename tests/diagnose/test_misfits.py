@@ -200,13 +200,13 @@ def test_another_cause_at_the_place_of_a_number_is_its_rival_by_what_it_removes(
 
 
 def test_a_factor_is_no_rival_of_a_number_that_it_does_not_bring_back():
-    """Where freeing a number explains hardly more than its tolerance had let it, any factor explains as much."""
+    """Of a parameter that is estimated within its prior there is little left to explain, and any factor does that."""
     detector = small_case.made_detector()
     _, y = small_case.source_off(4.5)
     start = begun(detector, y)
     relaxed = strained(start, y)
     assert relaxed is not None
-    factors = [h for h in start.scored[1] if h.family == "signal" and fault_of(h).corrects]
+    factors = [h for h in start.scored[1] if fault_of(h).corrects]
     every = [replace(h, statistic=1e9) for h in factors]
     found = closed(replace(start, glance=(*start.glance[:1], [], start.glance[2]), declared=every), y, relaxed)
     assert found is not None

@@ -110,6 +110,15 @@ def test_a_capacity_out_of_its_tolerance_is_one_of_its_node():
     assert cause.amplitude == pytest.approx(1.2**3)
 
 
+@pytest.mark.long
+def test_an_expansion_near_its_bound_has_the_interval_of_its_fit():
+    """No family says how far an expansion of a node may be; one metre per kelvin is none."""
+    detector = small_case.made_detector()
+    j, p = next((i, p) for i, p in enumerate(detector.study.probed.parameters) if p.path == "tcp.expansion.shaft.y")
+    (cause,) = strained_of(replace(nothing(), loose=(Loose(j, 9.5, 0.5, 5.0),)))
+    assert cause.ci95 == pytest.approx([p.value(9.5 - 1.96 * 0.5), p.value(9.5 + 1.96 * 0.5)])
+
+
 def nothing() -> Search:
     """The search of measurements without a cause."""
     detector = small_case.made_detector()

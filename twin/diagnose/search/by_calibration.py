@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.table import family_of_parameter, fault_of
@@ -32,7 +31,10 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
         place, (gain, ci95, unit) = _place(p), _told(detector, own)
         rivals = [rival_of(h, cosine, reading_beside(h)) for h, cosine in own.rivals]
         others = (h for h in unnamed if h.name != place)
-        rivals += [rival_of(h, _cosine(detector, own, h), sensor_between(place, h.name)) for h in others]
+        a = np.sign(own.x) * _response(detector, own.index)
+        for h in others:
+            cosine = _cosine(a, readings_columns(detector, h) @ np.array(h.amplitude))
+            rivals.append(rival_of(h, cosine, sensor_between(place, h.name)))
         as_likely = (o for o in found.loose if o.follows and not result and o.told >= own.told - detector.policy.close)
         rivals += [_rival_number(detector, own, other) for other in as_likely]
         result.append(Cause(
@@ -49,8 +51,7 @@ def _told(detector: Detector, own: Loose) -> tuple[float, tuple[float, float], s
     gain, *both = (p.value(own.x + z * own.sigma) / one for z in (0.0, -sure, sure))
     low, high = sorted(both)
     lowest, highest = (detector.policy.nearly * float(end[own.index]) for end in ends)
-    if own.settled and not lowest < own.x < highest:
-        far = _farthest(detector, own.index, own.x)
+    if own.settled and not lowest < own.x < highest and (far := _farthest(detector, own.index, own.x)) is not None:
         low, high = (low, max(high, far)) if own.x > 0.0 else (min(low, far), high)
     return gain, (low, high), unit
 
@@ -58,9 +59,8 @@ def _told(detector: Detector, own: Loose) -> tuple[float, tuple[float, float], s
 def _rival_number(detector: Detector, first: Loose, other: Loose) -> Rival:
     """Another number out of its tolerance as the rival of the farthest."""
     p, (gain, ci95, unit) = detector.study.probed.parameters[other.index], _told(detector, other)
-    a, b = (np.sign(own.x) * _response(detector, own.index) for own in (first, other))
-    cosine = float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-30)
-    remedy = sensor_between(_place(detector.study.probed.parameters[first.index]), _place(p))
+    cosine = _cosine(*(np.sign(own.x) * _response(detector, own.index) for own in (first, other)))
+    remedy = f"a measurement of {detector.study.probed.parameters[first.index].path}, or of {p.path}, by itself"
     return Rival(family_of_parameter(p), _place(p), CALIBRATED, gain, unit, other.strain**2, cosine, remedy, ci95)
 
 
@@ -70,10 +70,8 @@ def _place(p: Parameter) -> str:
     return ".".join(entry).removeprefix("nodes.")
 
 
-def _cosine(detector: Detector, own: Loose, h: Hypothesis) -> float:
-    """Of what a declared number out of its tolerance and a hypothesis do."""
-    a = np.sign(own.x) * _response(detector, own.index)
-    b = readings_columns(detector, h) @ np.array(h.amplitude)
+def _cosine(a: np.ndarray, b: np.ndarray) -> float:
+    """Of two white responses (m,)."""
     return float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-30)
 
 
@@ -82,12 +80,12 @@ def _response(detector: Detector, j: int) -> np.ndarray:
     return detector.whiten(detector.fitter.linear(np.zeros(len(detector.study.scale)))[1][:, j])
 
 
-def _farthest(detector: Detector, j: int, x: float) -> float:
-    """The factor of a declared number that physics allows, the largest for x > 0, the smallest for x < 0; 1 where no
-    range is known."""
+def _farthest(detector: Detector, j: int, x: float) -> float | None:
+    """The factor of a declared number that physics allows, the largest for x > 0, the smallest for x < 0; None where
+    no range is known."""
     for batch in detector.columns.batches:
         fault = fault_of(batch)
         for name, largest in zip(batch.places, batch.largest, strict=False) if fault.declared else ():
             if parameter_of(detector.study, name) == j:
                 return fault.curve.told(float(np.sign(x)) * largest)
-    return 1.0
+    return None

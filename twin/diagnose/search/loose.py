@@ -47,8 +47,8 @@ def loose_ones(
         if j not in known.settled:
             known.settled[j] = settled_alone(detector.fitter, y, (j,))
         x, covariance = known.settled[j]
-        told, follows = float(fitted.x[j]) ** 2 / (1.0 - variance_of(fitted, j)), bool(beside[j] < 1.0)
         sigma, (alone, spread) = float(np.sqrt(covariance[j, j])), untied(fitted, j)
+        told, follows = alone**2 / (1.0 + spread**2), bool(beside[j] < 1.0)  # beside its prior N(0, 1)
         robust = Loose(j, float(x[j]), sigma, float(strain[j]), told=told, follows=follows)
         efficient = replace(robust, x=alone, sigma=spread, settled=False)
         sure = max(policy.sure, float(np.sqrt(detector.least)))
