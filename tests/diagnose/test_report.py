@@ -116,7 +116,7 @@ SAID = {  # what the reader of each verdict must find
                "The model of the machine is left as it is"),
     "signal": ("signal x_current is at fault: factor, 0.500", "0.480 to 0.520"),
     "too_poor": ("model is too poor",),
-    "nothing": ("Nothing is missing that these data could show", "would have shown, in 95 of 100 cases:", "11.6 W",
+    "nothing": ("nothing else is missing that these data could show", "would have shown, in 95 of 100 cases:", "11.6 W",
                 "3.40 W/(m²·K)", "0.310 K/day", "2.30 µm", "No family of causes passes its threshold"),
 }  # fmt: skip
 
@@ -527,6 +527,8 @@ def test_nothing_says_first_what_calibration_had_to_change():
     pull = Pull("sources.spindle.gain", 1.0, 1.35, 0.5, 1.4, "1", temperature_change=2.0, displacement_change=8e-6)
     text = verdict_sentence(replace(quiet, series=(moved,), pulls=(*d.pulls, pull)))
     assert "within their noise" not in text
+    assert text.startswith("The description as delivered is not right: calibration moved")
+    assert "Nothing is missing" not in text
     for words in ("by 2.00 K", "dy by 9.00 um", "most of it by sources.spindle.gain, 1.35"):
         assert words in text
     second = replace(pull, path="films.bed.gain", temperature_change=0.6, displacement_change=0.0)

@@ -87,14 +87,10 @@ def _evidence(heat: Heat, k: int, s: int, g: np.ndarray) -> float:
     return float(half @ half - heat.charges[k][s])
 
 
-def history(heat: Heat, g: np.ndarray, part: str) -> tuple[str, np.ndarray, np.ndarray]:
-    """The surface that takes most, the heat of the part in every block (n_blocks,) [W] and its standard deviation."""
+def surface_of(heat: Heat, g: np.ndarray, part: str) -> str:
+    """The surface of a part that takes most of its heat."""
     k = heat.parts.index(part)
     s = max(range(len(SIGMAS)), key=lambda s: _evidence(heat, k, s, g))
     root = heat.roots[k][s]
-    mean = root.T @ (root @ g[heat.columns[k]])
-    n = len(heat.R)
-    by_surface = mean.reshape(-1, n)
-    total = root @ np.tile(np.eye(n), (len(by_surface), 1))
-    strongest = int(np.argmax(np.abs(by_surface).sum(axis=1)))
-    return heat.surfaces[k][strongest], by_surface.sum(axis=0), np.sqrt((total**2).sum(axis=0))
+    by_surface = (root.T @ (root @ g[heat.columns[k]])).reshape(-1, len(heat.R))
+    return heat.surfaces[k][int(np.argmax(np.abs(by_surface).sum(axis=1)))]

@@ -131,13 +131,13 @@ def histories_of(study: Study) -> Histories:
     return Histories(signals, speeds, blocks_of(study), unit)
 
 
-def blocks_of(study: Study) -> tuple[tuple[int, int, int], ...]:
-    """(fitted run, first step, end) of blocks of about an hour."""
+def blocks_of(study: Study, length: float = BLOCK) -> tuple[tuple[int, int, int], ...]:
+    """(fitted run, first step, end) of blocks of about so many seconds, an hour by default."""
     blocks: list[tuple[int, int, int]] = []
     for i, k in enumerate(study.fitted):
         run = study.runs[k].run
-        edges = list(range(0, run.drive.n_steps, round(BLOCK / run.step)))
-        if run.drive.n_steps - edges[-1] < BLOCK / run.step / 2 and len(edges) > 1:
+        edges = list(range(0, run.drive.n_steps, max(round(length / run.step), 1)))
+        if run.drive.n_steps - edges[-1] < length / run.step / 2 and len(edges) > 1:
             edges.pop()
         blocks += [(i, a, b) for a, b in zip(edges, [*edges[1:], run.drive.n_steps], strict=True)]
     return tuple(blocks)

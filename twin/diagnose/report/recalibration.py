@@ -39,7 +39,7 @@ def moved_words(d: Diagnosis) -> str:
     clauses = [
         words + (f", most of it by {' and by '.join(map(_value, most))}" if most else "") for words, most in told
     ]
-    return f"first of all, the description as delivered is not right: calibration moved {'; and '.join(clauses)}"
+    return f"the description as delivered is not right: calibration moved {'; and '.join(clauses)}"
 
 
 def left_words(d: Diagnosis) -> str:

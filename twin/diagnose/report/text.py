@@ -143,9 +143,13 @@ def verdict_sentence(d: Diagnosis) -> str:
     if d.verdict == "nothing":
         limits = _seen(d)
         seen = f"; {limit_words(limits[0])}, would have been seen at half of all places" if limits else ""
-        told = [text for text in (moved_words(d), left_words(d)) if text]
-        fits = "" if told else ": within their noise the description explains them"
-        return " ".join([f"Nothing is missing that these data could show{fits}{seen}.", *map(_sentence, told)])
+        moved, left = moved_words(d), left_words(d)
+        fits = "" if moved or left else ": within their noise the description explains them"
+        if moved:
+            head = f"{_sentence(moved)} With that, nothing else is missing that these data could show{seen}."
+        else:
+            head = f"Nothing is missing that these data could show{fits}{seen}."
+        return f"{head} {_sentence(left)}" if left else head
     if d.verdict == "too_poor":
         return _sentence(next((n for n in d.notes if n.startswith("the model is too poor")), "the model is too poor"))
     if d.verdict == "unknown":
@@ -210,7 +214,8 @@ def _unknown_words(d: Diagnosis) -> str:
     if d.unknown is None:
         return "the residuals hold an effect that nothing in the catalogue explains"
     part, surface = d.unknown.part, d.unknown.surface
-    text = f"heat enters part {part}, mostly at {surface}, and nothing in the catalogue explains it"
+    besides = f", and more at {' and '.join(d.unknown.besides)}" if d.unknown.besides else ""
+    text = f"heat enters part {part}, mostly at {surface}{besides}, and nothing in the catalogue explains it"
     hours = [
         (t, q, sigma, run) for run, (time, heat, spread) in d.unknown.history.items()
         for t, q, sigma in zip(time, heat, spread, strict=False) if abs(q) > 0.0

@@ -91,6 +91,7 @@ class Unknown:
     threshold: float
     history: Mapping[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]]  # per run: s, W, sigma W
     correlated_signals: tuple[tuple[str, float], ...]  # logged signals with their correlation, best first
+    besides: tuple[str, ...] = ()  # other surfaces where heat enters with a history of its own
 
 
 @dataclass(frozen=True)

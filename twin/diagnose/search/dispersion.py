@@ -34,14 +34,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import as_scored
 from twin.diagnose.search.contest import worth
 from twin.diagnose.search.detector import FLOOR, Detector, weighted
-from twin.diagnose.search.exact import beginning, misfit_of_each, unexplained
-from twin.diagnose.search.forward import search, search_again
+from twin.diagnose.search.exact import beginning, closer, exact, misfit_of_each, unexplained
+from twin.diagnose.search.forward import naming, search, search_again
 from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.refit import refit
@@ -90,13 +91,33 @@ def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
         first = search(detector, y, start)
     own = replace(dispersion_of(first), weight=weight)
     if own.share > detector.policy.dispersed:
-        own = _with_errors(own, detector, y)
-        wide = raised(described, own)
+        poor = _with_errors(own, detector, y)
+        wide = raised(described, poor)
         found = search(wide, y, begun(wide, y))
-        return (found if found.accepted else search_again(detector, y, start, first, math.inf)), own
+        if (heat := explained_by_heat(first)) > 0.0:
+            named = _closely(detector, y, first, found, heat)
+            return (first, replace(own, left=float(first.left.sum()) - heat, heat=True)) if named is None else named
+        return (found if found.accepted else search_again(detector, y, start, first, math.inf)), poor
     if not (least := own.least(detector.policy)):
         return first, own
     return search_again(detector, y, start, first, least), own
+
+
+def _closely(
+    detector: Detector, y: np.ndarray, first: Search, found: Search, heat: float
+) -> tuple[Search, Dispersion] | None:
+    """The first search with the cause that was named beside slow errors, fitted without them; None where that explains
+    less than `covers` of what heat of any history does."""
+    policy = detector.policy
+    if not found.accepted:
+        return None
+    named = max(found.accepted, key=lambda a: a.statistic)
+    h = closer(detector, y, first.fitted, exact(detector, y, first.fitted, named.hypothesis))
+    if h.statistic < policy.covers * heat:
+        return None
+    one = replace(as_scored(detector.study, h, detector.thresholds[h.family]), rivals=named.rivals)
+    result = naming(first, y, first.fitted.x, [one])
+    return result, dispersion_of(result)
 
 
 def dispersion_of(found: Search) -> Dispersion:
@@ -106,6 +127,26 @@ def dispersion_of(found: Search) -> Dispersion:
     left = float(found.left.sum()) - (heat if passes else 0.0)
     measured = int(np.isfinite(found.residual).sum())
     return Dispersion(left, measured, passes, lasting=_lasting(found))
+
+
+def explained_by_heat(found: Search) -> float:
+    """What heat of any history explains where slow errors of single channels are less likely, else 0 (Bayes factor:
+    Kass, Raftery, J. Am. Stat. Assoc. 90, 1995). It may leave as much as a number out of its tolerance may, since no
+    block is as short as a switch."""
+    evidence = sum(own.evidence for own in found.entering)
+    if not evidence or evidence < _evidence_of_errors(found.detector, found.fitted):
+        return 0.0
+    excess = float(found.left.sum()) - int(np.isfinite(found.residual).sum())
+    return evidence + float(np.clip(excess - evidence, 0.0, (1.0 - found.detector.policy.covers) * evidence))
+
+
+def _evidence_of_errors(detector: Detector, fitted: Fitted) -> float:
+    """Twice the logarithm of that for slow errors of single channels, as learned from what a fit has left."""
+    errors, white = slow_errors(detector, fitted), detector.whiten(fitted.residual)
+    seen = fitted.projector(errors)
+    factor = scipy.linalg.cho_factor(np.eye(errors.shape[1]) + errors.T @ seen, lower=True)
+    known = seen.T @ white
+    return float(known @ scipy.linalg.cho_solve(factor, known)) - 2.0 * float(np.log(np.diag(factor[0])).sum())
 
 
 def weights_of(found: Search, weight: np.ndarray) -> np.ndarray:

@@ -20,12 +20,13 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, possible, settled, strong
-from twin.diagnose.search.contest import foremost, judged, proof, tried, worth
+from twin.diagnose.search.any_heat import entering, switched_on
+from twin.diagnose.search.contest import bent, foremost, judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
-from twin.diagnose.search.exact import beginning, misfit, unexplained
-from twin.diagnose.search.growth import between, chilled, grown
+from twin.diagnose.search.exact import beginning, misfit
+from twin.diagnose.search.growth import between, chilled, grown, within
 from twin.diagnose.search.hotter import hotter
-from twin.diagnose.search.look import Search, Step, distinct, look, with_cosines
+from twin.diagnose.search.look import Search, Step, distinct, look, other_drives, with_cosines
 from twin.diagnose.search.loose import loose_ones
 from twin.diagnose.search.policy import SearchPolicy
 from twin.diagnose.search.refit import refit
@@ -82,7 +83,10 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         named = partial(_named, detector, y, fitted, accepted)
         alone = None if accepted else start.alone
         more = [[*starts, *_starts_alone(alone, starts, policy)] for starts in foremost(detector, ahead)]
-        compared = tried(detector, rest, fitted, more)
+        more = _starts_entering(detector, fitted, seen, step.parts, more)
+        drives = [other for h in passing[: policy.ahead] for other in other_drives(seen, h, policy)]
+        as_scores = [h for h in drives if not bent(detector, h)]
+        compared = tried(detector, rest, fitted, [*more, *([h] for h in drives if bent(detector, h))])
         proved, others = judged(detector, rest, fitted, compared, named)
         enough = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
         standing = [h for h in enough if possible(detector, h, h.amplitude[0])]
@@ -90,10 +94,10 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
             continue
-        standing = _covering(detector, standing, step.parts)
+        standing = _covering(detector, fitted, seen, step.parts, standing)
         if not standing:
             break
-        one, rivals = standing[0], _rivals(detector, fitted, standing[0], [*standing, *others, *ranked])
+        one, rivals = standing[0], _rivals(detector, fitted, standing[0], [*standing, *others, *ranked, *as_scores])
         accepted.append(replace(as_scored(detector.study, one, detector.thresholds[one.family]), rivals=rivals))
         fitted, accepted = refit(detector, y, beginning(fitted.x, policy), accepted)
         while weak := [a for a in accepted if not stands(detector, a)]:
@@ -109,9 +113,20 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
             steps.append(step)
     if accepted:  # which may have been all that made it seem hotter
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
-    return Search(
-        detector, start.x0, x, tuple(accepted), tuple(steps), fitted.residual, seen.g, seen.heat, covariance,
-        unexplained(detector, fitted), loose,
+    left = entering(detector, fitted, seen, steps[-1].parts, policy.entering)
+    return Search(detector, start.x0, x, tuple(accepted), tuple(steps), fitted, left, covariance, loose)
+
+
+def naming(found: Search, y: np.ndarray, x: np.ndarray, causes: Sequence[Accepted]) -> Search:
+    """A search in y (m,) as if it had named these causes, refitted from parameters x (n,)."""
+    detector = found.detector
+    fitted, accepted = refit(detector, y, beginning(x, detector.policy), causes)
+    seen, _, step = look(detector, fitted)
+    x, covariance = settled(detector, y, accepted)
+    left = entering(detector, fitted, seen, step.parts, detector.policy.entering)
+    return replace(
+        found, x=x, accepted=tuple(accepted), steps=(*found.steps, step), fitted=fitted, entering=left,
+        covariance=covariance,
     )  # fmt: skip
 
 
@@ -150,15 +165,21 @@ def _passing(
     ]  # fmt: skip
 
 
-def _covering(detector: Detector, standing: Sequence[Hypothesis], parts: dict[str, float]) -> list[Hypothesis]:
-    """Those that explain what heat of any history would, which pays for its freedom: less has imitated it."""
-    free, policy = max(parts.values(), default=0.0), detector.policy
+def _covering(
+    detector: Detector, fitted: Fitted, seen: Sight, parts: dict[str, float], standing: Sequence[Hypothesis]
+) -> list[Hypothesis]:
+    """Those that explain what heat of any history would, which pays for its freedom: less has imitated it. What
+    switches may imitate it within the hours that parts are looked at by, too."""
+    by_hour, policy = max(parts.values(), default=0.0), detector.policy
+    if by_hour <= detector.thresholds["unknown"]:
+        return list(standing)
+    switching = [_switches(h) for h in standing]
+    finer = [own.evidence for own in entering(detector, fitted, seen, parts)] if any(switching) else []
+    free = [max([by_hour, *finer]) if switches else by_hour for switches in switching]
     return [
-        h for h in standing
-        if free <= detector.thresholds["unknown"] or (
-            (h.statistic > min(policy.covers * free, free - detector.no_evidence) or fault_of(h).several)
-            and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
-        )
+        h for h, own in zip(standing, free, strict=True)
+        if (h.statistic > min(policy.covers * own, own - detector.no_evidence) or fault_of(h).several)
+        and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
     ]  # fmt: skip
 
 
@@ -189,6 +210,27 @@ def _starts_alone(alone: Alone | None, starts: Sequence[Hypothesis], policy: Sea
     more = [between(h), *([] if own is None else _starts(seen, own, policy))]
     known = [s.when.windows for s in starts]
     return [s for s in more if s is not None and s.when.windows not in known]
+
+
+def _starts_entering(
+    detector: Detector, fitted: Fitted, seen: Sight, parts: dict[str, float], candidates: list[list[Hypothesis]]
+) -> list[list[Hypothesis]]:
+    """What switches at the part where heat of any history enters also begins in the hours in which that is there, and
+    between them: at a light part a window that is off by an hour leaves more than most other causes do."""
+    if not any(_switches(h) for h, *_ in candidates):
+        return candidates
+    for own in entering(detector, fitted, seen, parts):
+        windows = switched_on(detector, own)
+        for starts in candidates:
+            h = starts[0]
+            if _switches(h) and fault_of(h).grows and own.part in _parts(detector.study, h.name):
+                there = within(h, windows)
+                starts += [there, *([] if (other := between(there)) is None else [other])]
+    return candidates
+
+
+def _switches(h: Hypothesis) -> bool:
+    return bool(h.when.windows) and h.when.bell is None
 
 
 def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
@@ -279,5 +321,8 @@ def _rivals(
         if h.statistic > 0.5 * detector.thresholds[h.family]
         and (h.statistic > chosen.statistic - near or worthy(h) > worthy(chosen) - near)
     ]  # fmt: skip
-    others = distinct([chosen, *sorted(likely, key=lambda h: -h.statistic)])[1:9]
-    return with_cosines(detector, fitted, chosen, others)
+    ordered = [chosen, *sorted(likely, key=lambda h: -h.statistic)]
+    same = [h for h in ordered if (h.family, h.name) == (chosen.family, chosen.name)]
+    drives = list({h.when.signal: h for h in reversed(same) if h.when.signal != chosen.when.signal}.values())
+    others = [*(drives if chosen.when.signal else ()), *distinct(ordered)[1:]]
+    return with_cosines(detector, fitted, chosen, others[:8])

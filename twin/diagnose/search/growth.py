@@ -162,6 +162,13 @@ def between(h: Hypothesis) -> Hypothesis | None:
     return in_windows(replace(h, when=when, amplitude=(h.amplitude[0], -h.amplitude[1])), found, spans)
 
 
+def within(h: Hypothesis, windows: Sequence[Window]) -> Hypothesis:
+    """A hypothesis that switches, in given windows of its blocks."""
+    parts = _blocks(h.batch.histories)
+    when = replace(h.when, weights=_acting(parts, windows), windows=tuple(windows))
+    return in_windows(replace(h, when=when), windows, _spans(parts))
+
+
 def _plain(h: Hypothesis, g: np.ndarray, block: np.ndarray, sign: int, policy: SearchPolicy) -> Hypothesis | None:
     """A coolant's heat of one sign without its film, in the windows that it likes best; None if it explains nothing."""
     histories = tuple(replace(w, weights=w.weights[1:]) for w in h.batch.histories)

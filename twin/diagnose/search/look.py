@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
 
-from twin.diagnose.evidence.batch import Hypothesis, best
+from twin.diagnose.evidence.batch import Hypothesis, best, score
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight, sight
-from twin.diagnose.evidence.unknown import Heat, evidence
+from twin.diagnose.evidence.unknown import evidence
 from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.lost import lost_candidates
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, curved_change, motion, readings_columns
+from twin.diagnose.search.any_heat import Entering
 from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.exact import unexplained
+from twin.diagnose.search.policy import SearchPolicy
 
 
 @dataclass(frozen=True)
@@ -39,12 +43,20 @@ class Search:
     x: np.ndarray  # (n,) and with the accepted ones
     accepted: tuple[Accepted, ...]
     steps: tuple[Step, ...]  # one more than were accepted, the dropped ones among them
-    residual: np.ndarray  # (m,) linearised, of the last fit, accepted amplitudes left in
-    g: np.ndarray  # (n_columns,) after the accepted ones
-    heat: Heat  # likewise
+    fitted: Fitted  # the last fit, accepted amplitudes left in its residual
+    entering: tuple[Entering, ...]  # heat that is left, the strongest first
     covariance: np.ndarray  # (n, n) of x
-    unexplained: np.ndarray  # (m,) of the last fit: the white residual less what everything explains
     loose: tuple[Loose, ...] = ()  # declared numbers out of their tolerance, the farthest first
+
+    @property
+    def residual(self) -> np.ndarray:
+        """(m,) linearised, accepted amplitudes left in."""
+        return self.fitted.residual
+
+    @cached_property
+    def unexplained(self) -> np.ndarray:
+        """(m,) the white residual less what everything explains."""
+        return unexplained(self.detector, self.fitted)
 
     @property
     def left(self) -> np.ndarray:
@@ -83,6 +95,22 @@ def look(
     ranked = distinct(sorted([*hypotheses, *more], key=lambda h: -h.statistic))
     top = ranked[:10]
     return seen, ranked, Step(tuple(top), cosines(detector, fitted, top), seen.largest(), evidence(seen.heat, seen.g))
+
+
+def other_drives(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis]:
+    """A hypothesis that follows a signal with every other signal, at its best, where that scores nearly as much."""
+    if not h.when.signal:
+        return []
+    own = next(own for own in seen.ready if own.batch is h.batch)
+    scores = score(own, seen.g)
+    statistic, amplitude = scores.statistic[h.place], scores.amplitude[h.place]
+    best = dict[str, Hypothesis]()
+    for i in np.argsort(-statistic):
+        when = h.batch.histories[i]
+        if statistic[i] > (1.0 - policy.behind) * h.statistic and when.signal not in ("", h.when.signal):
+            other = Hypothesis(h.batch, h.place, when, float(statistic[i]), tuple(map(float, amplitude[i])))
+            best.setdefault(when.signal, other)
+    return list(best.values())
 
 
 def with_cosines(

@@ -53,6 +53,7 @@ class SearchPolicy:
     switches: int = _rule(
         4, FIVE_AXIS, "windows of a cause at one place: of more the history is one that no name tells"
     )
+    entering: int = _rule(2, JUDGED, "places at most of heat of any history, which more of explain anything")
     few: int = _rule(2, FIVE_AXIS, "windows that a cause may have and still leave heat where it is")
     left: float = _rule(0.5, FIVE_AXIS, "of the threshold of heat of any history: what windows may leave of it")
     misfit: float = _rule(0.003, DERIVED, "of what a cause explains: a response wrong by a twentieth leaves 0.05^2")

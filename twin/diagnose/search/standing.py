@@ -12,10 +12,8 @@ from twin.diagnose.faults.acted import ended, units_of
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import Accepted, settled
-from twin.diagnose.search.exact import beginning, unexplained
-from twin.diagnose.search.forward import stands
-from twin.diagnose.search.look import Search, look
-from twin.diagnose.search.refit import refit
+from twin.diagnose.search.forward import naming, stands
+from twin.diagnose.search.look import Search
 from twin.diagnose.search.sealed import Judged, judged
 from twin.diagnose.search.verdict import verdict_of, with_faults
 
@@ -97,14 +95,7 @@ def _weakest(found: Search, families: Sequence[Family]) -> Accepted | None:
 
 def without(found: Search, y: np.ndarray, one: Accepted) -> Search:
     """A search in y (m,) as if a cause had not been named."""
-    detector, left = found.detector, [a for a in found.accepted if a is not one]
-    fitted, accepted = refit(detector, y, beginning(found.x, detector.policy), left)
-    seen, _, step = look(detector, fitted)
-    x, covariance = settled(detector, y, accepted)
-    return replace(
-        found, x=x, accepted=tuple(accepted), steps=(*found.steps, step), residual=fitted.residual, g=seen.g,
-        heat=seen.heat, covariance=covariance, unexplained=unexplained(detector, fitted),
-    )  # fmt: skip
+    return naming(found, y, found.x, [a for a in found.accepted if a is not one])
 
 
 def beside_sensors(found: Search, y: np.ndarray, families: Sequence[Family]) -> Search:

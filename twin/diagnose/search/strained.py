@@ -19,7 +19,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, possible, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import ALARM, Detector
-from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, unbent, unexplained
+from twin.diagnose.search.exact import beginning, by_chance, exact, misfit, unbent
 from twin.diagnose.search.look import Search, distinct, look, with_cosines
 from twin.diagnose.search.loose import Freed, factors_of, variance_of
 from twin.diagnose.search.refit import refit
@@ -33,7 +33,7 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     detector, before, declared, loose = start.detector, start.fitted, start.declared, start.loose
     fitted, one = relaxed
     _, ranked, first = start.glance
-    seen, left, last = look(detector, fitted)
+    _, left, last = look(detector, fitted)
     misfits = (1.0 - detector.policy.covers) * one.statistic  # that it may leave
     room = max(detector.thresholds["unknown"], misfits)
     if not _weak(detector, left, misfits) or max(last.parts.values(), default=0.0) > room:
@@ -105,10 +105,7 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         amplitude=np.array([amplitude]), covariance=np.array([[variance]]),
     )  # fmt: skip
     x, covariance = settled(detector, y, (one,))
-    return Search(
-        detector, start.x0, x, (one,), (first, last), fitted.residual, seen.g, seen.heat, covariance,
-        unexplained(detector, fitted), loose,
-    )  # fmt: skip
+    return Search(detector, start.x0, x, (one,), (first, last), fitted, (), covariance, loose)
 
 
 def _often(detector: Detector, family: str) -> float:

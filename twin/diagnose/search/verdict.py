@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from twin.diagnose.evidence.fitter import bounds
-from twin.diagnose.evidence.unknown import history
 from twin.diagnose.faults.fault import Described, Family
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause, Pull, Unknown, Verdict
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, freed
+from twin.diagnose.search.any_heat import heat_blocks
 from twin.diagnose.search.by_calibration import strained_of
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -111,29 +111,27 @@ def _more_alike(found: Search, left: float) -> bool:
 
 def unknown_of(found: Search) -> Unknown | None:
     """The unknown heat, where its evidence passes."""
-    detector = found.detector
-    parts = found.steps[-1].parts
-    if not parts or max(parts.values()) <= detector.thresholds["unknown"]:
+    if not found.entering:
         return None
-    part = max(parts, key=lambda p: parts[p])
-    surface, heat, sigma = history(found.heat, found.g, part)
-    study = detector.study
-    histories = {}
-    blocks = detector.elements.histories.blocks
+    (first, *others), study = found.entering, found.detector.study
+    blocks, told, histories = heat_blocks(study), first.told, {}
     for k, (name, dt) in zip(study.fitted, study.fitted_runs, strict=True):
         own = [b for b, (i, _, _) in enumerate(blocks) if i == k]
         when = tuple((blocks[b][1] + blocks[b][2]) / 2 * dt for b in own)
-        histories[name] = (when, tuple(map(float, heat[own])), tuple(map(float, sigma[own])))
+        histories[name] = (when, tuple(map(float, told.heat[own])), tuple(map(float, told.sigma[own])))
     correlated = []
     for signal in study.runs[0].run.signals:
         means = []
         for i, start, end in blocks:
             values = study.runs[i].run.signals.get(signal)
             means.append(float(np.abs(values[start:end]).mean()) if values is not None else 0.0)
-        if np.ptp(means) > 0 and np.ptp(heat) > 0:
-            correlated.append((signal, float(np.corrcoef(means, heat)[0, 1])))
+        if np.ptp(means) > 0 and np.ptp(told.heat) > 0:
+            correlated.append((signal, float(np.corrcoef(means, told.heat)[0, 1])))
     correlated.sort(key=lambda s: -abs(s[1]))
-    return Unknown(part, surface, parts[part], detector.thresholds["unknown"], histories, tuple(correlated[:5]))
+    return Unknown(
+        first.part, first.surface, first.evidence, found.detector.thresholds["unknown"], histories,
+        tuple(correlated[:5]), tuple(own.surface for own in others),
+    )  # fmt: skip
 
 
 def _moves(change: np.ndarray, study: Study) -> tuple[np.ndarray, np.ndarray]:

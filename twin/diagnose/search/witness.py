@@ -19,11 +19,12 @@ from twin.calibrate.channels.finding import Finding
 from twin.calibrate.channels.judge import Judgement, judge, set_aside, share
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.fitter import Fitted, Fitter
-from twin.diagnose.evidence.whiten import measured_of
+from twin.diagnose.evidence.whiten import Projector, measured_of
 from twin.diagnose.faults.channels_check import FAMILY, channels_at_fault, warmer_air
 from twin.diagnose.model.study import Study, with_measured
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import readings_columns
+from twin.diagnose.search.any_heat import entering
 from twin.diagnose.search.detector import Detector, emptied
 from twin.diagnose.search.exact import misfit_of_each
 from twin.diagnose.search.look import look
@@ -150,14 +151,21 @@ def _told(
     detector: Detector, fitted: Fitted, columns: np.ndarray, warmer: np.ndarray, threshold: float
 ) -> tuple[float, float, float]:
     """By how many times the white column warmer (m,) the air was colder, the information on it, and the statistic that
-    it needs: beside the cause that explains the most, where that is more than other air does, as what such a cause
-    leaves looks like other air, too. columns: of that air."""
+    it needs: beside the cause that explains the most, or heat of any history, where that is more than other air does,
+    as what either leaves looks like other air, too. columns: of that air."""
     white, policy = detector.whiten(fitted.residual), detector.policy
     seen = fitted.projector(warmer)
     g, information = float(seen @ white), float(seen @ warmer)
-    causes = (h for h in look(detector, fitted)[1] if not np.isin(h.combination()[0], columns).any())
+    sight, ranked, step = look(detector, fitted)
+    causes = (h for h in ranked if not np.isin(h.combination()[0], columns).any())
     leader, explained = next(causes, None), g**2 / max(information, 1e-30)
-    if leader is not None and leader.statistic > explained + max(policy.rival, policy.misfit * explained):
+    heat = entering(detector, fitted, sight, step.parts)
+    evidence = sum(own.evidence for own in heat)
+    if evidence > max(explained + policy.rival, 0.0 if leader is None else leader.statistic):
+        seen = Projector.of(*fitted.projector.blocks, *(own.told.responses for own in heat))(warmer)
+        g, information = float(seen @ white), float(seen @ warmer)
+        threshold = max(threshold, policy.misfit * evidence)
+    elif leader is not None and leader.statistic > explained + max(policy.rival, policy.misfit * explained):
         D = readings_columns(detector, leader)
         PD = fitted.projector(D)
         beside = warmer - D @ np.linalg.lstsq(D.T @ PD, PD.T @ warmer, rcond=None)[0]

@@ -1,0 +1,168 @@
+"""Effects that no entry of the catalogue has, hidden in drawn networks: `python -m benchmarks.drawn_outside FIRST N`.
+
+As `benchmarks.drawn_machines`, of the same machines and beside their measurements with nothing hidden: heat of
+irregular histories that no log has, at one node or at two, and two nodes that are joined without the description
+knowing. The right verdict is "unknown"; a name is wrong. A row per trial goes to out/drawn/outside_SEED.jsonl, and
+files that are there are not made again.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.drawn_machines import (
+    OUT,
+    SHARE,
+    drawn_of,
+    logs_of,
+    moved,
+    power_of,
+    said,
+    set_up,
+    simulated,
+)
+from benchmarks.rows import Row, counted, of_seeds
+from twin.cli.main import run as command
+from twin.errors import TwinError
+from twin.inject.machines.drawn import DrawnMachine
+from twin.logs.read import read_run
+from twin.logs.run import Run
+from twin.logs.write import write_run
+from twin.machine.description import Machine
+from twin.machine.load import load_machine
+
+HOUR = 3600.0  # s
+SWITCH = "hidden_"  # columns that `twin hide` adds
+RAMP = 0.7 * HOUR  # s, from no heat to all of it, of slow histories: those of the five-axis trials
+LEVELS = (-1.0, -0.4, 0.0, 0.6, 1.0)  # between which slow histories change at random, likewise
+
+
+@dataclass(frozen=True)
+class Outside:
+    """An effect: slow (random levels of both signs, with ramps) or switched (on and off at random) heat at nodes, or
+    a joint between two."""
+
+    history: str
+    nodes: tuple[str, ...]
+    size: float  # W, or W/K of a joint
+
+
+def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Outside]:
+    """One of each kind, places drawn from the machine's seed. power: W, of all sources in the mean."""
+    rng = np.random.default_rng([drawn.seed, 55])
+    nodes = list(machine.nodes)
+    heat = 2.0 * max(SHARE * power, 5.0)
+
+    def some(n: int) -> tuple[str, ...]:
+        return tuple(str(name) for name in rng.choice(nodes, n, replace=False))
+
+    found = [Outside("slow", some(1), heat), Outside("switched", some(1), heat), Outside("switched", some(2), heat)]
+    joined = {frozenset(c.surfaces) for c in machine.contacts.values() if c.surfaces}
+    joined |= {frozenset(pair) for c in machine.contacts.values() for pair in c.pairs}
+    totals = [float(c.total) for c in machine.contacts.values() if c.total]
+    free = [(a, b) for i, a in enumerate(nodes) for b in nodes[i + 1 :] if frozenset((a, b)) not in joined]
+    for pair in rng.permutation(free).tolist() if totals else ():
+        own = Outside("joint", tuple(pair), float(np.median(totals)))
+        try:
+            load_machine(Path("machine.toml"), with_joint(drawn.text, own))
+        except TwinError:  # an axis would carry both sides of its guides
+            continue
+        return [*found, own]
+    return found
+
+
+def with_joint(text: str, hidden: Outside) -> str:
+    """A description with two nodes joined."""
+    a, b = hidden.nodes
+    joint = f'kind = "fixed"\nsurfaces = ["{a}", "{b}"]\ntotal = "{hidden.size:.4g} W/K"\n'
+    return f"{text}\n[contacts.unknown]\n{joint}"
+
+
+def slow(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:
+    """Random levels for 0.4 h and 1.3 h more in the mean each, with ramps between them, at times (n,) s."""
+    edges = np.cumsum(rng.exponential(1.3 * HOUR, 40) + 0.4 * HOUR)
+    target = rng.choice(LEVELS, 41)[np.searchsorted(edges, time)]
+    ramp, now = np.empty(len(time)), 0.0
+    for k, step in enumerate(np.diff(time, prepend=time[0])):
+        now += float(np.clip(target[k] - now, -step / RAMP, step / RAMP))
+        ramp[k] = now
+    return ramp
+
+
+def switched(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:
+    """0 or 1 for 0.2 h and 0.5 h more in the mean each, at times (n,) s."""
+    edges = np.cumsum(rng.exponential(0.5 * HOUR, 100) + 0.2 * HOUR)
+    return (np.searchsorted(edges, time) % 2).astype(float)
+
+
+HISTORIES = {"slow": slow, "switched": switched}
+
+
+def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Outside, seed: int) -> list[Path]:
+    """Runs of a real machine with an effect; none where it cannot be hidden there."""
+    real, logs = folder / "real_0", logs_of(folder)
+    if hidden.history == "joint":
+        text = (real / "machine.toml").read_text(encoding="utf-8")
+        (out / "real").mkdir(parents=True)
+        (out / "real" / "machine.toml").write_text(with_joint(text, hidden), encoding="utf-8")
+        return simulated(out / "real", logs, out, drawn, seed)
+    for i, node in enumerate(hidden.nodes):
+        told = ["heat_source", node, f"{hidden.size:.4g} W", str(real), "-o", str(out / f"real_{i}"), "--to", "1 h"]
+        if command(["hide", *told, *(word for log in logs for word in ("--run", str(log)))]):
+            return []
+        real = out / f"real_{i}"
+        logs = [real / "runs" / log.name for log in logs]
+    rng = np.random.default_rng([drawn.seed, seed])
+    return simulated(real, [_with_histories(log, hidden, rng) for log in logs], out, drawn, seed)
+
+
+def _with_histories(log: Path, hidden: Outside, rng: np.random.Generator) -> Path:
+    """The log with a history in the column of each hidden switch."""
+    run = read_run(log)
+    made = {c: HISTORIES[hidden.history](rng, run.loads.time) for c in run.loads.columns if c.startswith(SWITCH)}
+    write_run(log, replace(run, loads=replace(run.loads, columns={**run.loads.columns, **made})))
+    return log
+
+
+def _seen(run: Run) -> Run:
+    """A run without the columns of hidden switches."""
+    columns = {c: values for c, values in run.loads.columns.items() if not c.startswith(SWITCH)}
+    units = {c: run.loads.units[c] for c in columns}
+    return replace(run, loads=replace(run.loads, columns=columns, units=units))
+
+
+def answer(row: Row) -> str:
+    """What a row is worth: "unknown", which is right, "too_poor", "nothing", or "wrong": a name."""
+    return row["verdict"] if row["verdict"] in ("unknown", "too_poor", "nothing") else "wrong"
+
+
+def judged(seed: int) -> list[Row]:
+    """A row per effect of one machine."""
+    with TemporaryDirectory() as folder:
+        return _judged(drawn_of("lumped", seed), Path(folder))
+
+
+def _judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
+    machine, healthy, detector = set_up(drawn, folder)
+    sound = [read_run(p) for p in healthy[0]]
+    rows = []
+    for i, hidden in enumerate(effects(drawn, machine, power_of(detector.study))):
+        if made := measured(drawn, folder, folder / f"effect_{i}", hidden, 60 + i):
+            own = [_seen(read_run(p)) for p in made]
+            row = said(detector, (hidden.history, *hidden.nodes, f"{hidden.size:.3g}"), own)
+            rows.append(row | {"moved": moved(own, sound)})
+    return rows
+
+
+def main(first: int, count: int) -> None:
+    rows = of_seeds(OUT, "outside", range(first, first + count), judged)
+    counted(rows, answer, lambda row: f"{row['hidden'][0]} at {len(row['hidden']) - 2}")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))
