@@ -111,6 +111,21 @@ def test_a_capacity_out_of_its_tolerance_is_one_of_its_node():
 
 
 @pytest.mark.long
+def test_what_may_be_nought_within_its_tolerance_is_told_as_it_is():
+    """Minus nine times a tenth of a micrometre per kelvin says less than minus 0.9 um/K."""
+    found = nothing()
+    study = found.detector.study
+    j, p = next((i, p) for i, p in enumerate(study.probed.parameters) if p.path == "tcp.expansion.housing.x")
+    known = list(study.probed.parameters)
+    known[j] = replace(p, nominal=-1e-7)
+    study = replace(study, probed=replace(study.probed, parameters=tuple(known)))
+    found = replace(found, detector=replace(found.detector, study=study), loose=(Loose(j, 3.0, 0.5, 1.5),))
+    (cause,) = strained_of(found)
+    assert cause.unit == p.unit == "m/K"
+    assert cause.amplitude == pytest.approx(-1e-7 + 3.0 * p.sigma)
+
+
+@pytest.mark.long
 def test_an_expansion_near_its_bound_has_the_interval_of_its_fit():
     """No family says how far an expansion of a node may be; one metre per kelvin is none."""
     detector = small_case.made_detector()

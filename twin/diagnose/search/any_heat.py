@@ -72,7 +72,7 @@ def heat_blocks(study: Study) -> tuple[tuple[int, int, int], ...]:
 
 
 def switched_on(detector: Detector, own: Entering) -> tuple[Window, ...]:
-    """In every run the window that, beside a straight line, heat tells best: a fit without what switches has bent
+    """In every run the window that heat tells best beside a linear trend: a fit without what switches has bent
     parameters, which drift."""
     study, blocks, windows = detector.study, heat_blocks(detector.study), list[Window]()
     for i, (name, step) in enumerate(study.fitted_runs):
@@ -83,7 +83,7 @@ def switched_on(detector: Detector, own: Entering) -> tuple[Window, ...]:
 
 
 def step_of(heat: np.ndarray) -> tuple[int, int]:
-    """First and end of the blocks in which heat (b,) differs most from a straight line through all others: of all
+    """First and end of the blocks in which heat (b,) differs most from a linear trend: of all
     windows the one that leaves least of it; of two halves of a run the one with more heat."""
     n = len(heat)
     line = np.linalg.qr(np.column_stack([np.ones(n), np.arange(n)]))[0]
@@ -91,7 +91,7 @@ def step_of(heat: np.ndarray) -> tuple[int, int]:
     sums = np.vstack([np.zeros(3), np.cumsum(np.column_stack([left, line]), axis=0)])
     within = sums[None, :] - sums[:, None]  # (first, end, 3)
     length = np.arange(n + 1)[None, :] - np.arange(n + 1)[:, None]
-    beside = length - (within[..., 1:] ** 2).sum(axis=-1)  # of the window's square, beside the line
+    beside = length - (within[..., 1:] ** 2).sum(axis=-1)  # of the window's square, beside the trend
     explained = np.where((length > 0) & (beside > 0.5), within[..., 0] ** 2 / np.maximum(beside, 0.5), 0.0)
     first, end = (int(k) for k in np.unravel_index(int(np.argmax(explained)), explained.shape))
     if within[first, end, 0] < 0.0 and (first == 0) != (end == n):

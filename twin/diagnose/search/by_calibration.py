@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.table import family_of_parameter, fault_of
 from twin.diagnose.result.diagnosis import Cause, Rival
 from twin.diagnose.search.accepted import parameter_of, readings_columns
+from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.look import Search
+from twin.diagnose.search.look import Search, distinct
 from twin.diagnose.search.rivals import reading_beside, rival_of, sensor_between
+from twin.diagnose.search.strained import beside, often
 from twin.rom.parameter import Parameter
 
 CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it is no extension of the model
@@ -20,8 +23,9 @@ CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it
 def strained_of(found: Search) -> tuple[Cause, ...]:
     """Declared parameters that calibration alone moved out of their tolerance, at their values without one. Of one that
     has come near a bound of the calibration, the interval reaches as far as physics allows. What passes its threshold
-    beside them and could not be named is their rival. One that is within its tolerance where the farthest has none is
-    that one's doing, or, where it explains as much without its own, its rival."""
+    beside them and could not be named is their rival, and what explains more than a number does without its tolerance,
+    more than its family does by chance, and brings the number back. One that is within its tolerance where the farthest
+    has none is that one's doing, or, where it explains as much without its own, its rival."""
     result, detector = list[Cause](), found.detector
     unnamed = [h for h in found.steps[-1].ranked if h.statistic > detector.thresholds[h.family]]
     for own in found.loose:
@@ -30,11 +34,12 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
         p = detector.study.probed.parameters[own.index]
         place, (gain, ci95, unit) = _place(p), _told(detector, own)
         rivals = [rival_of(h, cosine, reading_beside(h)) for h, cosine in own.rivals]
-        others = (h for h in unnamed if h.name != place)
+        others = (h for h in distinct([*unnamed, *_likelier(found, own)]) if h.name != place)
         a = np.sign(own.x) * _response(detector, own.index)
         for h in others:
             cosine = _cosine(a, readings_columns(detector, h) @ np.array(h.amplitude))
-            rivals.append(rival_of(h, cosine, sensor_between(place, h.name)))
+            alone = p.kind == "expansion" or fault_of(h).read
+            rivals.append(rival_of(h, cosine, _measured(p) if alone else sensor_between(place, h.name)))
         as_likely = (o for o in found.loose if o.follows and not result and o.told >= own.told - detector.policy.close)
         rivals += [_rival_number(detector, own, other) for other in as_likely]
         result.append(Cause(
@@ -44,10 +49,21 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
     return tuple(sorted(result, key=lambda c: -c.statistic))
 
 
+def _likelier(found: Search, own: Loose) -> list[Hypothesis]:
+    detector, policy = found.detector, found.detector.policy
+    limit = detector.pulls.fitted.limit[own.index]
+    return [
+        h for h in found.steps[-1].ranked
+        if h.statistic > max(own.told + policy.close, often(detector, h.family)) and not bent(detector, h)
+        and abs(beside(detector, found.fitted, own.index, h)) < limit
+    ]  # fmt: skip
+
+
 def _told(detector: Detector, own: Loose) -> tuple[float, tuple[float, float], str]:
-    """A number without its tolerance, as a factor with its 95 % interval; of what is declared as nought the value."""
+    """A number without its tolerance, as a factor with its 95 % interval; of what is declared as nought, or may be that
+    within its tolerance, the value."""
     p, sure, ends = detector.study.probed.parameters[own.index], detector.policy.sure, bounds(detector.study)
-    unit, one = ("1", p.nominal) if p.nominal else (p.unit, 1.0)
+    unit, one = ("1", p.nominal) if p.scale == "log" or abs(p.nominal) > p.sigma else (p.unit, 1.0)
     gain, *both = (p.value(own.x + z * own.sigma) / one for z in (0.0, -sure, sure))
     low, high = sorted(both)
     lowest, highest = (detector.policy.nearly * float(end[own.index]) for end in ends)
@@ -60,8 +76,12 @@ def _rival_number(detector: Detector, first: Loose, other: Loose) -> Rival:
     """Another number out of its tolerance as the rival of the farthest."""
     p, (gain, ci95, unit) = detector.study.probed.parameters[other.index], _told(detector, other)
     cosine = _cosine(*(np.sign(own.x) * _response(detector, own.index) for own in (first, other)))
-    remedy = f"a measurement of {detector.study.probed.parameters[first.index].path}, or of {p.path}, by itself"
+    remedy = _measured(detector.study.probed.parameters[first.index], p)
     return Rival(family_of_parameter(p), _place(p), CALIBRATED, gain, unit, other.strain**2, cosine, remedy, ci95)
+
+
+def _measured(*numbers: Parameter) -> str:
+    return f"a measurement of {', or of '.join(p.path for p in numbers)}{',' if numbers[1:] else ''} by itself"
 
 
 def _place(p: Parameter) -> str:

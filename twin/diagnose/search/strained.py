@@ -67,7 +67,7 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     fits = {
         h.name for h in declared
         if h.statistic > removed - detector.policy.close
-        and abs(_beside(detector, before, j, h)) < detector.policy.covers * off
+        and abs(beside(detector, before, j, h)) < detector.policy.covers * off
     }  # fmt: skip
     rivals = one.rivals + tuple(
         (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in factors_of(detector, j)
@@ -79,7 +79,7 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     near = [
         h for h in family
         if h.statistic > removed - detector.policy.close
-        and abs(_beside(detector, before, j, h)) < detector.policy.stands * off
+        and abs(beside(detector, before, j, h)) < detector.policy.stands * off
     ]  # fmt: skip
     # nor is a number out of its tolerance for sure where a cause beside which it is not explains more: too little to be
     # named alone, but more than its family does by chance. At the same place, with no window to choose, it need not:
@@ -88,7 +88,7 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     known |= {h.name for h, _ in rivals}
     likely = [
         h for h in more[: detector.policy.others]
-        if h.name not in known and h.statistic > max(removed + detector.policy.close, _often(detector, h.family))
+        if h.name not in known and h.statistic > max(removed + detector.policy.close, often(detector, h.family))
         and not bent(detector, h) and not _stays(detector, there, one, h)
     ]  # fmt: skip
     here = [
@@ -108,7 +108,7 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     return Search(detector, start.x0, x, (one,), (first, last), fitted, (), covariance, loose)
 
 
-def _often(detector: Detector, family: str) -> float:
+def often(detector: Detector, family: str) -> float:
     """The statistic that a family reaches in ALARM of all synthetic measurements."""
     values = detector.nulls[family]
     return float(np.quantile(values, 1.0 - ALARM)) if len(values) else 0.0
@@ -151,10 +151,10 @@ def _does_the_same(detector: Detector, one: Accepted, cosine: float, heat: float
 def _stays(detector: Detector, fitted: Fitted, one: Accepted, other: Hypothesis) -> bool:
     """Whether a declared number is as far out of its tolerance beside another cause, to first order."""
     (j,) = freed(detector.study, one.hypothesis)
-    return abs(_beside(detector, fitted, j, other)) > detector.policy.beyond
+    return abs(beside(detector, fitted, j, other)) > detector.policy.beyond
 
 
-def _beside(detector: Detector, fitted: Fitted, j: int, h: Hypothesis) -> float:
+def beside(detector: Detector, fitted: Fitted, j: int, h: Hypothesis) -> float:
     """A parameter beside a hypothesis, to first order."""
     columns = readings_columns(detector, h)
     free = detector.policy.wide * columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-30)
