@@ -13,7 +13,6 @@ from twin.diagnose.search.any_heat import _responses, entering, heat_blocks, ste
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.dispersion import searched
 from twin.diagnose.search.look import look
-from twin.diagnose.search.start import begun
 from twin.diagnose.search.verdict import unknown_of, verdict_of
 
 
@@ -71,9 +70,10 @@ def test_noise_is_no_heat_of_any_history():
     evidence = [any_history(D, blocks, projector, rng.standard_normal(len(D))).evidence for _ in range(20)]
     assert np.median(evidence) == 0.0
     assert max(evidence) < 10.0
-    start = begun(detector, study.all_outputs(np.zeros(len(study.scale))))
-    seen, _, step = look(detector, start.fitted)
-    assert entering(detector, start.fitted, seen, step.parts) == ()
+    y = study.all_outputs(np.zeros(len(study.scale)))
+    fitted = detector.fitter(y)
+    seen, _, step = look(detector, fitted)
+    assert entering(detector, y, fitted, seen, step.parts) == ()
 
 
 @pytest.mark.parametrize(("first", "end", "size"), [(18, 43, 10.0), (18, 43, -3.0), (0, 20, 3.0), (50, 72, 5.0)])

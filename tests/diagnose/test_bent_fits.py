@@ -17,7 +17,7 @@ from twin.diagnose.search.exact import exact, misfit, unbent
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.start import begun
-from twin.diagnose.search.strained import _beside
+from twin.diagnose.search.strained import beside
 from twin.diagnose.search.verdict import verdict_of
 
 
@@ -47,7 +47,7 @@ def test_beside_a_sensor_that_shows_the_air_no_number_is_far_from_its_declared_v
     there = unbent(detector, y, start.fitted)
     for own in start.loose:
         assert abs(own.x) > POLICY.beyond
-        assert abs(_beside(detector, there, own.index, h)) < 0.5 * POLICY.beyond
+        assert abs(beside(detector, there, own.index, h)) < 0.5 * POLICY.beyond
     verdict, (cause,) = verdict_of(search(detector, y, start), FAMILIES)
     assert (verdict, cause.place, cause.history) == ("sensor", f"sensors.{sensor}", "detached")
     assert cause.amplitude == pytest.approx(1.0, abs=0.05)

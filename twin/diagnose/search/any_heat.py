@@ -19,6 +19,7 @@ from twin.diagnose.faults.elements import blocks_of
 from twin.diagnose.model.bank import Column, nominal_run, respond
 from twin.diagnose.model.study import Study
 from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.exact import left_less, unbent
 from twin.machine.effects.effect import Window
 
 
@@ -33,24 +34,26 @@ class Entering:
 
 
 def entering(
-    detector: Detector, fitted: Fitted, seen: Sight, parts: dict[str, float], places: int = 1
+    detector: Detector, y: np.ndarray, fitted: Fitted, seen: Sight, parts: dict[str, float], places: int = 1
 ) -> tuple[Entering, ...]:
-    """Heat that a fit leaves, at so many places at most; parts: evidence by the hour, of which the first are asked.
-    None where no part has the evidence that heat needs."""
+    """Heat that a fit of measurements y (m,) leaves, at so many places at most; parts: evidence by the hour, of which
+    the first are asked. None where no part has the evidence that heat needs. Where the fit has bent parameters, which
+    then stand for some of the heat, it is told beside the description."""
     least, policy, study = detector.thresholds["unknown"], detector.policy, detector.study
     if max(parts.values(), default=0.0) <= least:
         return ()
     asked = {p: surface_of(seen.heat, seen.g, p) for p in sorted(parts, key=lambda p: -parts[p])[: policy.others]}
     of = _responses(detector, list(asked.values()))
     blocks = [(i, (a + b) / 2.0 * study.fitted_runs[i][1]) for i, a, b in heat_blocks(study)]
-    white = detector.whiten(fitted.residual)
+    there = unbent(detector, y, fitted)
+    white, less = detector.whiten(there.residual), left_less(detector, there, fitted)
 
     def best_beside(others: Sequence[Entering], among: Iterable[str] = asked) -> Entering:
-        projector = Projector.of(*fitted.projector.blocks, *(own.told.responses for own in others))
+        projector = Projector.of(*there.projector.blocks, *(own.told.responses for own in others))
         known = {own.part for own in others}
         told = {p: any_history(of(asked[p]), blocks, projector, white) for p in among if p not in known}
         part = max(told, key=lambda p: told[p].evidence)
-        return Entering(part, asked[part], told[part], told[part].evidence)
+        return Entering(part, asked[part], told[part], told[part].evidence - (0.0 if others else less))
 
     found = list[Entering]()
     while len(found) < min(places, len(asked)) and (best := best_beside(found)).evidence > least:

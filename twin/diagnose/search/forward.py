@@ -83,7 +83,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         named = partial(_named, detector, y, fitted, accepted)
         alone = None if accepted else start.alone
         more = [[*starts, *_starts_alone(alone, starts, policy)] for starts in foremost(detector, ahead)]
-        more = _starts_entering(detector, fitted, seen, step.parts, more)
+        more = _starts_entering(detector, y, fitted, seen, step.parts, more)
         drives = [other for h in passing[: policy.ahead] for other in other_drives(seen, h, policy)]
         as_scores = [h for h in drives if not bent(detector, h)]
         compared = tried(detector, rest, fitted, [*more, *([h] for h in drives if bent(detector, h))])
@@ -94,7 +94,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
             continue
-        standing = _covering(detector, fitted, seen, step.parts, standing)
+        standing = _covering(detector, y, fitted, seen, step.parts, standing)
         if not standing:
             break
         one, rivals = standing[0], _rivals(detector, fitted, standing[0], [*standing, *others, *ranked, *as_scores])
@@ -113,7 +113,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
             steps.append(step)
     if accepted:  # which may have been all that made it seem hotter
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
-    left = entering(detector, fitted, seen, steps[-1].parts, policy.entering)
+    left = entering(detector, y, fitted, seen, steps[-1].parts, policy.entering)
     return Search(detector, start.x0, x, tuple(accepted), tuple(steps), fitted, left, covariance, loose)
 
 
@@ -123,7 +123,7 @@ def naming(found: Search, y: np.ndarray, x: np.ndarray, causes: Sequence[Accepte
     fitted, accepted = refit(detector, y, beginning(x, detector.policy), causes)
     seen, _, step = look(detector, fitted)
     x, covariance = settled(detector, y, accepted)
-    left = entering(detector, fitted, seen, step.parts, detector.policy.entering)
+    left = entering(detector, y, fitted, seen, step.parts, detector.policy.entering)
     return replace(
         found, x=x, accepted=tuple(accepted), steps=(*found.steps, step), fitted=fitted, entering=left,
         covariance=covariance,
@@ -166,7 +166,12 @@ def _passing(
 
 
 def _covering(
-    detector: Detector, fitted: Fitted, seen: Sight, parts: dict[str, float], standing: Sequence[Hypothesis]
+    detector: Detector,
+    y: np.ndarray,
+    fitted: Fitted,
+    seen: Sight,
+    parts: dict[str, float],
+    standing: Sequence[Hypothesis],
 ) -> list[Hypothesis]:
     """Those that explain what heat of any history would, which pays for its freedom: less has imitated it. What
     switches may imitate it within the hours that parts are looked at by, too."""
@@ -174,7 +179,7 @@ def _covering(
     if by_hour <= detector.thresholds["unknown"]:
         return list(standing)
     switching = [_switches(h) for h in standing]
-    finer = [own.evidence for own in entering(detector, fitted, seen, parts)] if any(switching) else []
+    finer = [own.evidence for own in entering(detector, y, fitted, seen, parts)] if any(switching) else []
     free = [max([by_hour, *finer]) if switches else by_hour for switches in switching]
     return [
         h for h, own in zip(standing, free, strict=True)
@@ -213,13 +218,18 @@ def _starts_alone(alone: Alone | None, starts: Sequence[Hypothesis], policy: Sea
 
 
 def _starts_entering(
-    detector: Detector, fitted: Fitted, seen: Sight, parts: dict[str, float], candidates: list[list[Hypothesis]]
+    detector: Detector,
+    y: np.ndarray,
+    fitted: Fitted,
+    seen: Sight,
+    parts: dict[str, float],
+    candidates: list[list[Hypothesis]],
 ) -> list[list[Hypothesis]]:
     """What switches at the part where heat of any history enters also begins in the hours in which that is there, and
     between them: at a light part a window that is off by an hour leaves more than most other causes do."""
     if not any(_switches(h) for h, *_ in candidates):
         return candidates
-    for own in entering(detector, fitted, seen, parts):
+    for own in entering(detector, y, fitted, seen, parts):
         windows = switched_on(detector, own)
         for starts in candidates:
             h = starts[0]

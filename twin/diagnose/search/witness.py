@@ -139,8 +139,9 @@ def _air_stands(
     warmer = detector.columns.raw[:, columns].astype(float) @ means
     if not warmer.any():
         return True
-    fitted = detector.fitter(measured_of(with_measured(study, plans)))
-    colder, information, threshold = _told(detector, fitted, columns, warmer, threshold)
+    y = measured_of(with_measured(study, plans))
+    fitted = detector.fitter(y)
+    colder, information, threshold = _told(detector, y, fitted, columns, warmer, threshold)
     difference, column = np.concatenate(off), np.concatenate(of_fault)
     taken_off = float(column @ difference) / float(column @ column)  # of the fault, before the model was driven by it
     total = taken_off + colder
@@ -148,7 +149,7 @@ def _air_stands(
 
 
 def _told(
-    detector: Detector, fitted: Fitted, columns: np.ndarray, warmer: np.ndarray, threshold: float
+    detector: Detector, y: np.ndarray, fitted: Fitted, columns: np.ndarray, warmer: np.ndarray, threshold: float
 ) -> tuple[float, float, float]:
     """By how many times the white column warmer (m,) the air was colder, the information on it, and the statistic that
     it needs: beside the cause that explains the most, or heat of any history, where that is more than other air does,
@@ -159,7 +160,7 @@ def _told(
     sight, ranked, step = look(detector, fitted)
     causes = (h for h in ranked if not np.isin(h.combination()[0], columns).any())
     leader, explained = next(causes, None), g**2 / max(information, 1e-30)
-    heat = entering(detector, fitted, sight, step.parts)
+    heat = entering(detector, y, fitted, sight, step.parts)
     evidence = sum(own.evidence for own in heat)
     if evidence > max(explained + policy.rival, 0.0 if leader is None else leader.statistic):
         seen = Projector.of(*fitted.projector.blocks, *(own.told.responses for own in heat))(warmer)
