@@ -56,7 +56,10 @@ def left_words(d: Diagnosis) -> str:
             sizes = np.nan_to_num(rms(values)).tolist() if np.size(values) else ()
             left += [(v / of, quantity(v, unit), name) for v, name in zip(sizes, names, strict=False)]
     weight, size, name = max(left)
-    most = f", the most {name}, {size} (rms)" if weight >= 1.0 else ""
+    most = (
+        f", the most {name}, {size} (rms): twin calibrate takes all laws as described, and may leave less; what it "
+        "moves far from its prior is worth a look then"
+    ) if weight >= 1.0 else ""  # fmt: skip
     return (
         f"what is left is no noise (correlated by {np.nanmedian(after):.2f} from bin to bin), but no more than "
         f"simulated machines without an effect leave{most}"

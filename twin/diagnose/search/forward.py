@@ -174,11 +174,11 @@ def _covering(
     standing: Sequence[Hypothesis],
 ) -> list[Hypothesis]:
     """Those that explain what heat of any history would, which pays for its freedom: less has imitated it. What
-    switches may imitate it within the hours that parts are looked at by, too."""
+    switches, and the sun, may imitate it within the hours that parts are looked at by, too."""
     by_hour, policy = max(parts.values(), default=0.0), detector.policy
     if by_hour <= detector.thresholds["unknown"]:
         return list(standing)
-    switching = [_switches(h) for h in standing]
+    switching = [_switches(h) or h.when.bell is not None for h in standing]
     finer = [own.evidence for own in entering(detector, y, fitted, seen, parts)] if any(switching) else []
     free = [max([by_hour, *finer]) if switches else by_hour for switches in switching]
     return [

@@ -16,6 +16,7 @@ from twin.diagnose.evidence.fitter import Fitted, bounds
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.study import own_place
 from twin.diagnose.search.accepted import Accepted, as_scored, freed, parameter_of, possible, readings_columns, settled
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import ALARM, Detector
@@ -97,6 +98,16 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         and (bent(detector, h) or not h.when.windows) and not _stays(detector, there, one, h)
     ]  # fmt: skip
     likely += [h for h in here if h.statistic > removed - detector.policy.close]
+    # what does the same elsewhere is told from it by nothing: heat of a source that never rests, and warmer air there
+    as_much = [
+        h for h in ranked
+        if h.name not in known and h.family != one.hypothesis.family and h.name != _heated(detector, j)
+        and h.statistic > removed - detector.policy.close and not bent(detector, h) and not h.when.windows
+    ]  # fmt: skip
+    likely += [
+        h for h, cosine in with_cosines(detector, before, one.hypothesis, as_much)
+        if removed * (1.0 - cosine**2) < detector.policy.apart and not _stays(detector, there, one, h)
+    ]  # fmt: skip
     near = distinct([*near, *likely])
     rivals += tuple(pair for h in near for pair in with_cosines(detector, before, one.hypothesis, [h]))
     amplitude, variance = _size(one, next(own for own in loose if own.index == j), detector)
@@ -106,6 +117,15 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
     )  # fmt: skip
     x, covariance = settled(detector, y, (one,))
     return Search(detector, start.x0, x, (one,), (first, last), fitted, (), covariance, loose)
+
+
+def _heated(detector: Detector, j: int) -> str:
+    """The place that the source of a declared number heats, whose heat is told by the source; "" of other numbers."""
+    study, p = detector.study, detector.study.probed.parameters[j]
+    sources = study.probed.base.load_model.sources
+    own = next((k for k, s in enumerate(sources) if p.kind == "source" and s.name in p.targets and not s.contact), None)
+    at = None if own is None else own_place(study, own)
+    return "" if at is None else study.probed.places[at].name
 
 
 def often(detector: Detector, family: str) -> float:
