@@ -225,15 +225,15 @@ def _starts_entering(
     parts: dict[str, float],
     candidates: list[list[Hypothesis]],
 ) -> list[list[Hypothesis]]:
-    """What switches at the part where heat of any history enters also begins in the hours in which that is there, and
-    between them: at a light part a window that is off by an hour leaves more than most other causes do."""
+    """What switches at the surface where heat of any history enters also begins in the hours in which that is there,
+    and between them: at a light part a window that is off by an hour leaves more than most other causes do."""
     if not any(_switches(h) for h, *_ in candidates):
         return candidates
     for own in entering(detector, y, fitted, seen, parts):
         windows = switched_on(detector, own)
         for starts in candidates:
             h = starts[0]
-            if _switches(h) and fault_of(h).grows and own.part in _parts(detector.study, h.name):
+            if _switches(h) and fault_of(h).grows and own.surface in _surfaces(detector.study, h.name):
                 there = within(h, windows)
                 starts += [there, *([] if (other := between(there)) is None else [other])]
     return candidates
@@ -300,10 +300,13 @@ def _misfit(a: Accepted) -> float:
 
 def _parts(study: Study, name: str) -> set[str]:
     """The parts that a surface or a film belongs to."""
+    return {Spot.read(surface).part for surface in _surfaces(study, name)}
+
+
+def _surfaces(study: Study, name: str) -> set[str]:
+    """A surface, or all of a film."""
     spot = Spot.read(name)
-    if spot.of is Of.FILM:
-        return {Spot.read(p.name).part for p in study.probed.places if p.film == spot.name}
-    return {spot.part}
+    return {p.name for p in study.probed.places if p.film == spot.name} if spot.of is Of.FILM else {name}
 
 
 def stands(detector: Detector, a: Accepted) -> bool:
