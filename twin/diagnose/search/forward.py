@@ -20,7 +20,7 @@ from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, possible, settled, strong
-from twin.diagnose.search.any_heat import entering, switched_on
+from twin.diagnose.search.any_heat import Entering, entering, switched_on
 from twin.diagnose.search.contest import bent, foremost, judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.exact import beginning, misfit
@@ -83,7 +83,9 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         named = partial(_named, detector, y, fitted, accepted)
         alone = None if accepted else start.alone
         more = [[*starts, *_starts_alone(alone, starts, policy)] for starts in foremost(detector, ahead)]
-        more = _starts_entering(detector, y, fitted, seen, step.parts, more)
+        imitates = any(_switches(h) or h.when.bell is not None for h in passing)
+        heat = entering(detector, y, fitted, seen, step.parts) if imitates else ()
+        more = _starts_entering(detector, heat, more)
         drives = [other for h in passing[: policy.ahead] for other in other_drives(seen, h, policy)]
         as_scores = [h for h in drives if not bent(detector, h)]
         compared = tried(detector, rest, fitted, [*more, *([h] for h in drives if bent(detector, h))])
@@ -94,7 +96,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
             continue
-        standing = _covering(detector, y, fitted, seen, step.parts, standing)
+        standing = _covering(detector, heat, step.parts, standing)
         if not standing:
             break
         one, rivals = standing[0], _rivals(detector, fitted, standing[0], [*standing, *others, *ranked, *as_scores])
@@ -166,21 +168,15 @@ def _passing(
 
 
 def _covering(
-    detector: Detector,
-    y: np.ndarray,
-    fitted: Fitted,
-    seen: Sight,
-    parts: dict[str, float],
-    standing: Sequence[Hypothesis],
+    detector: Detector, heat: Sequence[Entering], parts: dict[str, float], standing: Sequence[Hypothesis]
 ) -> list[Hypothesis]:
     """Those that explain what heat of any history would, which pays for its freedom: less has imitated it. What
     switches, and the sun, may imitate it within the hours that parts are looked at by, too."""
     by_hour, policy = max(parts.values(), default=0.0), detector.policy
     if by_hour <= detector.thresholds["unknown"]:
         return list(standing)
-    switching = [_switches(h) or h.when.bell is not None for h in standing]
-    finer = [own.evidence for own in entering(detector, y, fitted, seen, parts)] if any(switching) else []
-    free = [max([by_hour, *finer]) if switches else by_hour for switches in switching]
+    finer = max([by_hour, *(own.evidence for own in heat)])
+    free = [finer if _switches(h) or h.when.bell is not None else by_hour for h in standing]
     return [
         h for h, own in zip(standing, free, strict=True)
         if (h.statistic > min(policy.covers * own, own - detector.no_evidence) or fault_of(h).several)
@@ -218,18 +214,11 @@ def _starts_alone(alone: Alone | None, starts: Sequence[Hypothesis], policy: Sea
 
 
 def _starts_entering(
-    detector: Detector,
-    y: np.ndarray,
-    fitted: Fitted,
-    seen: Sight,
-    parts: dict[str, float],
-    candidates: list[list[Hypothesis]],
+    detector: Detector, heat: Sequence[Entering], candidates: list[list[Hypothesis]]
 ) -> list[list[Hypothesis]]:
     """What switches at the surface where heat of any history enters also begins in the hours in which that is there,
     and between them: at a light part a window that is off by an hour leaves more than most other causes do."""
-    if not any(_switches(h) for h, *_ in candidates):
-        return candidates
-    for own in entering(detector, y, fitted, seen, parts):
+    for own in heat:
         windows = switched_on(detector, own)
         for starts in candidates:
             h = starts[0]
