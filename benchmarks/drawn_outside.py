@@ -15,20 +15,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.drawn_machines import (
-    OUT,
-    SHARE,
-    drawn_of,
-    logs_of,
-    moved,
-    power_of,
-    said,
-    set_up,
-    simulated,
-)
+from benchmarks.drawn_machines import OUT, SHARE, drawn_of, logs_of, moved, power_of, said, set_up, simulated
 from benchmarks.rows import Row, counted, of_seeds
 from twin.cli.main import run as command
 from twin.errors import TwinError
+from twin.inject.draw.histories import telegraph
 from twin.inject.machines.drawn import DrawnMachine
 from twin.logs.read import read_run
 from twin.logs.run import Run
@@ -38,8 +29,6 @@ from twin.machine.load import load_machine
 
 HOUR = 3600.0  # s
 SWITCH = "hidden_"  # columns that `twin hide` adds
-RAMP = 0.7 * HOUR  # s, from no heat to all of it, of slow histories: those of the five-axis trials
-LEVELS = (-1.0, -0.4, 0.0, 0.6, 1.0)  # between which slow histories change at random, likewise
 
 
 @dataclass(frozen=True)
@@ -84,14 +73,8 @@ def with_joint(text: str, hidden: Outside) -> str:
 
 
 def slow(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:
-    """Random levels for 0.4 h and 1.3 h more in the mean each, with ramps between them, at times (n,) s."""
-    edges = np.cumsum(rng.exponential(1.3 * HOUR, 40) + 0.4 * HOUR)
-    target = rng.choice(LEVELS, 41)[np.searchsorted(edges, time)]
-    ramp, now = np.empty(len(time)), 0.0
-    for k, step in enumerate(np.diff(time, prepend=time[0])):
-        now += float(np.clip(target[k] - now, -step / RAMP, step / RAMP))
-        ramp[k] = now
-    return ramp
+    """The history of the five-axis trials at times (n,) s."""
+    return telegraph(rng, time, np.diff(time, prepend=time[0]))
 
 
 def switched(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:

@@ -61,6 +61,26 @@ def test_heat_that_switches_at_random_is_unknown_and_told_with_its_watts(places)
 
 
 @pytest.mark.long
+def test_what_switches_at_a_light_part_begins_in_the_hours_of_its_heat():
+    """From the windows of full hours alone it ends as unknown."""
+    detector, hours = small_case.made_detector(), ((1.3, 2.4), (0.6, 3.1))
+    study, outputs = detector.study, []
+    place = [spot.name for spot in study.probed.places].index("stator")
+    for k, (first, end) in zip(study.fitted, hours, strict=True):
+        slots, time = study.slots(k), study.runs[k].run.drive.time[:-1]
+        on = (time >= 3600.0 * first) & (time < 3600.0 * end)
+        slots.forcing[:, 0] = 60.0 * on[:, None] * study.probed.B[place]
+        outputs.append(study.outputs(k, np.zeros(len(study.scale)), slots, [1.0]))
+    y = np.concatenate(outputs)
+    y = y + detector.whiten.colour(np.random.default_rng(5).standard_normal(len(y)))
+    verdict, (cause,) = verdict_of(searched(detector, y)[0], FAMILIES)
+    assert (verdict, cause.family, cause.place) == ("named", "heat_source", "stator")
+    assert cause.amplitude == pytest.approx(60.0, rel=0.1)
+    for w, (first, end) in zip(cause.windows, hours, strict=True):
+        assert (w.start, w.end) == pytest.approx((3600.0 * first, 3600.0 * end), abs=600.0)
+
+
+@pytest.mark.long
 def test_noise_is_no_heat_of_any_history():
     detector = small_case.made_detector()
     study, rng = detector.study, np.random.default_rng(8)

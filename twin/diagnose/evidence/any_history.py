@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from twin.calibrate.fit.measured import BIN
 from twin.diagnose.evidence.whiten import Projector
 
-BLOCK = 300.0  # s: a bin of measurements
+BLOCK = BIN  # s: means over bins tell nothing shorter
 MEMORIES = (600.0, 1800.0, 7200.0)  # s, tau: from two blocks to two hours, as by the hour
 SIGMAS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # W
 

@@ -86,8 +86,8 @@ def switched_on(detector: Detector, own: Entering) -> tuple[Window, ...]:
 
 
 def step_of(heat: np.ndarray) -> tuple[int, int]:
-    """First and end of the blocks in which heat (b,) differs most from a linear trend: of all
-    windows the one that leaves least of it; of two halves of a run the one with more heat."""
+    """First and end of the blocks in which heat (b,) differs most from a linear trend: of all windows the one that
+    leaves least of it; of two halves of a run the one with more heat."""
     n = len(heat)
     line = np.linalg.qr(np.column_stack([np.ones(n), np.arange(n)]))[0]
     left = heat - line @ (line.T @ heat)

@@ -91,7 +91,7 @@ class Detector(_Made):
     least: float = 0.0  # statistic that any cause needs, where the model is wrong in its form (`dispersion`)
     poor: bool = False  # its model discrepancy holds what the model leaves of these very runs (`dispersion`)
     derivatives: list[Derivatives] = field(default_factory=list)  # that a diagnosis has made: each takes seconds
-    heated: dict[str, np.ndarray] = field(default_factory=dict)  # by surface: responses to heat (`any_heat`), likewise
+    heated: dict[str, np.ndarray] = field(default_factory=dict)  # by surface: responses to heat (`any_heat`), made once
 
     @property
     def no_evidence(self) -> float:

@@ -95,17 +95,16 @@ def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
         wide = raised(described, poor)
         found = search(wide, y, begun(wide, y))
         if (heat := explained_by_heat(first)) > 0.0:
-            named = _closely(detector, y, first, found, heat)
-            return (first, replace(own, left=float(first.left.sum()) - heat, heat=True)) if named is None else named
+            if (named := _closely(detector, y, first, found, heat)) is not None:
+                return named, replace(dispersion_of(named), weight=weight)
+            return first, replace(own, left=float(first.left.sum()) - heat, heat=True)
         return (found if found.accepted else search_again(detector, y, start, first, math.inf)), poor
     if not (least := own.least(detector.policy)):
         return first, own
     return search_again(detector, y, start, first, least), own
 
 
-def _closely(
-    detector: Detector, y: np.ndarray, first: Search, found: Search, heat: float
-) -> tuple[Search, Dispersion] | None:
+def _closely(detector: Detector, y: np.ndarray, first: Search, found: Search, heat: float) -> Search | None:
     """The first search with the cause that was named beside slow errors, fitted without them; None where that explains
     less than `covers` of what heat of any history does."""
     policy = detector.policy
@@ -116,8 +115,7 @@ def _closely(
     if h.statistic < policy.covers * heat:
         return None
     one = replace(as_scored(detector.study, h, detector.thresholds[h.family]), rivals=named.rivals)
-    result = naming(first, y, first.fitted.x, [one])
-    return result, dispersion_of(result)
+    return naming(first, y, first.fitted.x, [one])
 
 
 def dispersion_of(found: Search) -> Dispersion:

@@ -83,8 +83,7 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         named = partial(_named, detector, y, fitted, accepted)
         alone = None if accepted else start.alone
         more = [[*starts, *_starts_alone(alone, starts, policy)] for starts in foremost(detector, ahead)]
-        imitates = any(_switches(h) or h.when.bell is not None for h in passing)
-        heat = entering(detector, y, fitted, seen, step.parts) if imitates else ()
+        heat = entering(detector, y, fitted, seen, step.parts) if any(map(_in_hours, passing)) else ()
         more = _starts_entering(detector, heat, more)
         drives = [other for h in passing[: policy.ahead] for other in other_drives(seen, h, policy)]
         as_scores = [h for h in drives if not bent(detector, h)]
@@ -176,7 +175,7 @@ def _covering(
     if by_hour <= detector.thresholds["unknown"]:
         return list(standing)
     finer = max([by_hour, *(own.evidence for own in heat)])
-    free = [finer if _switches(h) or h.when.bell is not None else by_hour for h in standing]
+    free = [finer if _in_hours(h) else by_hour for h in standing]
     return [
         h for h, own in zip(standing, free, strict=True)
         if (h.statistic > min(policy.covers * own, own - detector.no_evidence) or fault_of(h).several)
@@ -204,7 +203,7 @@ def _starts_alone(alone: Alone | None, starts: Sequence[Hypothesis], policy: Sea
     """Further starts of a hypothesis where a fit has bent parameters: in the windows that it likes best where nothing
     else is at work, and of a coolant in the hours between."""
     h = starts[0]
-    if alone is None or not (h.when.windows or h.when.bell is not None):
+    if alone is None or not _in_hours(h):
         return []
     seen, best = alone
     own = best.get((h.family, h.name, h.batch.kind))
@@ -226,6 +225,11 @@ def _starts_entering(
                 there = within(h, windows)
                 starts += [there, *([] if (other := between(there)) is None else [other])]
     return candidates
+
+
+def _in_hours(h: Hypothesis) -> bool:
+    """Whether it acts in hours of its own: in windows, or as the sun does."""
+    return bool(h.when.windows) or h.when.bell is not None
 
 
 def _switches(h: Hypothesis) -> bool:

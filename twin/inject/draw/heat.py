@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twin.inject.draw.histories import followed, on, one_of, signal, windows_of
+from twin.inject.draw.histories import followed, on, one_of, signal, telegraph, windows_of
 from twin.inject.draw.parts import Part, heating
 from twin.inject.experiment import HOUR, RUNS, STEP, STEPS, Experiment
 from twin.inject.five_axis import BEARINGS, DRIVES, ELSEWHERE, OUTER, SIDES
@@ -125,14 +125,5 @@ def pair(experiment: Experiment, rng: np.random.Generator, factor: float) -> Par
 def outside(experiment: Experiment, rng: np.random.Generator, factor: float) -> Part:
     """No entry of the catalogue: 25 W that switch, in and out, by slow ramps to levels of a random telegraph."""
     place = one_of(rng, OUTER)
-    watts = []
-    for _ in RUNS:
-        edges = np.cumsum(rng.exponential(1.3 * HOUR, 40) + 0.4 * HOUR)
-        level = rng.choice([-1.0, -0.4, 0.0, 0.6, 1.0], 41)
-        target = level[np.searchsorted(edges, STEP * np.arange(STEPS))]
-        ramp, now = np.empty(STEPS), 0.0
-        for k in range(STEPS):
-            now += float(np.clip(target[k] - now, -STEP / (0.7 * HOUR), STEP / (0.7 * HOUR)))
-            ramp[k] = now
-        watts.append(25.0 * factor * ramp)
+    watts = [25.0 * factor * telegraph(rng, STEP * np.arange(STEPS), np.full(STEPS, STEP)) for _ in RUNS]
     return heating(Hidden("outside", place, "a random telegraph with ramps, both signs", 25.0 * factor, "W"), watts)

@@ -50,3 +50,15 @@ def followed(experiment: Experiment, name: str, exponent: float) -> tuple[list[n
     histories = [(signal(experiment, r, name) / top) ** exponent for r in range(3)]
     fitted = np.concatenate(histories[:2])
     return histories, top, float(fitted[fitted > 0.01].mean())
+
+
+def telegraph(rng: np.random.Generator, time: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """(n,) levels between -1 and 1 at times (n,) s, drawn anew every 1.7 h in the mean, 0.4 h at least; from one to
+    another by ramps of 0.7 h per unit. steps: (n,) s, by which the ramp goes on before each time."""
+    edges = np.cumsum(rng.exponential(1.3 * HOUR, 40) + 0.4 * HOUR)
+    target = rng.choice([-1.0, -0.4, 0.0, 0.6, 1.0], 41)[np.searchsorted(edges, time)]
+    ramp, now = np.empty(len(time)), 0.0
+    for k, most in enumerate(steps / (0.7 * HOUR)):
+        now += float(np.clip(target[k] - now, -most, most))
+        ramp[k] = now
+    return ramp
