@@ -128,7 +128,6 @@ def diagnosis(verdict: Verdict, seed: int = 0) -> Diagnosis:
     return Diagnosis(
         machine="five_axis",
         verdict=verdict,
-        summary=("One run of 5 h was compared, another was sealed.",),
         causes=causes[verdict],
         pulls=tuple(
             Pull(f"films.part_{k}.gain", 1.0, 1.0 + 0.1 * v, 0.4, v, "1") for k, v in enumerate(rng.standard_normal(18))

@@ -142,6 +142,7 @@ def test_report_json_is_the_diagnosis(written, verdict):
     folder = written(verdict)
     with open(folder / "report.json", encoding="utf-8") as f:
         found = json.load(f)
+    assert found.pop("summary") == summary_lines(diagnosis(verdict))
     assert found == plain(diagnosis(verdict).to_json())
     assert found["verdict"] == verdict
     assert [c["amplitude"] for c in found["causes"]] == [c.amplitude for c in diagnosis(verdict).causes]
@@ -220,7 +221,6 @@ def odd() -> Diagnosis:
     return replace(
         d,
         machine=EVIL,
-        summary=(EVIL,),
         causes=(cause,),
         pulls=(replace(d.pulls[0], path=EVIL, pull=np.nan, sigma=np.nan), replace(d.pulls[1], path=EVIL, pull=6.0)),
         detection_limits=(Limit(EVIL, EVIL, np.inf, np.nan, np.inf, "W"),),
@@ -245,6 +245,7 @@ def test_odd_names_and_missing_values_neither_break_the_page_nor_leave_it(tmp_pa
     assert "160 sensors with smaller residuals are left out" in reader.text
     found = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert found["machine"] == EVIL
+    assert found["summary"] == summary_lines(d)
     assert found["causes"][0]["amplitude"] is None
     assert found["causes"][0]["ci95"] == [None, None]
     assert len(summary_lines(d)) <= 10
@@ -253,7 +254,7 @@ def test_odd_names_and_missing_values_neither_break_the_page_nor_leave_it(tmp_pa
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_a_diagnosis_that_holds_nothing_but_its_verdict_is_a_page(verdict):
     empty = replace(
-        diagnosis(verdict), summary=(), causes=(), pulls=(), detection_limits=(), unknown=None, gain=(), ranked=(),
+        diagnosis(verdict), causes=(), pulls=(), detection_limits=(), unknown=None, gain=(), ranked=(),
         nulls={}, cosine=np.zeros((0, 0)), thresholds={}, observed={}, whiteness=(), series=(), notes=(), provenance={},
     )  # fmt: skip
     reader = read(page(empty))
@@ -305,7 +306,7 @@ def test_decimals_follow_the_interval():
             "1.62 W/(m²·K), to a medium of 14.00 °C (95 % interval 13.02 to 14.98 °C)",
         ),
         ("scale_expansion", "1/K", {"part": "bed"}, "162 %/K, with the temperature of bed"),
-        ("heat_source", "W", {"reference": 8.0}, "1.62 W, where x_current is 8.00 in SI units"),
+        ("heat_source", "W", {"reference": 8.0, "reference_unit": "A"}, "1.62 W, where x_current is 8.00 A"),
     ],
 )
 def test_a_size_says_what_it_holds_for(family, unit, settings, wanted):

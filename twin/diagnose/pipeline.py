@@ -31,8 +31,7 @@ from twin.diagnose.model.time_step import time_step
 from twin.diagnose.plan.plan import make_plan
 from twin.diagnose.plan.suspicion import known_family, named, pairs_of, suspicions_in, worst_of_machine
 from twin.diagnose.report.scene import scene_of
-from twin.diagnose.report.text import cause_words
-from twin.diagnose.result.diagnosis import Cause, Diagnosis, Pull, Series, Unknown, Verdict
+from twin.diagnose.result.diagnosis import Cause, Diagnosis, Series, Unknown
 from twin.diagnose.result.place import Scene
 from twin.diagnose.search.by_calibration import CALIBRATED
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
@@ -243,7 +242,6 @@ def diagnose(
     diagnosis = Diagnosis(
         machine=machine.machine.name,
         verdict=verdict,
-        summary=_summary(verdict, causes, pulls),
         causes=causes,
         pulls=pulls,
         detection_limits=limits_of(detector),
@@ -301,13 +299,6 @@ def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unkno
     if unknown is not None:
         return scene_of(machine, probed, unknown.surface)
     return scene_of(machine, probed, causes[0].place, str(causes[0].settings.get("surface", ""))) if causes else None
-
-
-def _summary(verdict: Verdict, causes: Sequence[Cause], pulls: Sequence[Pull]) -> tuple[str, ...]:
-    lines = [cause_words(c) for c in causes]
-    lines += ["nothing passes its threshold"] if verdict == "nothing" else []
-    strong = [p.path for p in pulls if abs(p.pull) > 3.0]
-    return (*lines, *([f"far from their nominal values: {', '.join(strong[:5])}"] if strong else []))
 
 
 def _lag_1(residual: np.ndarray) -> float:

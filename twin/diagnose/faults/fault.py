@@ -245,10 +245,11 @@ class Fault:
 
 
 def as_found(cause: Cause, study: Study) -> Effect:
-    """A cause as descriptions take it, nothing turned."""
+    """A cause as descriptions take it, nothing turned; its reference in SI."""
+    settings = {key: value for key, value in cause.settings.items() if key != "reference_unit"}
     return Effect(
         cause.family, cause.place, cause.amplitude, cause.unit, cause.history, cause.signal, cause.exponent,
-        cause.windows, dict(cause.settings),
+        cause.windows, settings,
     )  # fmt: skip
 
 

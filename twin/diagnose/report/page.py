@@ -95,11 +95,12 @@ def summary_lines(d: Diagnosis) -> list[str]:
 def write_report(diagnosis: Diagnosis, folder: Path) -> None:
     """Write index.html and report.json into `folder`, each whole or not at all.
 
-    report.json is `Diagnosis.to_json` with null where a number is not finite.
+    report.json is `Diagnosis.to_json` with `summary_lines`, and null where a number is not finite.
     Raises TwinError where the folder cannot be written.
     """
     check_folder(Path(folder))
-    facts = json.dumps(plain(diagnosis.to_json()), indent=1, allow_nan=False, ensure_ascii=False)
+    told = diagnosis.to_json() | {"summary": summary_lines(diagnosis)}
+    facts = json.dumps(plain(told), indent=1, allow_nan=False, ensure_ascii=False)
     for name, text in (("index.html", page(diagnosis)), ("report.json", facts + "\n")):
         with atomic_path(Path(folder) / name) as temporary:
             # a lone surrogate of an odd file name must not lose the report

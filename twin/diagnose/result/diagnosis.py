@@ -133,7 +133,6 @@ class Diagnosis:
 
     machine: str
     verdict: Verdict
-    summary: tuple[str, ...]  # sentences for an engineer
     causes: tuple[Cause, ...]
     pulls: tuple[Pull, ...]
     detection_limits: tuple[Limit, ...]

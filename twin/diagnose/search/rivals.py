@@ -20,7 +20,8 @@ def rival_of(h: Hypothesis, cosine: float, remedy: str = "", policy: SearchPolic
     half = policy.sure * abs(value) / math.sqrt(h.statistic) if h.statistic > 0.0 and not h.batch.fixed else math.nan
     told = fault.curve.told
     ci95 = (told(value - half), told(value + half))
-    return Rival(h.family, place, h.when.name, told(value), h.batch.unit, h.statistic, cosine, remedy, ci95)
+    size = math.nan if fault.exchanges else told(value)
+    return Rival(h.family, place, h.when.name, size, h.batch.unit, h.statistic, cosine, remedy, ci95)
 
 
 def rival_beside(chosen: Hypothesis, other: Hypothesis, cosine: float, policy: SearchPolicy) -> Rival:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,7 +39,12 @@ def cause_of(a: Accepted, study: Study, policy: SearchPolicy = POLICY) -> Cause:
     value, low, high = said.size
     if fault.corrects:
         low, high = _factors(a)
-    settings = said.settings | ({"reference": h.when.reference} if h.when.signal else {})
+    if fault.exchanges:  # there is no size
+        value, low, high = (math.nan,) * 3
+    settings = said.settings
+    if h.when.signal:
+        units = {s.name: s.unit for s in study.probed.base.load_model.signals}
+        settings = settings | {"reference": h.when.reference, "reference_unit": units.get(h.when.signal, "")}
     return Cause(
         family=h.family, place=said.place, parameter="", amplitude=value, ci95=(low, high), unit=h.batch.unit,
         statistic=float(a.statistic), threshold=float(a.threshold), history=h.when.name, signal=h.when.signal,
