@@ -24,12 +24,11 @@ from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.search.accepted import settled
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.dispersion import searched
+from twin.diagnose.search.excused import other_search
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.limits import limits_at, limits_of
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.verdict import unknown_of, verdict_of, with_faults
-from twin.diagnose.search.witness import other_measurements
 from twin.inject.draw.trial import draw
 from twin.inject.hidden import Hidden, Trial
 from twin.inject.judge.items import Item, items
@@ -69,11 +68,10 @@ def limit(hidden: Hidden) -> float | None:
 def judged(detector: Detector, trial: Trial) -> Row:
     """One trial: what was hidden, what was said, and what it was worth on the sealed run (of a null nothing)."""
     began = time.perf_counter()
-    own, plans, y, faults = other_measurements(detector, trial.runs)
-    found, _ = searched(own, y)
-    verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
+    found, _, own = other_search(detector, trial.runs)
+    verdict, causes = with_faults(*verdict_of(found, FAMILIES), own.faults)
     unknown = unknown_of(found) if verdict == "unknown" else None
-    seconds = time.perf_counter() - began
+    seconds, plan = time.perf_counter() - began, own.plans[2]
     without = bare(trial.name, trial.seed) if trial.hidden else None
     return {
         "family": trial.name,
@@ -91,8 +89,8 @@ def judged(detector: Detector, trial: Trial) -> Row:
         "evidence": max(found.steps[0].parts.values()),
         "observed": found.steps[0].observed,
         "limits": [limit(h) for h in trial.hidden],
-        "present": _distance(detector, y, without.y) if without else 0.0,
-        "variance": [*variance(found, plans[2].temperature, plans[2].tcp), without.variance] if without else None,
+        "present": _distance(detector, own.y, without.y) if without else 0.0,
+        "variance": [*variance(found, plan.temperature, plan.tcp), without.variance] if without else None,
         "seconds": seconds,
     }  # fmt: skip
 

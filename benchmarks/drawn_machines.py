@@ -27,10 +27,9 @@ from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.report.recalibration import large
 from twin.diagnose.report.text import alike
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.dispersion import searched
+from twin.diagnose.search.excused import other_search
 from twin.diagnose.search.standing import standing
 from twin.diagnose.search.verdict import pulls_of
-from twin.diagnose.search.witness import other_measurements
 from twin.inject.machines.drawn import HOURS, NOISE, RUNS, SAMPLINGS, DrawnMachine, draw_machine
 from twin.inject.machines.draws import between, one_of
 from twin.inject.machines.loads import loads_of_run
@@ -280,9 +279,8 @@ def hidden_in_logs(told: Sequence[str], runs: Sequence[Path], out: Path, options
 
 def said(detector: Detector, hidden: tuple[str, ...], runs: Sequence[Run]) -> Row:
     began = time.perf_counter()
-    own, plans, y, faults = other_measurements(detector, runs)
-    found, left = searched(own, y)
-    found, opened = standing(found, y, FAMILIES, faults, plans[2:], 1)
+    found, left, own = other_search(detector, runs)
+    found, opened = standing(found, own.y, FAMILIES, own.faults, own.plans[2:], 1)
     verdict, causes = opened.verdict, opened.causes
     return {
         "hidden": hidden,

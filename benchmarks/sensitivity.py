@@ -60,10 +60,12 @@ def detector() -> Detector:
 def said(trial: str, policies: list[SearchPolicy]) -> list[Said]:
     """The diagnosis of a trial by each policy."""
     runs, made = trial_of(EXPERIMENT, table(EXPERIMENT)[trial], TRUTHS).runs, detector()
-    own, _, y, faults = other_measurements(made, runs)
+    own = other_measurements(made, runs)
     result = []
     for policy in policies:
-        verdict, causes = with_faults(*verdict_of(searched(replace(own, policy=policy), y)[0], FAMILIES), faults)
+        verdict, causes = with_faults(
+            *verdict_of(searched(replace(own.detector, policy=policy), own.y)[0], FAMILIES), own.faults
+        )
         result.append((verdict, tuple((c.family, c.place) for c in causes)))
     return result
 

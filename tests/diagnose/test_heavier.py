@@ -9,9 +9,8 @@ import pytest
 from tests.diagnose.test_lumped import MACHINE, loads, twin
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.pipeline import Settings, prepare
-from twin.diagnose.search.dispersion import searched
+from twin.diagnose.search.excused import other_search
 from twin.diagnose.search.verdict import verdict_of
-from twin.diagnose.search.witness import other_measurements
 from twin.logs.read import read_run
 from twin.machine.load import load_machine
 
@@ -28,8 +27,7 @@ def test_a_capacity_that_a_loss_would_imitate_is_compared_with_it_exactly(tmp_pa
         twin("simulate", tmp_path / "heavy", run, "-o", tmp_path / f"measured_{seed}", *noise)
         runs.append(read_run(tmp_path / f"measured_{seed}"))
     detector = prepare(load_machine(MACHINE), runs, [], Settings(nulls=40, form=32))[0]
-    own, _, y, _ = other_measurements(detector, runs)
-    verdict, (cause, *others) = verdict_of(searched(own, y)[0], FAMILIES)
+    verdict, (cause, *others) = verdict_of(other_search(detector, runs)[0], FAMILIES)
     assert (verdict, cause.family, cause.place, others) == ("named", "capacity", "head", [])
     assert cause.ci95[0] < 20e3 < cause.ci95[1]
     assert cause.amplitude == pytest.approx(20e3, rel=0.3)

@@ -525,17 +525,20 @@ def test_nothing_says_first_what_calibration_had_to_change():
     assert "within their noise the description explains them" in verdict_sentence(quiet)
     run = next(s for s in still.series if not s.sealed)
     moved = replace(run, recalibrated=run.delivered - 2.0, tcp_recalibrated=run.tcp_delivered - [0.0, 9e-6, 0.0])
-    pull = Pull("sources.spindle.gain", 1.0, 1.35, 0.5, 1.4, "1", temperature_change=2.0, displacement_change=8e-6)
+    pull = Pull("sources.spindle.gain", 1.0, 1.35, 0.5, 1.4, "1", changes={"sensor_0": 2.0, "dy": 8e-6})
     text = verdict_sentence(replace(quiet, series=(moved,), pulls=(*d.pulls, pull)))
     assert "within their noise" not in text
     assert text.startswith("The description as delivered is not right: calibration moved")
     assert "Nothing is missing" not in text
-    for words in ("by 2.00 K", "dy by 9.00 um", "most of it by sources.spindle.gain, 1.35"):
+    for words in ("by 2.00 K", "dy by 9.00 µm", "most of it by sources.spindle.gain, 1.35"):
         assert words in text
-    second = replace(pull, path="films.bed.gain", temperature_change=0.6, displacement_change=0.0)
-    small = replace(pull, path="films.table.gain", temperature_change=0.4, displacement_change=1e-6)
+    second = replace(pull, path="films.bed.gain", changes={"sensor_0": 0.6})
+    small = replace(pull, path="films.table.gain", changes={"sensor_0": 0.4, "dy": 1e-6, "other": 3.0})
     text = verdict_sentence(replace(quiet, series=(moved,), pulls=(small, second, pull)))
     assert 0 < text.index("sources.spindle.gain") < text.index("films.bed.gain")
     assert "films.table.gain" not in text
+    unsure = replace(pull, sigma=0.8)
+    text = verdict_sentence(replace(quiet, series=(moved,), pulls=(unsure,)))
+    assert text.startswith("Within the tolerances of the description calibration moved")
     left = tuple((name, before, 0.5) for name, before, _ in d.whiteness)
     assert "correlated by 0.50" in verdict_sentence(replace(quiet, whiteness=left))

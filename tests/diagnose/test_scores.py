@@ -12,7 +12,7 @@ import scipy.optimize
 from tests.diagnose import small_case
 from twin.calibrate.fit.noise import Channels
 from twin.diagnose.evidence.batch import Batch, History, best, prepared, score
-from twin.diagnose.evidence.unknown import evidence, heat_of, surface_of, with_information
+from twin.diagnose.evidence.unknown import evidence, heat_of, surfaces_of, with_information
 from twin.diagnose.evidence.whiten import Projector, Whitener, measured_of, missing, offsets
 from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.detector import thresholds_of
@@ -193,7 +193,7 @@ def test_unknown_heat_is_seen_in_its_part(seen, part):
     found = evidence(heat, g)
     assert max(found, key=lambda p: found[p]) == part
     assert found[part] > 30.0
-    assert surface_of(heat, g, part) == part
+    assert surfaces_of(heat, g, part, 0.9) == [part]
 
 
 def test_evidence_charges_for_freedom(seen):

@@ -98,7 +98,7 @@ def test_swapped_sensors_are_put_back_and_leave_nothing():
     assert (verdict, cause.history, set(cause.place.removeprefix("sensors.").split("<>"))) == (
         "sensor", "swapped", set(names)
     )  # fmt: skip
-    assert (cause.amplitude, cause.ci95) == (1.0, (1.0, 1.0))
+    assert np.isnan([cause.amplitude, *cause.ci95]).all()  # there is no size
     clean = search(small_case.made_detector(), measured(seed=4))
     np.testing.assert_allclose(found.x, clean.x, atol=0.1)
     np.testing.assert_array_equal(exchanged(study, y, found.accepted), measured(seed=4))

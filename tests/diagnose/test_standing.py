@@ -115,10 +115,9 @@ def test_a_cause_that_ends_before_the_sealed_run_is_judged_there_by_the_calibrat
     assert told.refuted is refuted
 
 
-@pytest.mark.parametrize(("power", "stays"), [(100.0, True), (0.0, False)])
-def test_what_switches_in_every_run_may_do_so_in_the_sealed_run(power, stays):
-    """100 W for two hours of every run, of the sealed one, too: without it the calibration that has taken some of it
-    for a source's predicts that run. Where nothing is in that run, a calibration beside a false cause is astray."""
+def switching(power: float) -> tuple[Search, np.ndarray, list[Measured]]:
+    """A search that has named 100 W for two hours of every run that was looked at; power [W]: of the sealed run, in the
+    same hours."""
     found, y, opened = found_beside()
     study, batch = found.detector.study, found.accepted[0].hypothesis.batch
     when = next(w for w in batch.histories if w.name == "from 1.0 h to 3.0 h of run_0")
@@ -127,23 +126,42 @@ def test_what_switches_in_every_run_may_do_so_in_the_sealed_run(power, stays):
         windows = tuple(replace(when.windows[0], run=run) for run in runs)
         return Hypothesis(batch, batch.places.index("housing"), replace(when, windows=windows), 500.0, (100.0,))
 
-    h, astray = heat("run_0", "run_1"), found.x0.copy()
+    h = heat("run_0", "run_1")
     one = replace(
         found.accepted[0], hypothesis=h, units=units_of(study, h), amplitude=np.array([100.0]), statistic=500.0
     )
     slots = slots_with(study, small_case.elements(), units_of(study, heat("run_2")), 2)
     T, w = study.runs[2].split(study.outputs(2, found.x0, slots, (power,)))
-    measured = [replace(opened[0], temperature=T, tcp=w)]
+    return replace(found, accepted=(one,), x=found.x0), y, [replace(opened[0], temperature=T, tcp=w)]
+
+
+@pytest.mark.parametrize(("power", "stays"), [(100.0, True), (0.0, False)])
+def test_what_switches_in_every_run_may_do_so_in_the_sealed_run(power, stays):
+    """100 W for two hours of every run, of the sealed one, too: without it the calibration that has taken some of it
+    for a source's predicts that run. Where nothing is in that run, a calibration beside a false cause is astray."""
+    found, y, measured = switching(power)
+    study, astray = found.detector.study, found.x0.copy()
     astray[next(j for j, p in enumerate(study.probed.parameters) if p.kind == "source")] += 0.5
-    x, x0 = (found.x0, astray) if stays else (astray, found.x0)
-    told_of = replace(found, accepted=(one,), x=x, x0=x0)
-    assert judged(told_of, y, "named", [cause_of(one, study, POLICY)], FAMILIES, measured, 1).refuted
+    told_of = replace(found, x0=astray) if stays else replace(found, x=astray)
+    causes = [cause_of(told_of.accepted[0], study, POLICY)]
+    assert judged(told_of, y, "named", causes, FAMILIES, measured, 1).refuted
     now, told = standing(told_of, y, FAMILIES, (), measured, 1)
     assert told.refuted is not stays
     assert (now is told_of) is not stays
     if stays:
         assert told.less == "the sealed run is predicted with what switches, at its hours of run_0"
         assert [{w.run for w in c.windows} for c in told.extension] == [{"run_0", "run_1"}]
+
+
+@pytest.mark.parametrize("power", [100.0, 0.0])
+def test_where_the_sealed_run_speaks_for_hours_of_the_others_it_is_predicted_with_them(power):
+    """A calibration beside the cause is as far from that run as one without it: nothing is refuted."""
+    found, y, measured = switching(power)
+    causes = [cause_of(found.accepted[0], found.detector.study, POLICY)]
+    without = judged(found, y, "named", causes, FAMILIES, measured, 1)
+    assert (without.refuted, without.confirmed) == (False, False)
+    now, told = standing(found, y, FAMILIES, (), measured, 1)
+    assert told.confirmed is (now is not found) is bool(told.less) is (power > 0.0)
 
 
 def test_what_is_not_refuted_stays_as_it_was_found():

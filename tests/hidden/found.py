@@ -16,9 +16,8 @@ from twin.diagnose.faults.coarse_model import Coarse, too_coarse
 from twin.diagnose.pipeline import Settings, prepare
 from twin.diagnose.result.diagnosis import Cause, Verdict
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.dispersion import searched
+from twin.diagnose.search.excused import other_search
 from twin.diagnose.search.verdict import unknown_of, verdict_of, with_faults
-from twin.diagnose.search.witness import other_measurements
 from twin.machine.load import load_machine
 from twin.rom.model import MachineModel
 
@@ -57,9 +56,8 @@ def said(settings: Settings, name: str) -> Said:
     else:
         detector = made_detector(settings)
     study = detector.study
-    own, _, y, faults = other_measurements(detector, runs)
-    found, _ = searched(own, y)
-    verdict, causes = with_faults(*verdict_of(found, FAMILIES), faults)
+    found, _, own = other_search(detector, runs)
+    verdict, causes = with_faults(*verdict_of(found, FAMILIES), own.faults)
     states, coarse = STATES.get(name), None
     if states:
         coarse = too_coarse(_few(detector, states), study, settings.temperature_sigma, settings.tcp_sigma)

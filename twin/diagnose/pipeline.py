@@ -17,7 +17,7 @@ from twin.calibrate.fit.problem import run_names
 from twin.calibrate.fit.traces import traces_of_run
 from twin.diagnose.evidence.discretisation import Difference, differences
 from twin.diagnose.evidence.film_laws import with_film_laws
-from twin.diagnose.evidence.nulls import form_of
+from twin.diagnose.evidence.nulls import Form
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import VERSION
 from twin.diagnose.faults.channels_check import channels_at_fault, warm_place_note
@@ -36,6 +36,7 @@ from twin.diagnose.result.place import Scene
 from twin.diagnose.search.by_calibration import CALIBRATED
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.dispersion import raised, searched, wrong_temperatures
+from twin.diagnose.search.excused import excused
 from twin.diagnose.search.gain import predicted
 from twin.diagnose.search.limits import limits_of
 from twin.diagnose.search.look import Search
@@ -119,7 +120,7 @@ def prepare(
         probed = make_probed_model(machine, known, every, progress, step=step)
     plans = [measured(probed.base, run, p.drive, p.name) for run, p in zip(every, probed.runs, strict=True)]
     closed = [*plans[: len(runs)], *(_closed(m) for m in plans[len(runs) :])]
-    form = form_of(machine)
+    form = Form()
     study = with_film_laws(make_study(probed, closed, range(len(runs))), form)
     if sum(m.n_temperature + len(m.tcp) for m in plans[: len(runs)]) < LEAST:
         raise LogError(
@@ -193,8 +194,14 @@ def diagnose(
     if len(judgement.findings) < len(told.findings):
         usable, faults, detector, plans = sound(judgement)
     asked = named(settings.plan, detector) if settings.plan else []
-    study, y = detector.study, measured_of(detector.study)
+    y = measured_of(detector.study)
     found, dispersion = searched(detector, y)
+    told, judgement = judgement, excused(found, runs, judgement)
+    if len(judgement.findings) < len(told.findings):
+        usable, faults, detector, plans = sound(judgement)
+        y = measured_of(detector.study)
+        found, dispersion = searched(detector, y)
+    study = detector.study
     detector = raised(detector, dispersion)  # what was searched with in the end
     poor = dispersion.share > settings.policy.dispersed
     found, opened = standing(found, y, settings.families, faults, plans[len(runs) :], settings.seed)

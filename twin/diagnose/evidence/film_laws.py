@@ -3,11 +3,14 @@
     h = h_described (rise / usual)^e exp(w (s - mean s) + m (b - mean b)),
     e ~ N(0, steep^2),  w ~ N(0, speed^2),  m ~ N(0, speed_exponent^2)
 
-usual: the rise at which the coefficient is stated, or the geometric mean of the rise over the runs where synthetic
-measurements draw what a law makes of the mean coefficient (`Form.law`). With a relative speed v and h = h_0 (1 + c v^m)
-b = d ln h / dm = c v^m ln v / (1 + c v^m), and s is d ln h / d ln c as a share of what it is at the top speed; c as
-described. Means are subtracted, so that none of them says how strong a film is in the mean. Radiation is part of h:
-emissivities are known no better than laws.
+usual: the rise at which coefficients are stated. steep: the described film has an exponent p of the rise, its
+radiation included, and the real one any of those that physics allows; what both differ by then is, in rms,
+
+    steep^2 = (middle - p)^2 + width^2 / 12.
+
+With a relative speed v and h = h_0 (1 + c v^m) b = d ln h / dm = c v^m ln v / (1 + c v^m), and s is d ln h / d ln c as
+a share of what it is at the top speed; c as described. Means are subtracted, so that none of them says how strong a
+film is in the mean. Radiation is part of h: emissivities are known no better than laws.
 
 They are fitted with the exact model, like the numbers of the description: a calibration can make the described film of
 a motor 0.4 times as strong, and there the response linearised at the description has another shape.
@@ -22,9 +25,10 @@ from scipy.special import xlogy
 
 from twin.diagnose.evidence.nulls import Form
 from twin.diagnose.evidence.speeds import relative_speed
-from twin.diagnose.model.integration import LITTLE
 from twin.diagnose.model.probed_loads import convection
 from twin.diagnose.model.study import Study, make_study
+from twin.physics.radiation import radiation_coefficient
+from twin.rom.following import DIFFERENCES
 from twin.rom.parameter import Kind, Parameter
 
 FREE = 25.0  # W/(m^2 K), the most that free convection in a gas is (Incropera, DeWitt, 6th ed. 2007, table 1.1)
@@ -50,8 +54,7 @@ def with_film_laws(study: Study, form: Form) -> Study:
     n, fitted = len(films), study.fitted
     described = [convection(probed.runs[k].drive, n) for k in fitted]
     most = np.max([h.mean(axis=0) for h in described], axis=0)
-    rises = np.mean(np.concatenate([_log_rise(study, k) for k in fitted]), axis=0)
-    usual = np.exp(rises) if form.law > 0.0 else np.full(n, STATED)
+    steep = [_steepness(p, form.exponents) for p in _exponents(study)]
     least, largest = (of([of(h, axis=0) for h in described], axis=0) for of in (np.min, np.max))
     c = np.maximum(largest / np.maximum(least, LEAST) - 1.0, FORCED)
     speed = _relative_speeds(study)
@@ -61,14 +64,14 @@ def with_film_laws(study: Study, form: Form) -> Study:
     mean_wind, mean_bent = (np.mean(np.concatenate([own[k] for k in fitted]), axis=0) for own in (wind, bent))
     parameters = list(probed.parameters)
     for f, film in enumerate(films):
-        if form.steep > 0.0:
-            parameters.append(_of(film.name, "exponent", form.steep * min(1.0, FREE / max(float(most[f]), FREE))))
+        if form.exponents[1] > form.exponents[0]:
+            parameters.append(_of(film.name, "exponent", steep[f] * min(1.0, FREE / max(float(most[f]), FREE))))
         if any(speed[k][:, f].any() for k in fitted):
             parameters.append(_of(film.name, "wind", form.speed))
             parameters.append(_of(film.name, "wind_exponent", form.speed_exponent))
     runs = []
     for k, run in enumerate(probed.runs):
-        constant = np.tile(usual, (run.drive.n_steps, 1))
+        constant = np.full((run.drive.n_steps, n), STATED)
         loads = replace(run.loads, usual=constant, wind=wind[k] - mean_wind, wind_exponent=bent[k] - mean_bent)
         runs.append(replace(run, loads=loads))
     wider = replace(probed, parameters=tuple(parameters), runs=tuple(runs))
@@ -88,10 +91,24 @@ def _of(film: str, kind: Kind, sigma: float) -> Parameter:
     return Parameter(f"films.{film}.{kind}", kind, (film,), 0.0, "1", -MOST * sigma, MOST * sigma, sigma, "linear")
 
 
-def _log_rise(study: Study, k: int) -> np.ndarray:
-    """(n, n_films) ln of the rise [K] of films' surfaces above their air in run k, as described."""
-    system, run = study.probed.system, study.runs[k].run
-    states = study.states(k, np.zeros(len(study.scale)))[:-1]
-    surface = np.asarray(system.reference_temperature + states @ system.film_rows.T / system.safe_area)
-    air = system.film_plan.air(np.asarray(run.loads.environment), np.asarray(run.loads.position))
-    return np.log(np.maximum(np.abs(surface - air), LITTLE))
+def _steepness(exponent: float, allowed: tuple[float, float]) -> float:
+    """Standard deviation of the exponent of a film that is described with another one."""
+    low, high = allowed
+    return float(np.hypot((low + high) / 2.0 - exponent, (high - low) / np.sqrt(12.0)))
+
+
+def _exponents(study: Study) -> np.ndarray:
+    """(n_films,) d ln h / d ln rise of films as described, radiation included, from half to twice the rise at which
+    coefficients are stated, in the mean of the fitted runs."""
+    probed, ends = study.probed, (STATED / 2.0, 2.0 * STATED)
+    films, air = probed.base.load_model.films, probed.base.reference_temperature
+    result = np.zeros(len(films))
+    tables = [probed.runs[k].drive.films for k in study.fitted]
+    for i, f in enumerate(tables[0].index):
+        convection = np.mean([table.value[:, i].mean(axis=0) for table in tables], axis=0)
+        half, twice = (
+            np.interp(rise, DIFFERENCES, convection) + radiation_coefficient(air + rise, air, films[f].emissivity)
+            for rise in ends
+        )
+        result[f] = np.log(twice / half) / np.log(ends[1] / ends[0])
+    return result

@@ -19,7 +19,6 @@ from twin.diagnose.model.beginning import Beginning
 from twin.diagnose.model.probed_loads import convection
 from twin.diagnose.model.study import Study, heated_places, own_place
 from twin.diagnose.result.spot import Spot
-from twin.machine.description import Machine
 from twin.rom.parameter import OF_LAWS
 
 # of parameters, in prior standard deviations: all that lies within the stated tolerance is alike likely, and nothing
@@ -35,9 +34,9 @@ class Form:
     local_film: float = 0.12  # of each face's coefficient against its group's
     shape: float = 0.05  # of a film group's coefficient, slowly varying within a run
     shape_time: float = 5400.0  # s, over which it does
-    # of the exponent of the rise above the air in a film's coefficient: rms difference of two of 0 (forced air), 0.13
-    # (free convection beside as much radiation), 1/4 and 1/3 (laminar and turbulent free convection)
-    steep: float = 0.2
+    # exponents of the rise above the air that a film's coefficient may have, radiation included: 0 of forced air, 1/3
+    # of turbulent free convection (Incropera, DeWitt, 6th ed. 2007, 9.6)
+    exponents: tuple[float, float] = (0.0, 1.0 / 3.0)
     # of the logarithm of a film's coefficient at its top speed against that at rest: rms of the other laws of the
     # ball-screw axis and the ram borer of even seeds
     speed: float = 0.5
@@ -45,11 +44,6 @@ class Form:
     # of the exponent of a speed in the heat of a source: rectangular distribution between 1, friction by load, and 5/3,
     # by the lubricant (`twin.diagnose.evidence.loss_exponents`)
     loss_exponent: float = 0.19
-    # of the logarithm of a film's coefficient beyond its tolerance: laws of the rise to the power 0 and 0.3 that agree
-    # at one rise differ by 0.3 ln 5 at five times and at a fifth of it (three times had a film of the table of the
-    # ball-screw axis, seed 0, before a loss). In synthetic measurements alone: what a calibration makes of it is what a
-    # film's own number may be moved by
-    law: float = 0.48
     # of the logarithm of a contact's conductance beyond its tolerance: chosen among 0, 0.2 and 0.5 on the drawn
     # networks of even seeds 0 to 20
     contact: float = 0.2
@@ -63,11 +57,6 @@ class Form:
     start_apart: float = 0.03  # K, of single parts on top
     offset: float = 0.05  # K, of sensors
     tcp_zero: float = 0.3e-6  # m
-
-
-def form_of(machine: Machine) -> Form:
-    """That of a machine: in a lumped one a film is no face's, and in the mean as uncertain as it is stated."""
-    return Form(law=0.0) if machine.lumped else Form()
 
 
 @dataclass(frozen=True)
@@ -101,7 +90,6 @@ def null(
     for p in heated_places(study):
         lump = lump_of(study, p, form) * float(np.clip(rng.standard_normal(), -1.8, 1.8))
         E += lump * np.outer(probed.B[p], probed.B[p])
-    law = np.exp(form.law * np.clip(rng.standard_normal(len(load.films)), -1.5, 1.5)) if form.law else 1.0
     readings = _readings(study, J, rng, form)
     aside = form.aside * rng.standard_normal(len(probed.base.sensors))
     offset = form.offset * rng.standard_normal(len(probed.base.sensors))
@@ -120,7 +108,7 @@ def null(
                 M += strength * probed.M[p]
         rise = run.drive.environment[:, load.surroundings] - probed.base.reference_temperature
         slow = _smooth(rng, n, len(load.films), form.shape_time / run.step)
-        wobble = law * (1.0 + mean + form.shape * slow) - 1.0
+        wobble = mean + form.shape * slow
         forcing = np.zeros((n, body.n))
         for j, vector in enumerate(split):
             if vector is not None:

@@ -87,10 +87,22 @@ def _evidence(heat: Heat, k: int, s: int, g: np.ndarray) -> float:
     return float(half @ half - heat.charges[k][s])
 
 
-def surface_of(heat: Heat, g: np.ndarray, part: str) -> str:
-    """The surface of a part that takes most of its heat."""
+def surfaces_of(heat: Heat, g: np.ndarray, part: str, share: float) -> list[str]:
+    """The surface of a part where heat has the most evidence alone, and those with a share of that, in their order. The
+    one that takes most of a part's heat may be another one: of two that are felt alike much may enter one and leave by
+    the other."""
     k = heat.parts.index(part)
-    s = max(range(len(SIGMAS)), key=lambda s: _evidence(heat, k, s, g))
-    root = heat.roots[k][s]
-    by_surface = (root.T @ (root @ g[heat.columns[k]])).reshape(-1, len(heat.R))
-    return heat.surfaces[k][int(np.argmax(np.abs(by_surface).sum(axis=1)))]
+    n, L = len(heat.R), np.linalg.cholesky(heat.R)
+    found = dict[str, float]()
+    for i, name in enumerate(heat.surfaces[k]):
+        own = slice(i * n, (i + 1) * n)
+        F, score = L.T @ heat.F[k][own, own] @ L, L.T @ g[heat.columns[k][own]]
+        found[name] = max(_alone(sigma * score, np.eye(n) + sigma**2 * (F + F.T) / 2) for sigma in SIGMAS)
+    ordered = sorted(found, key=lambda name: -found[name])
+    return [name for name in ordered if found[name] >= share * found[ordered[0]]] or ordered[:1]
+
+
+def _alone(score: np.ndarray, matrix: np.ndarray) -> float:
+    factor = np.linalg.cholesky(matrix)
+    half = scipy.linalg.solve_triangular(factor, score, lower=True)
+    return float(half @ half) - 2.0 * float(np.log(np.diag(factor)).sum())

@@ -21,7 +21,7 @@ from twin.calibrate.fit.measured import measured
 from twin.calibrate.fit.noise import Channels
 from twin.diagnose.evidence.film_laws import with_film_laws
 from twin.diagnose.evidence.formal import known_forms
-from twin.diagnose.evidence.nulls import Form, form_of
+from twin.diagnose.evidence.nulls import Form
 from twin.diagnose.evidence.whiten import Whitener
 from twin.diagnose.faults.elements import Elements, Histories, Key, elements_of
 from twin.diagnose.faults.forms import described_forms, is_nuisance
@@ -70,7 +70,7 @@ def foreseen(
     runs: as the detector's study was fitted to; asked: keys of the detector's columns (u,) whose information is wanted;
     noise [K] of a reading, where no sensor of today tells that of a mean.
     """
-    today, form = detector.study, form_of(machine)
+    today, form = detector.study, Form()
     n = len(runs)
     described = [p for p in today.probed.parameters if p.kind not in OF_LAWS]
     every = [*runs, *(e.run for e in experiments)]

@@ -4,16 +4,17 @@ of nothing, because a tolerance swallows what lies within it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from twin.diagnose.model.study import COMPONENTS
 from twin.diagnose.result.diagnosis import Diagnosis, Pull
-from twin.diagnose.result.numbers import number, quantity, rms, size_words
+from twin.diagnose.result.numbers import quantity, rms, size_words
 
 KELVIN, METRES = 0.5, 3e-6  # rms of a channel, from which a change is told: what users asked for
 LARGE = 3  # parameters at most that a headline names
+SURE = 1.96  # standard deviations, of a 95 % interval
 WHITE = 0.2  # correlation from bin to bin: two standard deviations of that of 100 bins (8 h) of white noise
 
 
@@ -23,15 +24,14 @@ def moved_words(d: Diagnosis) -> str:
     for s in (s for s in d.series if not s.sealed):
         changes = s.recalibrated - s.delivered, s.tcp_recalibrated - s.tcp_delivered
         T, w = (np.nan_to_num(rms(change)).tolist() for change in changes)
-        of_sensors += [(v, f"sensors.{name}", s.run) for v, name in zip(T, s.sensors, strict=True)]
+        of_sensors += [(v, name, s.run) for v, name in zip(T, s.sensors, strict=True)]
         of_tcp += [(v, name, s.run) for v, name in zip(w, COMPONENTS, strict=True)]
     said = list[tuple[str, list[Pull]]]()
-    for moved, least, factor, unit, of in (
-        (of_sensors, KELVIN, 1.0, "K", _temperature), (of_tcp, METRES, 1e6, "um", _displacement)
-    ):  # fmt: skip
+    for moved, least, unit, where in ((of_sensors, KELVIN, "K", "sensors."), (of_tcp, METRES, "m", "")):
         size, channel, run = max(moved, key=lambda m: m[0])
         if size > least:
-            said.append((f"{channel} by {number(factor * size)} {unit} (rms) in {run}", _large(d.pulls, of, least)))
+            words = f"{where}{channel} by {quantity(size, unit)} (rms) in {run}"
+            said.append((words, _large(d.pulls, channel, least)))
     if not said:
         return ""
     alike = all(most == said[0][1] for _, most in said)
@@ -39,7 +39,9 @@ def moved_words(d: Diagnosis) -> str:
     clauses = [
         words + (f", most of it by {' and by '.join(map(_value, most))}" if most else "") for words, most in told
     ]
-    return f"the description as delivered is not right: calibration moved {'; and '.join(clauses)}"
+    sure = any(abs(p.pull) > SURE * p.sigma for _, most in said for p in most)
+    head = "the description as delivered is not right:" if sure else "within the tolerances of the description"
+    return f"{head} calibration moved {'; and '.join(clauses)}"
 
 
 def left_words(d: Diagnosis) -> str:
@@ -67,27 +69,24 @@ def left_words(d: Diagnosis) -> str:
 
 
 def large(pulls: Sequence[Pull]) -> list[Pull]:
-    """Those that a headline names: what moves temperatures or the TCP far."""
-    named = [*_large(pulls, _temperature, KELVIN), *_large(pulls, _displacement, METRES)]
-    return [p for p in dict.fromkeys(named) if _temperature(p) >= KELVIN or _displacement(p) >= METRES]
+    """Those that a headline may name: what moves a temperature or the TCP far."""
+    channels = dict.fromkeys(name for p in pulls for name in p.changes)
+    named = [p for name in channels for p in _large(pulls, name, _least(name)) if p.changes[name] >= _least(name)]
+    return list(dict.fromkeys(named))
 
 
-def _large(pulls: Sequence[Pull], of: Callable[[Pull], float], least: float) -> list[Pull]:
+def _least(channel: str) -> float:
+    return METRES if channel in COMPONENTS else KELVIN
+
+
+def _large(pulls: Sequence[Pull], channel: str, least: float) -> list[Pull]:
     """Those that move a channel by so much (rms), LARGE at most, the largest first; the largest where none does."""
-    ordered = sorted((p for p in pulls if of(p) > 0.0), key=of, reverse=True)
-    return [p for p in ordered if of(p) >= least][:LARGE] or ordered[:1]
-
-
-def _temperature(pull: Pull) -> float:
-    return pull.temperature_change
-
-
-def _displacement(pull: Pull) -> float:
-    return pull.displacement_change
+    ordered = sorted((p for p in pulls if p.changes.get(channel, 0.0) > 0.0), key=lambda p: -p.changes[channel])
+    return [p for p in ordered if p.changes[channel] >= least][:LARGE] or ordered[:1]
 
 
 def _value(pull: Pull) -> str:
     """As "sources.motor.gain, 1.35 (95 % interval 1.09 to 1.67) instead of 1"."""
-    shift = 1.96 * abs(pull.value - pull.nominal) / max(abs(pull.pull), 1e-9) * pull.sigma
+    shift = SURE * abs(pull.value - pull.nominal) / max(abs(pull.pull), 1e-9) * pull.sigma
     size = size_words(pull.value, (pull.value - shift, pull.value + shift), pull.unit)
     return f"{pull.path}, {size} instead of {quantity(pull.nominal, pull.unit)}"

@@ -65,8 +65,8 @@ class Pull:
     pull: float  # posterior shift in prior standard deviations
     unit: str
     freed: bool = False  # of its tolerance: it is the size of a cause, not what calibration made of it
-    temperature_change: float = 0.0  # K rms, of the sensor that the shift alone changes most, to first order
-    displacement_change: float = 0.0  # m rms, of the TCP component that it changes most, to first order
+    # K or m rms over a run, of each sensor and TCP component, that the shift alone changes, to first order
+    changes: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from twin.diagnose.evidence.any_history import BLOCK, AnyHistory, any_history
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.sight import Sight
-from twin.diagnose.evidence.unknown import surface_of
+from twin.diagnose.evidence.unknown import surfaces_of
 from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.elements import blocks_of
 from twin.diagnose.model.bank import Column, nominal_run, respond
@@ -42,7 +42,9 @@ def entering(
     least, policy, study = detector.thresholds["unknown"], detector.policy, detector.study
     if max(parts.values(), default=0.0) <= least:
         return ()
-    asked = {p: surface_of(seen.heat, seen.g, p) for p in sorted(parts, key=lambda p: -parts[p])[: policy.others]}
+    ordered = sorted(parts, key=lambda p: -parts[p])[: policy.others]
+    near = {p: surfaces_of(seen.heat, seen.g, p, 1.0 - policy.behind)[: policy.others] for p in ordered}
+    asked = {p: names[0] for p, names in near.items()}
     of = _responses(detector, list(asked.values()))
     blocks = [(i, (a + b) / 2.0 * study.fitted_runs[i][1]) for i, a, b in heat_blocks(study)]
     there = unbent(detector, y, fitted)
@@ -53,6 +55,11 @@ def entering(
         known = {own.part for own in others}
         told = {p: any_history(of(asked[p]), blocks, projector, white) for p in among if p not in known}
         part = max(told, key=lambda p: told[p].evidence)
+        if near[part][1:]:  # which of its surfaces an hour may not tell
+            of_near = _responses(detector, near[part])
+            of_each = {name: any_history(of_near(name), blocks, projector, white) for name in near[part]}
+            near[part] = [max(of_each, key=lambda name: of_each[name].evidence)]
+            asked[part], told[part] = near[part][0], of_each[near[part][0]]
         return Entering(part, asked[part], told[part], told[part].evidence - (0.0 if others else less))
 
     found = list[Entering]()

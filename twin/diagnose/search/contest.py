@@ -71,7 +71,7 @@ def judged(
     lead, leads_by, count = -np.inf, -np.inf, Counter[str]()
     for starts in sorted(candidates, key=lambda starts: worthy(starts[0]), reverse=True):
         h = starts[0]
-        led = worthy(h) < (1.0 - _behind(h, detector.policy)) * leads_by
+        led = worthy(h) < (1.0 - behind(h, detector.policy)) * leads_by
         bends = bent(detector, h)
         if (led and not _told_badly(detector, h)) or (bends and count[h.batch.kind] >= detector.policy.entrants):
             left.append(h)
@@ -103,7 +103,7 @@ def _refitted(
     return max(best, exact(detector, y, fitted, best), key=worthy)
 
 
-def _behind(h: Hypothesis, policy: SearchPolicy) -> float:
+def behind(h: Hypothesis, policy: SearchPolicy) -> float:
     """Share of the leader's score that a hypothesis may lack and overtake it by being refitted."""
     if h.when.windows and h.when.bell is None:
         return policy.switched
@@ -165,9 +165,9 @@ def _fair(
     if order and (bent(detector, order[0]) or order[0].batch.fixed):
         lead, kinds = order[0], set[str]()
         from_description = fault_of(lead).elsewhere or lead.batch.fixed
-        behind = detector.policy.saturates if from_description else detector.policy.behind
+        lacks = detector.policy.saturates if from_description else detector.policy.behind
         least = (1.0 - detector.policy.behind) * worthy(lead)
-        score = (1.0 - behind) * scores.get(id(lead), worthy(lead))
+        score = (1.0 - lacks) * scores.get(id(lead), worthy(lead))
         for i, h in enumerate(order):
             as_near = worthy(h) > score and not (bent(detector, h) or h.batch.fixed)
             if (_follows(h) and worthy(h) > least) or (as_near and h.batch.kind not in kinds):

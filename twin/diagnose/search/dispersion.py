@@ -129,13 +129,15 @@ def dispersion_of(found: Search) -> Dispersion:
 
 def explained_by_heat(found: Search) -> float:
     """What heat of any history explains where slow errors of single channels are less likely, else 0 (Bayes factor:
-    Kass, Raftery, J. Am. Stat. Assoc. 90, 1995). It may leave as much as a number out of its tolerance may, since no
-    block is as short as a switch."""
-    evidence = sum(own.evidence for own in found.entering)
-    if not evidence or evidence < _evidence_of_errors(found.detector, found.fitted):
+    Kass, Raftery, J. Am. Stat. Assoc. 90, 1995). Of heat at one surface they hold the misfits of the response, too; two
+    surfaces are free enough to explain the errors of few channels. It may leave as much as a number out of its
+    tolerance may, since no block is as short as a switch."""
+    policy, evidence = found.detector.policy, sum(own.evidence for own in found.entering)
+    misfits = policy.misfit * evidence if len(found.entering) == 1 else 0.0
+    if not evidence or evidence + misfits < _evidence_of_errors(found.detector, found.fitted):
         return 0.0
     excess = float(found.left.sum()) - int(np.isfinite(found.residual).sum())
-    return evidence + float(np.clip(excess - evidence, 0.0, (1.0 - found.detector.policy.covers) * evidence))
+    return evidence + float(np.clip(excess - evidence, 0.0, (1.0 - policy.covers) * evidence))
 
 
 def _evidence_of_errors(detector: Detector, fitted: Fitted) -> float:

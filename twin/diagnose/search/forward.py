@@ -21,7 +21,7 @@ from twin.diagnose.model.study import K, Study
 from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, possible, settled, strong
 from twin.diagnose.search.any_heat import Entering, entering, switched_on
-from twin.diagnose.search.contest import bent, foremost, judged, proof, tried, worth
+from twin.diagnose.search.contest import behind, bent, foremost, judged, proof, tried, worth
 from twin.diagnose.search.detector import FLOOR, Detector
 from twin.diagnose.search.exact import beginning, misfit
 from twin.diagnose.search.growth import between, chilled, grown, within
@@ -84,7 +84,9 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         alone = None if accepted else start.alone
         more = [[*starts, *_starts_alone(alone, starts, policy)] for starts in foremost(detector, ahead)]
         heat = entering(detector, y, fitted, seen, step.parts) if any(map(_in_hours, passing)) else ()
-        more = _starts_entering(detector, heat, more)
+        more = [starts for starts in _starts_entering(detector, heat, more) if _may_cover(starts, heat, policy)]
+        if not more:
+            break
         drives = [other for h in passing[: policy.ahead] for other in other_drives(seen, h, policy)]
         as_scores = [h for h in drives if not bent(detector, h)]
         compared = tried(detector, rest, fitted, [*more, *([h] for h in drives if bent(detector, h))])
@@ -181,6 +183,14 @@ def _covering(
         if (h.statistic > min(policy.covers * own, own - detector.no_evidence) or fault_of(h).several)
         and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
     ]  # fmt: skip
+
+
+def _may_cover(starts: Sequence[Hypothesis], heat: Sequence[Entering], policy: SearchPolicy) -> bool:
+    """Whether a candidate that acts in hours could explain what heat of any history does once it is refitted: windows
+    with many edges take minutes, and end no nearer than who scores less than a leader does."""
+    h = max(starts, key=lambda start: start.statistic)
+    needed = policy.covers * max((own.evidence for own in heat), default=0.0)
+    return not _in_hours(h) or fault_of(h).several or h.statistic > (1.0 - behind(h, policy)) * needed
 
 
 def _without(

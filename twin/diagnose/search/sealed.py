@@ -45,6 +45,7 @@ class Judged:
     size: str = ""  # why its size was
     less: str = ""  # which of several was withdrawn, beside which the others would have been
     refuted: bool = False  # all that was named in the machine is withdrawn
+    confirmed: bool = False  # the sealed runs are likelier with it, beyond chance
 
 
 def judged(
@@ -69,7 +70,7 @@ def judged(
     table, worth = gains(channels, seed, policy), _worth(channels, seed, policy)
     by_fit = _told_by_fit(found)
     if not extension or worth >= (1 if by_fit and opened else 0):
-        return Judged(verdict, tuple(causes), extension, table)
+        return Judged(verdict, tuple(causes), extension, table, confirmed=bool(extension) and worth > 0)
     names = " and ".join(dict.fromkeys(f"{c.family.replace('_', ' ')} at {c.place}" for c in extension))
     for accepted in other_sizes(found, y):
         x, _ = settled(found.detector, y, accepted)

@@ -29,7 +29,8 @@ def standing(
     Where these refute several causes in the machine together, the weakest goes and the others are fitted and judged
     again. If they are refuted down to the last one, so is all that was found. Where they refute what has come to stay,
     and it may have ended with the runs that were looked at, they refute that it stays. What comes in every run that was
-    looked at may come in a sealed one, too: it is refuted only where that run has it at no hours of the others either.
+    looked at may come in a sealed one, too: it is refuted only where that run has it at no hours of the others either,
+    and where the run speaks for such hours it is predicted with them.
     """
 
     def held_against(now: Search, told_of: Search | None = None) -> Judged:
@@ -42,8 +43,9 @@ def standing(
     if whole.refuted and (over := _ended(found)) is not found and not (told := held_against(over)).refuted:
         names = " and ".join(f"{c.family.replace('_', ' ')} at {c.place}" for c in told.causes if c.windows)
         return over, replace(told, less=f"told until the end of the runs that were looked at: {names}. {REFUTED_LATER}")
-    for run, again in _recurring(found, opened) if whole.refuted or whole.size else ():
-        if (told := held_against(again, found)).extension:
+    for run, again in () if whole.confirmed else _recurring(found, opened):
+        told = held_against(again, found)
+        if told.confirmed or (told.extension and (whole.refuted or whole.size)):
             return again, replace(told, less=f"the sealed run is predicted with what switches, at its hours of {run}")
     now, told, gone = found, whole, list[Accepted]()
     while told.refuted and (weakest := _weakest(now, families)):

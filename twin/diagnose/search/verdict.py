@@ -10,7 +10,7 @@ import numpy as np
 from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.faults.fault import Described, Family
 from twin.diagnose.faults.table import fault_of
-from twin.diagnose.model.study import Study
+from twin.diagnose.model.study import COMPONENTS, Study
 from twin.diagnose.result.diagnosis import Cause, Pull, Unknown, Verdict
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, freed
@@ -140,14 +140,14 @@ def unknown_of(found: Search) -> Unknown | None:
     )  # fmt: skip
 
 
-def _moves(change: np.ndarray, study: Study) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) K and (n,) m: rms over its run of the sensor, and the TCP component, that a column (m, n) changes most."""
-    T, w = np.zeros(change.shape[1]), np.zeros(change.shape[1])
-    for _, *of_run in study.split(change):
-        for most, values in zip((T, w), of_run, strict=True):
-            if values.size:
-                np.maximum(most, np.sqrt(np.mean(np.square(values), axis=0)).max(axis=0), out=most)
-    return T, w
+def _changes(change: np.ndarray, study: Study) -> dict[str, np.ndarray]:
+    """(n,) K and m by channel: rms over the run in which it is changed most by each column (m, n)."""
+    found: dict[str, np.ndarray] = {}
+    for planned, T, w in study.split(change):
+        for names, values in ((planned.measured.sensors, T), (COMPONENTS, w)):
+            rms = np.sqrt(np.mean(np.square(values), axis=0)) if values.size else np.zeros((0, change.shape[1]))
+            found |= {name: np.maximum(own, found.get(name, 0.0)) for name, own in zip(names, rms, strict=False)}
+    return found
 
 
 def pulls_of(found: Search) -> tuple[Pull, ...]:
@@ -156,11 +156,11 @@ def pulls_of(found: Search) -> tuple[Pull, ...]:
     low, high = bounds(study)
     sigma = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     x = np.clip(found.x, low, high)
-    moves = _moves(found.detector.fitter.linear(np.zeros(len(x)))[1] * x, study)
+    changes = _changes(found.detector.fitter.linear(np.zeros(len(x)))[1] * x, study)
     pulls = [
         Pull(p.path, p.nominal, float(np.clip(p.value(float(c)), p.low, p.high)), float(s), float(c), p.unit,
-             temperature_change=float(T), displacement_change=float(w))
-        for p, c, s, T, w in zip(study.probed.parameters, x, sigma, *moves, strict=True) if p.kind not in OF_LAWS
+             changes={name: float(own[j]) for name, own in changes.items()})
+        for j, (p, c, s) in enumerate(zip(study.probed.parameters, x, sigma, strict=True)) if p.kind not in OF_LAWS
     ]  # fmt: skip
     for a in found.accepted:
         change, spread = float(a.amplitude[0]), float(np.sqrt(max(a.covariance[0, 0], 0.0)))

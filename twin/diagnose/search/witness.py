@@ -11,7 +11,7 @@ less the fault than to the readings. Two channels are swapped where the model le
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,26 +39,35 @@ def upheld(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], j
     return replace(judgement, findings=tuple(f for f in told if _stands(detector, plans, runs, told, f)))
 
 
-def other_measurements(
-    detector: Detector, runs: Sequence[Run]
-) -> tuple[Detector, list[Measured], np.ndarray, list[Cause]]:
-    """A detector for other measurements of the runs that it was made for, sealed ones last: with their plans, what the
-    fitted ones measured (m,), and the channels at fault. For campaigns: `twin diagnose` makes a detector of its own."""
+@dataclass(frozen=True)
+class Measurements:
+    """Of runs that a detector was made for, without the readings of channels at fault."""
+
+    detector: Detector  # where these have gaps
+    plans: list[Measured]  # of all runs
+    y: np.ndarray  # (m,) what the fitted runs measured
+    faults: list[Cause]
+    judgement: Judgement
+
+
+def other_measurements(detector: Detector, runs: Sequence[Run]) -> Measurements:
+    """Other measurements of the runs that a detector was made for, sealed ones last. For campaigns: `twin diagnose`
+    makes a detector of its own."""
+    fitted = runs[: len(detector.study.fitted)]
+    told = judge(fitted, sensors=detector.study.probed.base.all_sensors)
+    own = measurements(detector, runs, told)
+    kept = upheld(own.detector, own.plans, fitted, told)
+    return own if len(kept.findings) == len(told.findings) else measurements(detector, runs, kept)
+
+
+def measurements(detector: Detector, runs: Sequence[Run], judgement: Judgement) -> Measurements:
+    """The same by a judgement of the channels of the fitted runs."""
     study, n = detector.study, len(detector.study.fitted)
     names, sensors = [p.run.name for p in study.runs[:n]], study.probed.base.sensors
-    judgement = judge(runs[:n], sensors=study.probed.base.all_sensors)
-
-    def beside(judgement: Judgement) -> tuple[Detector, list[Measured], list[Cause]]:
-        sound, faults = channels_at_fault(runs[:n], judgement, sensors, names)
-        every = zip([*sound, *runs[n:]], study.runs, strict=True)
-        plans = [measured(study.probed.base, run, p.run.drive, p.run.name) for run, p in every]
-        return emptied(detector, plans), plans, faults
-
-    own, plans, faults = beside(judgement)
-    kept = upheld(own, plans, runs[:n], judgement)
-    if len(kept.findings) < len(judgement.findings):
-        own, plans, faults = beside(kept)
-    return own, plans, measured_of(with_measured(study, plans)), faults
+    sound, faults = channels_at_fault(runs[:n], judgement, sensors, names)
+    every = zip([*sound, *runs[n:]], study.runs, strict=True)
+    plans = [measured(study.probed.base, run, p.run.drive, p.run.name) for run, p in every]
+    return Measurements(emptied(detector, plans), plans, measured_of(with_measured(study, plans)), faults, judgement)
 
 
 def _stands(
@@ -92,19 +101,25 @@ def _left(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run]) ->
 
 
 def _nearer_corrected(detector: Detector, plans: Sequence[Measured], runs: Sequence[Run], f: Finding) -> bool:
-    """Of readings that were taken out, for which the detector has no responses: whether what the model predicts beside
-    the others is nearer to the readings less the fault than to what they are."""
+    """`nearer_corrected` of readings that were taken out, for which the detector has no responses, by what the model
+    predicts from the others."""
     study = detector.study
     y, name = measured_of(with_measured(study, plans)), f.channels[0]
-    outputs = study.all_outputs(detector.fitter(y).x)
-    off, of_fault = list[np.ndarray](), list[np.ndarray]()
+    outputs, off = study.all_outputs(detector.fitter(y).x), list[tuple[int, np.ndarray, np.ndarray]]()
     for number, (planned, T, _) in enumerate(study.split(outputs)):
         m = planned.measured
         raw = measured(study.probed.base, runs[number], planned.run.drive, m.name)
         if name in raw.sensors and name in m.sensors and raw.temperature.shape[0] == len(T):
-            off.append(raw.temperature[:, raw.sensors.index(name)] - T[:, m.sensors.index(name)])
-            of_fault.append(_of_run(m.bin_time, f, number))
-    difference, column = np.concatenate([np.zeros(0), *off]), np.concatenate([np.zeros(0), *of_fault])
+            beyond = raw.temperature[:, raw.sensors.index(name)] - T[:, m.sensors.index(name)]
+            off.append((number, m.bin_time, beyond))
+    return nearer_corrected(off, f)
+
+
+def nearer_corrected(off: Sequence[tuple[int, np.ndarray, np.ndarray]], f: Finding) -> bool:
+    """Whether readings less a fault are nearer to what is predicted there than the readings are; off: of fitted runs,
+    by their number, times (b,) s and the readings (b,) K less what is predicted, NaN where there are none."""
+    difference = np.concatenate([np.zeros(0), *(beyond for *_, beyond in off)])
+    column = np.concatenate([np.zeros(0), *(_of_run(time, f, number) for number, time, _ in off)])
     known = np.isfinite(difference)
     if not column[known].any():
         return True
