@@ -18,6 +18,7 @@ from twin.diagnose.extend import write_extension
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.pipeline import Result
 from twin.diagnose.report.page import page, plain, summary_lines, write_report
+from twin.diagnose.report.recalibration import large
 from twin.diagnose.report.residuals import load_rows, loudest, residual_map, with_gaps
 from twin.diagnose.report.tables import families_table, gain_table, pulls_table, table
 from twin.diagnose.report.text import (
@@ -537,6 +538,8 @@ def test_nothing_says_first_what_calibration_had_to_change():
     text = verdict_sentence(replace(quiet, series=(moved,), pulls=(small, second, pull)))
     assert 0 < text.index("sources.spindle.gain") < text.index("films.bed.gain")
     assert "films.table.gain" not in text
+    assert large((small, second, pull)) == [pull, second, small]
+    assert large((replace(small, changes={"sensor_0": 0.4}), second)) == [second]
     unsure = replace(pull, sigma=0.8)
     text = verdict_sentence(replace(quiet, series=(moved,), pulls=(unsure,)))
     assert text.startswith("Within the tolerances of the description calibration moved")

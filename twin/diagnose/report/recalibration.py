@@ -71,8 +71,10 @@ def left_words(d: Diagnosis) -> str:
 def large(pulls: Sequence[Pull]) -> list[Pull]:
     """Those that a headline may name: what moves a temperature or the TCP far."""
     channels = dict.fromkeys(name for p in pulls for name in p.changes)
-    named = [p for name in channels for p in _large(pulls, name, _least(name)) if p.changes[name] >= _least(name)]
-    return list(dict.fromkeys(named))
+    named = {
+        p.path: p for name in channels for p in _large(pulls, name, _least(name)) if p.changes[name] >= _least(name)
+    }
+    return list(named.values())
 
 
 def _least(channel: str) -> float:
