@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from tests.diagnose import small_case
-from twin.diagnose.evidence.any_history import any_history
+from twin.diagnose.evidence.any_history import AnyHistory, any_history
+from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.search.any_heat import _responses, entering, heat_blocks, step_of
+from twin.diagnose.search.any_heat import Entering, _responses, entering, heat_blocks, step_of
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.dispersion import searched
+from twin.diagnose.search.forward import _may_cover
 from twin.diagnose.search.look import look
+from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.verdict import unknown_of, verdict_of
 
 
@@ -105,3 +108,20 @@ def test_the_step_is_found_beside_what_drifts(first, end, size):
 
 def test_of_two_halves_the_one_with_more_heat_is_that_of_the_step():
     assert step_of(np.repeat([-3.0, 0.0], [20, 52])) == (20, 72)
+
+
+def test_what_acts_in_hours_is_refitted_only_where_it_may_explain_such_heat():
+    detector = small_case.made_detector()
+    batch = next(b for b in detector.columns.batches if b.family == "heat_source")
+    always = next(h for h in batch.histories if not h.windows and not h.signal)
+    hours = next(h for h in batch.histories if h.windows)
+    told = AnyHistory(1000.0, np.zeros(0), np.zeros(0), np.zeros((0, 0)))
+    heat = (Entering("housing", "housing", told, told.evidence),)
+
+    def may(when, *statistics: float, beside=heat) -> bool:
+        return _may_cover([Hypothesis(batch, 0, when, s, (1.0,)) for s in statistics], beside, POLICY)
+
+    assert may(always, 50.0)
+    assert may(hours, 50.0, beside=())
+    assert not may(hours, 50.0, 100.0)
+    assert may(hours, 50.0, 900.0)  # of one of its starts

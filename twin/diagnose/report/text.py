@@ -12,7 +12,7 @@ import numpy as np
 
 from twin.diagnose.faults.channels_check import REFUTED
 from twin.diagnose.faults.table import family_of
-from twin.diagnose.report.recalibration import left_words, moved_words
+from twin.diagnose.report.recalibration import SURE, left_words, moved_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Limit, Pull, Rival
 from twin.diagnose.result.numbers import interval_and_unit, number, quantity, rms, size_words
 from twin.diagnose.result.place import Support
@@ -223,7 +223,7 @@ def _unknown_words(d: Diagnosis) -> str:
     if not hours:
         return text
     at, largest, sigma, run = max(hours, key=lambda hour: abs(hour[1]))
-    middle, low, high, unit = interval_and_unit(largest, largest - 1.96 * sigma, largest + 1.96 * sigma, "W")
+    middle, low, high, unit = interval_and_unit(largest, largest - SURE * sigma, largest + SURE * sigma, "W")
     return f"{text}; its peak is {middle} {unit} (95 % interval {low} to {high} {unit}), {at / 3600:.1f} h into {run}"
 
 
