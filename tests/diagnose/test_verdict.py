@@ -21,7 +21,7 @@ from twin.diagnose.search.forward import search
 from twin.diagnose.search.limits import limits_at, limits_of, over_histories
 from twin.diagnose.search.loose import Freed
 from twin.diagnose.search.policy import POLICY
-from twin.diagnose.search.rivals import rival_of
+from twin.diagnose.search.rivals import remedy, rival_of
 from twin.diagnose.search.start import begun
 from twin.diagnose.search.strained import strained
 from twin.diagnose.search.verdict import _more_alike, cause_of, verdict_of
@@ -101,6 +101,17 @@ def test_factors_of_one_signal_that_explain_nearly_the_same_are_ambiguous(less, 
     verdict, (cause,) = verdict_of(found, FAMILIES)
     assert (verdict, cause.amplitude) == (wanted, 0.5)
     assert cause.ci95 == ((0.5, 0.707) if wanted == "ambiguous" else (0.5, 0.5))
+
+
+@pytest.mark.parametrize("first", ["heat", "zone"])
+def test_another_temperature_of_a_film_s_air_is_told_from_heat_by_that_of_the_air(first):
+    batches = {b.kind: b for b in small_case.made_detector().columns.batches if b.q == 1}
+    heat, air = (Hypothesis(batches[k], 0, batches[k].histories[0], 800.0, (10.0,)) for k in ("heat", "zone"))
+    one, other = (heat, air) if first == "heat" else (air, heat)
+    assert remedy(one, other) == f"a temperature sensor in the air at {air.name}"
+    assert remedy(heat, replace(heat, place=1)) == f"a temperature sensor between {heat.name} and " + (
+        f"{replace(heat, place=1).name}, nearer to one of them"
+    )
 
 
 @pytest.mark.parametrize(

@@ -175,6 +175,19 @@ def test_sensors_and_axes_are_matched(tmp_path):
     assert "did you mean 'X'?" in axis.remedy
 
 
+@pytest.mark.parametrize("logged", [False, True])
+def test_a_column_that_a_signal_is_read_from_is_no_unknown_sensor(tmp_path, logged):
+    """Where loads.csv has it, it is not read from there."""
+    water = {"water [degC]": 20 + WAVE}
+    loads = table({"time [s]": TIME, "x [m]": WAVE, **(water if logged else {})})
+    run = parse_run(
+        write(tmp_path, loads, temperatures=table({"time [s]": TIME, "bed [degC]": 21 + 0 * TIME, **water}))
+    )
+    problems = check_run(run, (Signal("coolant", "water", "degC"),), sensors=("bed",))
+    told = [p.what for p in problems if "no sensor" in p.what]
+    assert told == (["column 'water' is no sensor of the machine"] if logged else [])
+
+
 @pytest.mark.parametrize("signed", [True, False])
 @pytest.mark.parametrize(("shift", "says"), [(0, ""), (4, "3 sample(s) late"), (-3, "3 sample(s) early")])
 def test_shifted_speed_channel(tmp_path, signed, shift, says):

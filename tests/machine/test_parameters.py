@@ -139,6 +139,17 @@ def test_later_tables_win_and_what_they_leave_out_stays(tmp_path):
     assert list(found) == [path for path in parameter_units(load_machine(lumped.SPINDLE)) if path in found]
 
 
+def test_a_share_of_an_expansion_is_one_of_the_node_s_largest_component(tmp_path):
+    """As its default is, so that a component of nought may be unsure, too; whatever an earlier table says."""
+    tables = declared("tcp.expansion.*", 'tolerance = "0.2 um/K"') + declared(
+        "tcp.expansion.housing.*", 'tolerance = "8 %"'
+    )
+    found = by_path(load_machine(with_tables(tmp_path, tables)))
+    assert found["tcp.expansion.housing.x"].sigma == pytest.approx(0.08 * 1.1e-6)  # -0.8 um/K beside 1.1 um/K
+    assert found["tcp.expansion.housing.y"].sigma == pytest.approx(0.08 * 1.1e-6)
+    assert found["tcp.expansion.bed.z"].sigma == pytest.approx(0.2e-6)
+
+
 def test_constant_environments_and_zero_rows_are_fitted_where_a_table_names_them(tmp_path):
     path = descriptions.edited(tmp_path, ("[poses]", declared("environment.floor.offset") + "\n[poses]"))
     assert by_path(load_machine(path))["environment.floor.offset"].sigma == 0.5
@@ -172,6 +183,7 @@ def test_a_gain_of_zero_is_no_parameter(tmp_path):
         ('path = "sources.motor.gain"\ntolerance = 0', "tolerance", "a tolerance of 0", "fixed = true"),
         ('path = "environment.*.offset"\ntolerance = "30 %"', "tolerance", "not a quantity in K", "0.5 K"),
         ('path = "tcp.expansion.*"\ntolerance = 0.3', "tolerance", "0.3 m/K", "1 um/K"),
+        ('path = "tcp.expansion.shaft.*"\ntolerance = "-8 %"', "tolerance", "a tolerance of -2.56e-07 m/K", "1 um/K"),
         ('path = "sources.motor.gain"\nlow = 2\nhigh = 1.5', "low", "are empty", "low < high"),
         ('path = "sources.motor.gain"\nlow = 1.5', "low", "outside its bounds", "widen"),
         ('path = "sources.motor.gain"\nhigh = 0.5', "high", "outside its bounds", "widen"),

@@ -17,7 +17,7 @@ from twin.logs.refuse import refusals, tables_of, usual_step
 from twin.logs.run import Run
 from twin.logs.sampling_rule import Needed
 from twin.logs.shift import drive_shifts, table_shifts
-from twin.logs.signals import SignalLike, signal_problems
+from twin.logs.signals import SignalLike, read_from_temperatures, signal_problems
 from twin.logs.slips import range_problems, slip_problems, stroke_problems, temperature_slips
 from twin.logs.stuck import stuck_loads
 from twin.logs.values import value_problems
@@ -75,18 +75,18 @@ def _check(
         problems += stuck_loads(run.loads, where)
         problems += fault_problems(run, faults)
         problems += table_shifts(run)
-    return [*problems, *_names(run, axes, sensors)]
+    return [*problems, *_names(run, axes, sensors, read_from_temperatures(run, signals))]
 
 
-def _names(run: Run, axes: Sequence[str], sensors: Sequence[str]) -> list[Problem]:
-    """Columns of temperatures.csv and tcp.csv that the machine does not know, or misses."""
+def _names(run: Run, axes: Sequence[str], sensors: Sequence[str], read: set[str]) -> list[Problem]:
+    """Columns of temperatures.csv and tcp.csv that the machine does not know, or misses; read: those of signals."""
     problems = []
     if run.temperatures is not None and sensors:
         where = str(run.folder / "temperatures.csv")
         problems += [
             warning(f"column '{c}' is no sensor of the machine", where, did_you_mean(c, sensors, "sensors"))
             for c in run.temperatures.columns
-            if c not in sensors
+            if c not in sensors and c not in read
         ]
     if run.tcp is not None:
         where = str(run.folder / "tcp.csv")

@@ -63,6 +63,11 @@ def column_of(run: Run, signal: SignalLike) -> np.ndarray | None:
     return np.interp(run.loads.time, run.temperatures.time[good], values[good], left=np.nan, right=np.nan)
 
 
+def read_from_temperatures(run: Run, signals: Sequence[SignalLike]) -> set[str]:
+    """The columns of temperatures.csv that signals are read from."""
+    return {s.column for s in signals if s.column not in run.loads.columns and _measured_too(run, s)}
+
+
 def _measured_too(run: Run, signal: SignalLike) -> bool:
     table = run.temperatures
     if table is None or signal.unit != "degC" or signal.column not in table.columns:

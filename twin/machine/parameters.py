@@ -158,6 +158,7 @@ def _tcp(machine: Machine) -> Iterator[_Declared]:
 def _declared(machine: Machine) -> tuple[list[_Declared], list[Problem]]:
     """All parameters after the tables, in their order; and what is wrong with the tables."""
     every = {d.parameter.path: d for d in _every(machine)}
+    largest = {path: d.parameter.sigma / TCP_EXPANSION for path, d in every.items()}  # of a tcp.expansion: of its node
     problems: dict[str, Problem] = {}  # by place: one table may match a hundred parameters
     for i, entry in enumerate(machine.parameters):
         if entry is None:  # broken, and reported on reading
@@ -174,18 +175,19 @@ def _declared(machine: Machine) -> tuple[list[_Declared], list[Problem]]:
             problems[f"{where}.path"] = Problem(what, f"{where}.path", remedy)
         for path in possible:
             try:
-                every[path] = _told(every[path].parameter, entry, where)
+                every[path] = _told(every[path].parameter, entry, where, largest[path])
             except TwinError as e:
                 for problem in e.problems:
                     problems.setdefault(problem.where, problem)
     return list(every.values()), list(problems.values())
 
 
-def _told(p: Parameter, entry: ParameterEntry, where: str) -> _Declared:
-    """A parameter as a table has it; what the table leaves out stays. Raises DescriptionError."""
+def _told(p: Parameter, entry: ParameterEntry, where: str, largest: float) -> _Declared:
+    """A parameter as a table has it; what the table leaves out stays. largest: what a share of a component is a share
+    of. Raises DescriptionError."""
     problems: list[Problem] = []
     if entry.tolerance is not None:
-        p = _with_tolerance(p, entry.tolerance, where, problems)
+        p = _with_tolerance(p, entry.tolerance, where, largest, problems)
     unit = "" if p.unit == "1" else f" {p.unit}"
     shown = f'"{p.nominal:g}{unit}"' if unit else f"{p.nominal:g}"
     if entry.low is not None:
@@ -211,11 +213,15 @@ def _si(p: Parameter, place: str, value: float | str, unit: str, example: str, p
         return math.nan
 
 
-def _with_tolerance(p: Parameter, given: float | str, where: str, problems: list[Problem]) -> Parameter:
+def _with_tolerance(
+    p: Parameter, given: float | str, where: str, largest: float, problems: list[Problem]
+) -> Parameter:  # fmt: skip
     """The parameter with the sigma of a tolerance; what is wrong with the tolerance is added to `problems`."""
-    example, dimension, largest = _tolerances(p)
+    example, dimension, most = _tolerances(p)
+    if p.component >= 0 and isinstance(given, str) and given.rstrip().endswith("%"):
+        given = _si(p, f"{where}.tolerance", given, "1", '"30 %"', problems) * largest
     tolerance = _si(p, f"{where}.tolerance", given, dimension, example, problems)
-    if not 0.0 < tolerance <= largest and not problems:
+    if not 0.0 < tolerance <= most and not problems:
         shown = f"({100 * tolerance:g} %)" if dimension == "1" else dimension
         what = f"{p.path}: a tolerance of {tolerance:g} {shown}"
         remedy = f"write tolerance = {example}; what is certain is fixed = true"

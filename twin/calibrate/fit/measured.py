@@ -14,6 +14,7 @@ import numpy as np
 from twin.errors import LogError
 from twin.logs.faults.usable import aside_words, usable
 from twin.logs.run import Run, Table, tcp_places
+from twin.logs.signals import read_from_temperatures
 from twin.rom.drive import Drive
 from twin.rom.model import MachineModel
 from twin.rom.poses import Kind, outside_grid
@@ -87,10 +88,10 @@ def measured(
     run, aside = usable(run, [s for s in model.sensors if s not in exclude])
     skipped = [f"set aside: {aside_words(f)}" for f in aside]
     edges = drive.time
-    table = run.temperatures
+    table, read = run.temperatures, read_from_temperatures(run, model.load_model.signals)
     sensors = [s for s in model.sensors if table is not None and s in table.columns and s not in exclude]
     if table is not None:
-        centre, mean_of, temperature, count = _temperatures(model, table, sensors, edges, bin_length, skipped)
+        centre, mean_of, temperature, count = _temperatures(model, table, sensors, read, edges, bin_length, skipped)
     else:
         centre, mean_of = np.zeros(0), np.zeros((0, len(edges)))
         temperature = count = np.zeros((0, 0))
@@ -129,13 +130,15 @@ def after_steps(measured: Measured, steps: int) -> Measured:
 
 
 def _temperatures(
-    model: MachineModel, table: Table, sensors: list[str], edges: np.ndarray, bin_length: float, skipped: list[str]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """What `_bins` makes of the sensors' columns; what is left out is added to `skipped`."""
-    air = {name for name, _ in model.ambient_sensors}
-    unknown = [c for c in table.columns if c not in model.sensors and c not in air]
-    if unknown:
-        skipped.append(f"{len(unknown)} columns that are no sensor of the machine: {', '.join(unknown)}")
+    model: MachineModel, table: Table, sensors: list[str], read: set[str], edges: np.ndarray, bin_length: float,
+    skipped: list[str],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """What `_bins` makes of the sensors' columns; read: columns that signals are read from. What is left out is added
+    to `skipped`."""
+    known = {*model.sensors, *(name for name, _ in model.ambient_sensors), *read}
+    if unknown := [c for c in table.columns if c not in known]:
+        what = "1 column that is" if len(unknown) == 1 else f"{len(unknown)} columns that are"
+        skipped.append(f"{what} no sensor of the machine: {', '.join(unknown)}")
     time = table.time
     inside = (time >= edges[0]) & (time <= edges[-1])
     if not inside.all():

@@ -84,6 +84,11 @@ class Spot:
         return self.of in (Of.FILM, Of.CONTACT, Of.SOURCE, Of.MATERIAL)
 
     @property
+    def air(self) -> bool:
+        """Whether it is a film, or what films give their heat to."""
+        return self.of in (Of.FILM, Of.ENVIRONMENT)
+
+    @property
     def pad(self) -> bool:
         """Whether it is the face of a contact."""
         return self.of is Of.CONTACT

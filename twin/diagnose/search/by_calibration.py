@@ -13,7 +13,7 @@ from twin.diagnose.search.accepted import parameter_of, readings_columns
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.look import Search, distinct
-from twin.diagnose.search.rivals import reading_beside, rival_of, sensor_between
+from twin.diagnose.search.rivals import in_the_air, reading_beside, rival_of, sensor_between
 from twin.diagnose.search.strained import beside, often
 from twin.rom.parameter import Parameter
 
@@ -39,7 +39,8 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
         for h in others:
             cosine = _cosine(a, readings_columns(detector, h) @ np.array(h.amplitude))
             alone = p.kind == "expansion" or fault_of(h).read
-            rivals.append(rival_of(h, cosine, _measured(p) if alone else sensor_between(place, h.name)))
+            remedy = _measured(p) if alone else in_the_air(h) or sensor_between(place, h.name)
+            rivals.append(rival_of(h, cosine, remedy))
         as_likely = (o for o in found.loose if o.follows and not result and o.told >= own.told - detector.policy.close)
         rivals += [_rival_number(detector, own, other) for other in as_likely]
         result.append(Cause(

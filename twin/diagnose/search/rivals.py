@@ -7,6 +7,7 @@ import math
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Rival
+from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 
 
@@ -42,7 +43,7 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
     if wrong is not None:
         return reading_beside(wrong)
     if a.name != b.name and a.when.name == b.when.name:
-        return sensor_between(a.name, b.name)
+        return in_the_air(a) or in_the_air(b) or sensor_between(a.name, b.name)
     if a.name == b.name and fault_of(a).read and fault_of(b).read:
         return f"a longer run, measured twice as often: {a.when.name} and {b.when.name} differ there"
     signals = [h.when.signal for h in (a, b) if h.when.signal]
@@ -58,6 +59,11 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
 
 def sensor_between(a: str, b: str) -> str:
     return f"a temperature sensor between {a} and {b}, nearer to one of them"
+
+
+def in_the_air(h: Hypothesis) -> str:
+    """What tells another temperature of a film's medium from anything else; "" for other causes."""
+    return f"a temperature sensor in the air at {h.name}" if Spot.read(h.name).air and h.batch.unit == "K" else ""
 
 
 def reading_beside(h: Hypothesis) -> str:
