@@ -18,7 +18,9 @@ from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Window
-from twin.diagnose.search.accepted import Accepted, as_scored, possible
+from twin.diagnose.result.spot import Spot
+from twin.diagnose.search.accepted import Accepted, as_scored, misfits, possible
+from twin.diagnose.search.companions import limits_beside
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import _leaking, _restless, refit, search
@@ -304,3 +306,28 @@ def test_a_size_is_refused_where_its_interval_lies_beyond_physics():
     assert batch.largest[0] == 9.0  # of a relative change
     assert possible(detector, h, 9.4)
     assert not possible(detector, h, 12.0)
+
+
+def test_a_companion_at_the_same_part_or_in_the_same_history_needs_more_than_the_error_of_the_response():
+    """Of all the response, which parameters may imitate: its error they do not."""
+    detector = small_case.made_detector()
+    one = in_windows(1)
+    batch, when = one.hypothesis.batch, one.hypothesis.when
+    other = next(i for i, name in enumerate(batch.places) if Spot.read(name).part != Spot.read(batch.places[0]).part)
+    switched = next(h for h in batch.histories if h.windows and h.name != when.name)
+    sensor = next(b for b in detector.columns.batches if b.kind == "offset")
+
+    def needed(size: float, h: Hypothesis) -> float:
+        return limits_beside(detector, [replace(one, amplitude=np.array([size]))])(h)
+
+    same_part = replace(one.hypothesis, when=switched)
+    same_hours = replace(one.hypothesis, place=other)
+    apart = replace(one.hypothesis, place=other, when=switched)
+    for h in (same_part, same_hours):
+        assert needed(1e4, h) - detector.thresholds[h.family] == pytest.approx(
+            misfits(detector, one.hypothesis, [1e4])
+        )  # fmt: skip
+        assert needed(2e4, h) > 3.0 * needed(1e4, h) > 10.0 * needed(1.0, h)
+    for h in (apart, Hypothesis(sensor, 0, sensor.histories[0], 100.0, (1.0,))):
+        assert needed(1e4, h) == needed(1.0, h) > detector.thresholds[h.family]
+    assert limits_beside(detector, [])(apart) == detector.thresholds[apart.family]

@@ -215,3 +215,21 @@ def test_a_log_slower_than_the_rule_is_told_once(tmp_path):
     assert "rail segment" in problem.remedy
     assert check_run(run, core=Needed(5.0, "x", "speed")) == []
     assert check_run(run, core=None) == []
+
+
+def test_rows_that_no_loads_are_beside_are_counted(tmp_path):
+    later = table({"time [s]": TIME + 500.0, "bed [degC]": 21 + 0 * TIME})
+    (told,) = [
+        p for p in found(tmp_path, {"time [s]": TIME, "x [m]": WAVE}, temperatures=later) if "not used" in p.what
+    ]
+    assert told.what.startswith(
+        "99 of 200 rows lie outside the loads' 0 .. 995 s"
+    )  # one step beyond is beside the last
+    assert told.warning
+
+
+def test_a_sensor_without_a_column_is_told(tmp_path):
+    temperatures = table({"time [s]": TIME, "bed": 21 + 0 * TIME}).replace("bed", "bed [degC]")
+    run = parse_run(write(tmp_path, table({"time [s]": TIME, "x [m]": WAVE}), temperatures=temperatures))
+    told = [p.what for p in check_run(run, sensors=("bed", "column", "x")) if "no column" in p.what]
+    assert told == ["no column of sensor 'column'"]

@@ -11,7 +11,7 @@ from twin.logs.clocks import clock_problems
 from twin.logs.currents import current_problems
 from twin.logs.faults.find import faults_of
 from twin.logs.faults.tell import fault_problems
-from twin.logs.found import warning
+from twin.logs.found import at, warning
 from twin.logs.motion import motion_problems
 from twin.logs.refuse import refusals, tables_of, usual_step
 from twin.logs.run import Run
@@ -21,7 +21,7 @@ from twin.logs.signals import SignalLike, read_from_temperatures, signal_problem
 from twin.logs.slips import range_problems, slip_problems, stroke_problems, temperature_slips
 from twin.logs.stuck import stuck_loads
 from twin.logs.values import value_problems
-from twin.nearest import did_you_mean
+from twin.nearest import did_you_mean, nearest
 
 
 def check_run(
@@ -56,7 +56,9 @@ def _check(
     refused = refusals(run)
     problems = [*signal_problems(run, signals), *refused]
     wanted = {s.column for s in signals}
-    faults = [] if refused else faults_of(run)
+    read = read_from_temperatures(run, signals)
+    apart = ("offset", "offset_or_warm")  # of a coolant from the machine, which is none
+    faults = [f for f in ([] if refused else faults_of(run)) if f.kind not in apart or not read.issuperset(f.channels)]
     for name, table in tables_of(run).items():
         where = str(run.folder / f"{name}.csv")
         problems += clock_problems(run, name, table, where)
@@ -75,7 +77,23 @@ def _check(
         problems += stuck_loads(run.loads, where)
         problems += fault_problems(run, faults)
         problems += table_shifts(run)
-    return [*problems, *_names(run, axes, sensors, read_from_temperatures(run, signals))]
+        problems += _beyond(run)
+    return [*problems, *_names(run, axes, sensors, read)]
+
+
+def _beyond(run: Run) -> list[Problem]:
+    """Measured rows before and after all loads, which no verb compares with anything."""
+    problems = []
+    first, last, step = run.loads.time[0], run.loads.time[-1], usual_step(run.loads)
+    for name, time in ((n, t.time) for n, t in tables_of(run).items() if n != "loads"):
+        outside = np.flatnonzero((time < first - step) | (time > last + step))
+        if len(outside):
+            what = (
+                f"{len(outside)} of {len(time)} rows lie outside the loads' {first:g} .. {last:g} s, and are not used"
+            )
+            where = at(str(run.folder / f"{name}.csv"), outside)
+            problems.append(warning(what, where, "is loads.csv complete? else cut these rows"))
+    return problems
 
 
 def _names(run: Run, axes: Sequence[str], sensors: Sequence[str], read: set[str]) -> list[Problem]:
@@ -83,11 +101,16 @@ def _names(run: Run, axes: Sequence[str], sensors: Sequence[str], read: set[str]
     problems = []
     if run.temperatures is not None and sensors:
         where = str(run.folder / "temperatures.csv")
+        unknown = [c for c in run.temperatures.columns if c not in sensors and c not in read]
         problems += [
             warning(f"column '{c}' is no sensor of the machine", where, did_you_mean(c, sensors, "sensors"))
-            for c in run.temperatures.columns
-            if c not in sensors and c not in read
+            for c in unknown
         ]
+        logged = {*run.temperatures.columns, *run.loads.columns, *(nearest(c, sensors) for c in unknown)}
+        if missing := [s for s in sensors if s not in logged]:
+            what = f"no column of {'sensor' if len(missing) == 1 else 'sensors'} {', '.join(map(repr, missing))}"
+            remedy = did_you_mean(missing[0], list(run.temperatures.columns), "columns")
+            problems.append(warning(what, where, f"{remedy}; what is not measured is not compared"))
     if run.tcp is not None:
         where = str(run.folder / "tcp.csv")
         problems += [

@@ -42,7 +42,7 @@ def clock_problems(run: Run, name: str, table: Table, where: str) -> list[Proble
             " row: log at a fixed rate, or write a heartbeat row at least every minute and before each change"
         )
         return [*problems, warning(what, span(where, longest, longest + 1), remedy)]
-    return [*problems, *_gaps(step, usual, where)]
+    return [*problems, *_gaps(step, usual, name, where)]
 
 
 def changes_only(table: Table) -> bool:
@@ -99,7 +99,7 @@ def _lost(step: np.ndarray, usual: float) -> np.ndarray:
     return np.flatnonzero(step > (_LOST if regular else _GAP) * usual)
 
 
-def _gaps(step: np.ndarray, usual: float, where: str) -> list[Problem]:
+def _gaps(step: np.ndarray, usual: float, name: str, where: str) -> list[Problem]:
     jitter, regular = _jitter(step, usual)
     gaps = _lost(step, usual)
     problems = []
@@ -110,7 +110,8 @@ def _gaps(step: np.ndarray, usual: float, where: str) -> list[Problem]:
         what = f"{times(len(gaps))} a gap, the longest {longest:g} s where {usual:g} s are usual"
         what += f", {lost} rows missing" if regular else ""
         what += ": an hour, as at a clock change" if abs(longest - 3600.0 - usual) < 1.5 * usual else ""
-        remedy = "loads are held over a gap and the result is flagged; fill it if you can"
+        held = "loads are held over a gap and the result is flagged; fill it if you can"
+        remedy = held if name == "loads" else "nothing is compared in a gap; did the logger stop?"
         problems.append(warning(what, at(where, gaps + 1), remedy))
     if regular:
         tolerance = max(0.02 * usual, 6.0 * jitter)

@@ -10,6 +10,7 @@ import numpy as np
 
 from twin.logs.faults.fault import Fault, Kind
 from twin.logs.faults.find import faults_of
+from twin.logs.faults.usable import BRIEF
 from twin.logs.run import Run, Table
 
 BINS = (600.0, 900.0, 1800.0, 3600.0)  # s: the first that leaves
@@ -50,7 +51,7 @@ def emptied(run: Run) -> tuple[Run, tuple[Fault, ...]]:
     found = tuple(f for f in faults_of(run) if f.table == "temperatures" and _lasts(f))
     columns = {name: np.array(values, dtype=float) for name, values in table.columns.items()}
     for f in found:
-        names = columns if f.kind == "splice" else f.channels if f.kind in (*EMPTIED, "held") else ()
+        names = columns if f.kind == "splice" else f.channels if f.kind in (*EMPTIED, *BRIEF) else ()
         for name in names:
             columns[name][f.first_row : f.last_row + 1] = np.nan
     return replace(run, temperatures=replace(table, columns=columns)), found

@@ -99,18 +99,22 @@ def jacobian(
 
 
 def strong(detector: Detector, h: Hypothesis) -> bool:
-    """Whether an error of a twentieth of the response to a cause would pass for another cause. Of the response as it
-    is: calibration may imitate nearly all of it, and does not imitate the error. Not where the cause has the place of a
-    parameter, beside whose change the surrogate knows what others do, nor in a poor model, whose slow errors hold more.
-    A source that is elsewhere is strong whatever its size: the surrogate knows what its number does where the source is
-    not."""
+    """Whether an error of a twentieth of the response to a cause would pass for another cause. Not where the cause has
+    the place of a parameter, beside whose change the surrogate knows what others do, nor in a poor model, whose slow
+    errors hold more. A source that is elsewhere is strong whatever its size: the surrogate knows what its number does
+    where the source is not."""
     if not units_of(detector.study, h) or freed(detector.study, h):
         return False
     if detector.poor:
         return fault_of(h).elsewhere
-    response = readings_columns(detector, h) @ np.array(h.amplitude)
-    limit = min(detector.thresholds.values())
-    return fault_of(h).elsewhere or detector.policy.misfit * float(response @ response) > limit
+    return fault_of(h).elsewhere or misfits(detector, h, h.amplitude) > min(detector.thresholds.values())
+
+
+def misfits(detector: Detector, h: Hypothesis, amplitude: Sequence[float] | np.ndarray) -> float:
+    """What the response to a cause of an amplitude (q,) may leave, as it is wrong by a twentieth. Of the response as it
+    is: calibration may imitate nearly all of it, and does not imitate the error."""
+    response = readings_columns(detector, h) @ np.asarray(amplitude)
+    return detector.policy.misfit * float(response @ response)
 
 
 def _unknown_to_surrogate(

@@ -18,11 +18,11 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.sight import Sight
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import K, Study
-from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, possible, settled, strong
 from twin.diagnose.search.any_heat import Entering, entering, switched_on
+from twin.diagnose.search.companions import Limit, limits_beside, parts_of, surfaces_of_place
 from twin.diagnose.search.contest import behind, bent, foremost, judged, proof, tried, worth
-from twin.diagnose.search.detector import FLOOR, Detector
+from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.exact import beginning, misfit
 from twin.diagnose.search.growth import between, chilled, grown, within
 from twin.diagnose.search.hotter import hotter
@@ -48,8 +48,8 @@ def search_again(described: Detector, y: np.ndarray, start: Start, first: Search
     if ended := _one_number(start, y):
         return ended
     named = sorted(first.accepted, key=lambda a: -a.statistic)
-    beside = _limits(fewer, named[:1])
-    if all(a.statistic > (beside[a.hypothesis.family] if i else least) for i, a in enumerate(named)):
+    beside = limits_beside(fewer, named[:1])
+    if all(a.statistic > (beside(a.hypothesis) if i else least) for i, a in enumerate(named)):
         accepted = tuple(replace(a, threshold=max(a.threshold, least)) for a in first.accepted)
         return replace(first, detector=fewer, loose=start.loose, accepted=accepted)
     return _forward(described.at_least(least), y, start)
@@ -74,8 +74,8 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
             fitted, accepted = _without(detector, y, fitted, accepted, restless)
             seen, ranked, step = look(detector, fitted)
         steps.append(step)
-        limits = _limits(detector, accepted)
-        passing = _passing(detector, ranked, accepted, refused, limits)
+        limit = limits_beside(detector, accepted)
+        passing = _passing(detector, ranked, accepted, refused, limit)
         if not passing or len(accepted) >= policy.causes or fruitless >= policy.tries or imitated:
             break
         ahead = sorted((_starts(seen, h, policy) for h in passing), key=lambda starts: -worth(starts[0], policy))
@@ -91,9 +91,9 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         as_scores = [h for h in drives if not bent(detector, h)]
         compared = tried(detector, rest, fitted, [*more, *([h] for h in drives if bent(detector, h))])
         proved, others = judged(detector, rest, fitted, compared, named)
-        enough = [h for h in proved if proof(detector, h) > policy.named * limits[h.family]]
+        enough = [h for h in proved if proof(detector, h) > policy.named * limit(h)]
         standing = [h for h in enough if possible(detector, h, h.amplitude[0])]
-        if not any(proof(detector, h) > limits[h.family] for h in standing):
+        if not any(proof(detector, h) > limit(h) for h in standing):
             refused.update((h.family, h.name) for h in proved)
             fruitless += 1
             continue
@@ -143,27 +143,19 @@ def _named(
     return replace(h, statistic=max(h.statistic, misfit(detector, fitted) - misfit(detector, after)))
 
 
-def _limits(detector: Detector, accepted: Sequence[Accepted]) -> dict[str, float]:
-    """Per family the statistic that a name needs beside the accepted ones, whose misfits look like causes."""
-    policy = detector.policy
-    misfits = policy.misfit * max((a.statistic for a in accepted if a.units), default=0.0)
-    beside = policy.later * max(FLOOR, detector.least) if accepted else 0.0
-    return {name: max(value + beside, misfits) for name, value in detector.thresholds.items()}
-
-
 def _passing(
     detector: Detector, ranked: Sequence[Hypothesis], accepted: Sequence[Accepted], refused: set[tuple[str, str]],
-    limits: dict[str, float],
+    limit: Limit,
 ) -> list[Hypothesis]:  # fmt: skip
     """Hypotheses that may be named next; none where nothing passes its threshold."""
     left = [h for h in ranked if (h.family, h.name) not in refused]
-    if not any(h.statistic > limits[h.family] for h in left):
+    if not any(h.statistic > limit(h) for h in left):
         return []
     used, named = sum(len(a.units) for a in accepted), [a.hypothesis for a in accepted]
     again = {(h.family, h.name, h.when.name) for h in named}
     return [
         h for h in left
-        if h.statistic > detector.policy.named * limits[h.family] and used + h.batch.q <= K
+        if h.statistic > detector.policy.named * limit(h) and used + h.batch.q <= K
         and (h.family, h.name, h.when.name) not in again and not _reads(detector.study, h, accepted)
     ]  # fmt: skip
 
@@ -231,7 +223,7 @@ def _starts_entering(
         windows = switched_on(detector, own)
         for starts in candidates:
             h = starts[0]
-            if _switches(h) and fault_of(h).grows and own.surface in _surfaces(detector.study, h.name):
+            if _switches(h) and fault_of(h).grows and own.surface in surfaces_of_place(detector.study, h.name):
                 there = within(h, windows)
                 starts += [there, *([] if (other := between(there)) is None else [other])]
     return candidates
@@ -258,7 +250,7 @@ def _reads(study: Study, h: Hypothesis, accepted: Sequence[Accepted]) -> bool:
 def _in_turn(study: Study, accepted: Sequence[Accepted]) -> list[Accepted]:
     """Causes that switch at one part, of several families or twice at one place: together they imitate a history."""
     causes = [(a, a.hypothesis) for a in accepted if a.hypothesis.when.windows and a.units]
-    passing = [(a, h, _parts(study, h.name)) for a, h in causes]
+    passing = [(a, h, parts_of(study, h.name)) for a, h in causes]
     return [
         a for a, h, own in passing
         if any(own & other and b is not a and (h.family != g.family or h.name == g.name) for b, g, other in passing)
@@ -299,17 +291,6 @@ def _uneven(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, f
 def _misfit(a: Accepted) -> float:
     """Heat that a cause in windows may leave because the model is not the machine."""
     return fault_of(a.hypothesis).leaves * a.statistic
-
-
-def _parts(study: Study, name: str) -> set[str]:
-    """The parts that a surface or a film belongs to."""
-    return {Spot.read(surface).part for surface in _surfaces(study, name)}
-
-
-def _surfaces(study: Study, name: str) -> set[str]:
-    """A surface, or all of a film."""
-    spot = Spot.read(name)
-    return {p.name for p in study.probed.places if p.film == spot.name} if spot.of is Of.FILM else {name}
 
 
 def stands(detector: Detector, a: Accepted) -> bool:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["noise", "rail", "leap", "rezero", "stuck", "held", "splice", "offset", "offset_or_warm"]
+Kind = Literal["noise", "spike", "rail", "leap", "rezero", "stuck", "held", "splice", "offset", "offset_or_warm"]
 MEANS: dict[Kind, str] = {  # kind: what happened, and what `size` is
     "noise": "leaps, and is noise from then on; how far its readings typically depart from their neighbours",
+    "spike": "leaps away and comes back within three rows; how far",
     "rail": "leaps to a value that it does not leave, as an open circuit does; that value",
     "leap": "changes within one row by more than heat can; the change",
     "rezero": "leaps to zero: somebody set the probe to zero; the change",

@@ -13,6 +13,7 @@ from twin.logs.faults.fault import Fault, Kind
 from twin.logs.faults.held import held
 from twin.logs.faults.leaps import Changes, changes, leaps, leapt_together, set_to_zero
 from twin.logs.faults.series import Series, beside, long_enough, tcp_series, temperature_series
+from twin.logs.faults.spikes import spikes
 from twin.logs.run import Run, Table
 from twin.logs.stuck import Standstill, standstills
 
@@ -41,10 +42,12 @@ def faults_of(run: Run) -> list[Fault]:
     temperatures, tcp = temperature_series(run), tcp_series(run)
     noisy = [_fault("noise", s, n.first, n.last, n.size) for s in (*temperatures, *tcp) for n in noise(s)]
     temperatures, tcp = (long_enough(_without(s, noisy) for s in series) for series in (temperatures, tcp))
+    single = [_fault("spike", s, n.first, n.last, n.size) for s in temperatures for n in spikes(s)]
+    temperatures = long_enough(_without(s, single) for s in temperatures)
     borders = [t for segment in run.segments for t in (segment.start, segment.end)]
-    found = [*noisy, *_of_temperatures(run, temperatures, borders), *_stuck_probes(run, tcp)]
+    found = [*noisy, *single, *_of_temperatures(run, temperatures, borders), *_stuck_probes(run, tcp)]
     for s in (*temperatures, *tcp):
-        known = [f for f in found if f.fault.kind == "splice" or _of(f.fault, s)]
+        known = [f for f in found if f.fault.kind != "spike" and (f.fault.kind == "splice" or _of(f.fault, s))]
         leapt = _rails_and_leaps(s, known, borders)
         rails = [f.fault for f in leapt if f.fault.kind == "rail"]
         found = [f for f in found if not _within(f.fault, rails)] + leapt

@@ -15,10 +15,10 @@ _EMPTY = "leave its cells empty from there on, or remove the column"
 
 
 def fault_problems(run: Run, faults: Sequence[Fault]) -> list[Problem]:
-    """One warning for each fault; all leaps of one channel share theirs."""
+    """One warning for each fault; all leaps of one channel share theirs, and all its spikes."""
     groups: dict[tuple[str, ...], list[Fault]] = {}
     for f in faults:
-        own = () if f.kind == "leap" else (str(f.first_row),)
+        own = () if f.kind in ("leap", "spike") else (str(f.first_row),)
         groups.setdefault((f.kind, f.table, *f.channels, *own), []).append(f)
     return [_problem(run, same) for same in groups.values()]
 
@@ -41,6 +41,11 @@ def _problem(run: Run, same: Sequence[Fault]) -> Problem:
         return _apart(f, path)
     if f.kind == "leap":
         return _leaps(run, same, path)
+    if f.kind == "spike":
+        when = f"first at {_hours(f.first_time)}" if len(same) > 1 else f"at {_hours(f.first_time)}"
+        most = max(same, key=lambda own: abs(own.size))
+        what = f"{_do(f, 'leap')} and comes back within three rows, {times(len(same))}, {when}, by up to {_size(most)}"
+        return warning(what, at(path, [own.first_row for own in same]), "a loose plug? leave these cells empty")
     if f.kind == "rezero":
         what = f"{_do(f, 'leap')} by {_size(f)} to zero at {_hours(f.first_time)}"
         return warning(

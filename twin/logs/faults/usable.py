@@ -1,5 +1,5 @@
-"""A run without what is no measurement of its machine: a broken sensor, a leap, rows of another time, what a logger
-repeats.
+"""A run without what is no measurement of its machine: a broken sensor, a leap, rows of another time, single wrong
+readings, what a logger repeats.
 
 One such channel decides a fit by least squares: it would be told as heat that nobody described. What is set aside is
 told, never lost silently. What may have been the machine stays: leaps of several channels at once (a coolant that is
@@ -22,7 +22,11 @@ BROKEN: tuple[Kind, ...] = ("noise", "rail", "leap")  # of temperatures: what a 
 NEAR = 120.0  # s between rows, beyond which a wetted surface (time constant 100 s and more) may seem to leap
 MOST = 0.8  # of the sensors that a splice moves: a door that opens moves those in the air
 
-_DOES = {"noise": "noise of", "rail": "rests at", "leap": "leaps by", "stuck": "stands still at", "held": "repeats"}
+BRIEF: tuple[Kind, ...] = ("spike", "held")  # readings of a channel that is sound before and after
+_DOES = {
+    "noise": "noise of", "spike": "leaps and comes back, by", "rail": "rests at", "leap": "leaps by",
+    "stuck": "stands still at", "held": "repeats",
+}  # fmt: skip
 
 
 def usable(run: Run, sensors: Collection[str]) -> tuple[Run, tuple[Fault, ...]]:
@@ -54,8 +58,8 @@ def _aside(run: Run, table: Table, named: Sequence[str]) -> tuple[Fault, ...]:
     splices = [_ended(run, f) for f in found if f.kind == "splice" and len(f.channels) > MOST * len(named)]
     broken = [_ended(run, f) for f in found if f.kind in BROKEN and (f.kind != "leap" or _alone(f, step))]
     broken = [f for f in broken if not any(s.first_row <= f.first_row <= s.last_row for s in splices)]
-    repeated = [f for f in found if f.kind == "held"]
-    return tuple(sorted((*splices, *broken, *repeated), key=lambda f: f.first_row))
+    brief = [f for f in found if f.kind in BRIEF]
+    return tuple(sorted((*splices, *broken, *brief), key=lambda f: f.first_row))
 
 
 def _alone(f: Fault, step: float) -> bool:
