@@ -12,8 +12,10 @@ import pytest
 from tests.diagnose import small_case
 from twin.calibrate.fit.measured import measured
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
+from twin.diagnose.evidence.nulls import Instruments, null
 from twin.diagnose.faults.readings import LAGS, late, play, readings_of
 from twin.diagnose.model.study import Study, make_study
+from twin.diagnose.search.detector import first_rows
 from twin.diagnose.search.gain import _read
 from twin.inject.damage.channels import Damage
 from twin.inject.damage.kinds import damaged
@@ -187,3 +189,28 @@ def test_a_sealed_run_that_counts_from_its_first_row_does_so_in_what_is_predicte
     assert np.abs(added[0]).max() > 0.0
     assert not added[0][0].any()
     np.testing.assert_allclose(added[0], added[1] - added[1][0], atol=1e-6 * np.abs(added[1]).max())
+
+
+@pytest.mark.parametrize("reference", ["first", "absolute"])
+def test_the_noise_of_the_first_row_is_in_all_others(reference):
+    """Of each run its own, and in none that does not count from it; in measurements without a cause, too."""
+    study, tcp = planned(runs(reference)), 4e-6
+    columns = first_rows(study, tcp)
+    if reference == "absolute":
+        assert columns.shape == (study.rows[-1].stop, 0)
+        return
+    assert columns.shape[1] == 6
+    for r, (_, T, w) in enumerate(study.split(columns)):
+        assert not T.any()
+        own, other = w[:, :, 3 * r : 3 * r + 3], np.delete(w, range(3 * r, 3 * r + 3), axis=2)
+        np.testing.assert_array_equal(own[1:], np.broadcast_to(tcp * np.eye(3), own[1:].shape))
+        assert not own[0].any()
+        assert not other.any()
+    J = [np.zeros((study.runs[k].size, len(zeros(study)))) for k in study.fitted]
+    drawn = [null(study, J, seed, Instruments(tcp=tcp)) for seed in range(40)]
+    of_first = [w for y in drawn for _, _, w in study.split(y)]
+    assert not any(w[0].any() for w in of_first)
+    quiet = [null(study, J, seed, Instruments(tcp=1e-12)) for seed in range(40)]
+    errors = np.array([(a - b)[1:] for y, z in zip(drawn, quiet, strict=True)
+                       for (_, _, a), (_, _, b) in zip(study.split(y), study.split(z), strict=True)])  # fmt: skip
+    assert np.std(errors.mean(axis=1)) == pytest.approx(tcp, rel=0.3)  # that of one row, in all of them

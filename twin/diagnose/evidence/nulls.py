@@ -135,6 +135,7 @@ def null(
         T = T + instruments.temperature / np.sqrt(count) * rng.standard_normal(T.shape)
         row_sigma = instruments.tcp / m.row_weight(instruments.tcp)
         w = w + row_sigma[:, None] * rng.standard_normal(w.shape) + form.tcp_zero * rng.standard_normal(3)
+        w = w - w[0] if m.from_first else w
         parts.append(np.concatenate([T.ravel(), w.ravel()]))
     y = np.concatenate(parts)
     for difference in differences:

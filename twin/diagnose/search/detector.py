@@ -34,7 +34,7 @@ from twin.diagnose.faults.forms import clocks, described_forms
 from twin.diagnose.faults.lost import Lost, lost_conductances
 from twin.diagnose.faults.readings import readings_of
 from twin.diagnose.model.bank import Nominal, nominal_run, respond
-from twin.diagnose.model.study import Study, with_measured
+from twin.diagnose.model.study import Planned, Study, with_measured
 from twin.diagnose.model.surrogate import Surrogate, make_surrogate
 from twin.progress import Progress, silent
 
@@ -192,7 +192,7 @@ def make_detector(
     index = {**elements.index, **{key: first + c for key, c in of_reading.items()}}
     floors = _floors(study, instruments)
     whiten = Whitener(study, tuple((Channels(s, np.zeros(len(s))), Channels(w, np.zeros(3))) for s, w in floors))
-    bare = np.hstack(bare_forms(study, raw, index))
+    bare = np.hstack([*bare_forms(study, raw, index), first_rows(study, instruments.tcp)])
     described = described_forms(study, elements, raw, form)
 
     def fitter_of(whiten: Whitener, *modes: np.ndarray) -> Fitter:
@@ -236,6 +236,20 @@ def bare_forms(study: Study, raw: np.ndarray, index: dict[tuple[str, str, str], 
         TCP_ZERO * (study.joined(lambda _: (-1, range(3)))[:, None] == np.arange(3)),
         _together(raw, index),
     ]
+
+
+def first_rows(study: Study, tcp: float) -> np.ndarray:
+    """(m, k) columns of unit prior variance: the noise [m] of the first TCP row of a run, which all its others have
+    with the other sign where deviations count from it."""
+    names = [name for name, _ in study.fitted_runs]
+
+    def column_of(planned: Planned) -> tuple[int, np.ndarray]:
+        w = np.tile(3 * names.index(planned.run.name) + np.arange(3), (planned.shapes[1][0], 1))
+        w[: 1 if planned.measured.from_first else None] = -1
+        return -1, w
+
+    number = study.joined(column_of)
+    return tcp * (number[:, None] == np.unique(number[number >= 0]))
 
 
 def _together(raw: np.ndarray, index: dict[tuple[str, str, str], int]) -> np.ndarray:
