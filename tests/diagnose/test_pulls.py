@@ -9,11 +9,12 @@ import pytest
 from scipy.stats import norm
 
 from tests.diagnose import small_case
+from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.pulls import Loose, Pulls, Spread, as_rare, deviate
 from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.search.by_calibration import strained_of
+from twin.diagnose.search.by_calibration import not_named, strained_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.loose import beside_free
@@ -169,3 +170,22 @@ def test_others_beside_a_free_number_are_those_of_the_fit_without_its_prior():
     prior = np.eye(5)
     prior[j, j] = 0.0
     np.testing.assert_allclose(beside_free(fitted, j), np.linalg.solve(N.T @ N + prior, N.T @ y), rtol=1e-9)
+
+
+@pytest.mark.long
+def test_what_does_nothing_of_what_a_number_does_is_a_note_and_no_rival():
+    """Two findings that have nothing to do with each other are two, and no choice."""
+    found, (j, _) = nothing(), small_case.source_off(0.0)
+    source = found.detector.study.probed.parameters[j].path.removesuffix(".gain")
+    batches = {b.kind: b for b in found.detector.columns.batches if b.q == 1}
+    heat = next(h for h in batches["heat"].histories if h.signal)  # the drive of the source, at its bearing
+    at = batches["heat"].places.index("bearing_front")
+    alike = Hypothesis(batches["heat"], at, heat, 1e3, (10.0,))
+    apart = Hypothesis(batches["probe"], 0, batches["probe"].histories[0], 1e3, (1e-10,))
+    step = replace(found.steps[-1], ranked=(alike, apart))
+    (cause,) = strained_of(replace(found, steps=(step,), loose=(Loose(j, 4.0, 0.3, 2.0, told=1e4),)))
+    assert (cause.place, [r.place for r in cause.rivals]) == (source, ["bearing_front"])
+    note = not_named(replace(found, steps=(step,)), [cause])
+    assert apart.name in note
+    assert alike.name not in note
+    assert not not_named(found, [cause])

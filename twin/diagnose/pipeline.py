@@ -33,7 +33,7 @@ from twin.diagnose.plan.suspicion import known_family, named, pairs_of, suspicio
 from twin.diagnose.report.scene import scene_of
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Series, Unknown
 from twin.diagnose.result.place import Scene
-from twin.diagnose.search.by_calibration import CALIBRATED
+from twin.diagnose.search.by_calibration import CALIBRATED, not_named
 from twin.diagnose.search.detector import FORM, NULLS, Detector, instruments_of, make_detector, stored
 from twin.diagnose.search.dispersion import raised, searched, wrong_temperatures
 from twin.diagnose.search.excused import excused
@@ -216,7 +216,7 @@ def diagnose(
     notes += [
         f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED and not c.rivals
     ]
-    notes += [text for text in (opened.less, opened.size) if text]
+    notes += [text for text in (opened.less, opened.size, not_named(found, causes)) if text]
     if opened.note:  # what is shown is then the calibration beside faulty channels, as of any unknown
         notes.insert(0, opened.note)
         shown, beside = beside_sensors(found, y, settings.families), ()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from twin.diagnose.evidence.batch import Hypothesis
@@ -22,22 +24,24 @@ CALIBRATED = "by calibration"  # history of a cause that calibration absorbs: it
 
 def strained_of(found: Search) -> tuple[Cause, ...]:
     """Declared parameters that calibration alone moved out of their tolerance, at their values without one. Of one that
-    has come near a bound of the calibration, the interval reaches as far as physics allows. What passes its threshold
-    beside them and could not be named is their rival, and what explains more than a number does without its tolerance,
-    more than its family does by chance, and brings the number back. One that is within its tolerance where the farthest
-    has none is that one's doing, or, where it explains as much without its own, its rival."""
+    has come near a bound of the calibration, the interval reaches as far as physics allows. A rival does a tenth at
+    least of what they do: what passes its threshold beside them and could not be named, and what explains more than a
+    number does without its tolerance, more than its family does by chance, and brings the number back. One that is
+    within its tolerance where the farthest has none is that one's doing, or, where it explains as much without its own,
+    its rival."""
     result, detector = list[Cause](), found.detector
-    unnamed = [h for h in found.steps[-1].ranked if h.statistic > detector.thresholds[h.family]]
+    least = 1.0 - detector.policy.covers
     for own in found.loose:
         if own.follows:
             continue
         p = detector.study.probed.parameters[own.index]
         place, (gain, ci95, unit) = _place(p), _told(detector, own)
         rivals = [rival_of(h, cosine, reading_beside(h)) for h, cosine in own.rivals]
-        others = (h for h in distinct([*unnamed, *_likelier(found, own)]) if h.name != place)
         a = np.sign(own.x) * _response(detector, own.index)
-        for h in others:
+        for h in distinct([*_unnamed(found), *_likelier(found, own)]):
             cosine = _cosine(a, readings_columns(detector, h) @ np.array(h.amplitude))
+            if h.name == place or cosine**2 < least:
+                continue
             alone = p.kind == "expansion" or fault_of(h).read
             remedy = _measured(p) if alone else in_the_air(h) or sensor_between(place, h.name)
             rivals.append(rival_of(h, cosine, remedy))
@@ -48,6 +52,19 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
             statistic=own.strain**2, threshold=1.0, history=CALIBRATED, rivals=tuple(rivals),
         ))  # fmt: skip
     return tuple(sorted(result, key=lambda c: -c.statistic))
+
+
+def not_named(found: Search, causes: Sequence[Cause]) -> str:
+    """A note on what passes its threshold beside numbers that calibration moved, has nothing to do with them, and could
+    not be named; "" where there is nothing."""
+    told = {c.place for c in causes} | {r.place for c in causes for r in c.rivals}
+    more = [h for h in _unnamed(found) if h.name not in told] if any(c.history == CALIBRATED for c in causes) else []
+    names = ", ".join(dict.fromkeys(f"{h.family.replace('_', ' ')} at {h.name} ({h.when.name})" for h in more))
+    return f"not named beside it, as its score passes its threshold and its refit does not: {names}" if names else ""
+
+
+def _unnamed(found: Search) -> list[Hypothesis]:
+    return [h for h in found.steps[-1].ranked if h.statistic > found.detector.thresholds[h.family]]
 
 
 def _likelier(found: Search, own: Loose) -> list[Hypothesis]:
