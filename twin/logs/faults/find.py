@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twin.logs.faults.breaks import LONGEST, noise, rail, rest_before, rests_by_rounding
+from twin.logs.faults.breaks import LONGEST, Stretch, noise, rail, rest_before, rests_by_rounding
 from twin.logs.faults.cold_start import begins_apart
 from twin.logs.faults.fault import Fault, Kind
 from twin.logs.faults.held import held
@@ -40,10 +40,8 @@ def faults_of(run: Run) -> list[Fault]:
     Times must increase, as `read_run` demands. Nothing is changed in the run.
     """
     temperatures, tcp = temperature_series(run), tcp_series(run)
-    noisy = [_fault("noise", s, n.first, n.last, n.size) for s in (*temperatures, *tcp) for n in noise(s)]
-    temperatures, tcp = (long_enough(_without(s, noisy) for s in series) for series in (temperatures, tcp))
-    single = [_fault("spike", s, n.first, n.last, n.size) for s in temperatures for n in spikes(s)]
-    temperatures = long_enough(_without(s, single) for s in temperatures)
+    noisy, (temperatures, tcp) = _apart("noise", noise, temperatures, tcp)
+    single, (temperatures,) = _apart("spike", spikes, temperatures)
     borders = [t for segment in run.segments for t in (segment.start, segment.end)]
     found = [*noisy, *single, *_of_temperatures(run, temperatures, borders), *_stuck_probes(run, tcp)]
     for s in (*temperatures, *tcp):
@@ -57,6 +55,14 @@ def faults_of(run: Run) -> list[Fault]:
         found.append(_fault(kind, s, 0, len(s.row) - 1, apart.size))
     order = [*(run.temperatures.columns if run.temperatures is not None else ()), "dx", "dy", "dz"]
     return sorted(_together(found, order), key=lambda f: (f.table != "temperatures", f.first_row))
+
+
+def _apart(
+    kind: Kind, find: Callable[[Series], Sequence[Stretch]], *groups: Sequence[Series]
+) -> tuple[list[_Found], list[list[Series]]]:
+    """The faults of a kind in groups of series, and what is left of these."""
+    found = [_fault(kind, s, n.first, n.last, n.size) for series in groups for s in series for n in find(s)]
+    return found, [long_enough(_without(s, found) for s in series) for series in groups]
 
 
 def _of_temperatures(run: Run, series: Sequence[Series], borders: Sequence[float]) -> list[_Found]:
