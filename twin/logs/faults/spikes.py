@@ -16,7 +16,7 @@ from twin.logs.faults.leaps import LEAST
 from twin.logs.faults.series import Series
 
 _SIDE = 5  # rows on each side
-_LONGEST = 3  # rows, less than the larger half of these
+_LONGEST = 3  # rows: of the five on either side of any of them two are wrong at most
 # Of the next two, as in `leaps`: tails are heavier than a normal distribution's, so the largest other one counts
 _RATIO = 4.0  # of the smallest spike of a channel to the largest other departure
 _SCALE = 5.0  # to what 98 % of the rows do not exceed, or to the last digit
@@ -54,7 +54,7 @@ def _away(values: np.ndarray) -> np.ndarray:
 
 
 def _stretches(away: np.ndarray) -> list[Stretch]:
-    """Neighbours that depart to one side, cut at the largest step where there are more than noise would have."""
+    """The farthest departures, each with its neighbours to the same side that are half as far at least."""
     peak, found = np.abs(away), list[Stretch]()
     left = peak.copy()
     while len(found) <= _MOST and left.any():
