@@ -2,8 +2,8 @@
 
 A response that is wrong by a twentieth leaves 0.05^2 of what it explains, wherever. Most of what a cause does may be
 imitated by calibration, and the error of it is not: where another cause would act at the same part, or in the same
-history, it may be that error, of all that the first one does (beside a loss that grows with its own temperature, heat
-of 9 W at its bearing in two hours; beside a source at the wrong surface, heat elsewhere with its signal).
+history, it may be that error, of all that the first one does: beside a loss that grows with its own temperature, heat
+at its bearing in two hours.
 """
 
 from __future__ import annotations

@@ -40,8 +40,8 @@ def faults_of(run: Run) -> list[Fault]:
     Times must increase, as `read_run` demands. Nothing is changed in the run.
     """
     temperatures, tcp = temperature_series(run), tcp_series(run)
-    noisy, (temperatures, tcp) = _apart("noise", noise, temperatures, tcp)
-    single, (temperatures,) = _apart("spike", spikes, temperatures)
+    noisy, (temperatures, tcp) = _taken_out("noise", noise, temperatures, tcp)
+    single, (temperatures,) = _taken_out("spike", spikes, temperatures)
     borders = [t for segment in run.segments for t in (segment.start, segment.end)]
     found = [*noisy, *single, *_of_temperatures(run, temperatures, borders), *_stuck_probes(run, tcp)]
     for s in (*temperatures, *tcp):
@@ -57,7 +57,7 @@ def faults_of(run: Run) -> list[Fault]:
     return sorted(_together(found, order), key=lambda f: (f.table != "temperatures", f.first_row))
 
 
-def _apart(
+def _taken_out(
     kind: Kind, find: Callable[[Series], Sequence[Stretch]], *groups: Sequence[Series]
 ) -> tuple[list[_Found], list[list[Series]]]:
     """The faults of a kind in groups of series, and what is left of these."""

@@ -27,7 +27,7 @@ _USUAL = 120.0  # s between rows, beyond which a light part warms and cools betw
 
 
 def spikes(s: Series) -> list[Stretch]:
-    """Stretches of up to three readings, with how far the farthest departs."""
+    """Stretches of up to three readings of a temperature, with how far [K] the farthest departs."""
     away = _away(s.values)
     found, impossible = _stretches(away), (s.values < POSSIBLE[0]) | (s.values > POSSIBLE[1])
     found = [f for f in found if f.last - f.first < _LONGEST and _at_once(s.values, f)]
@@ -38,7 +38,7 @@ def spikes(s: Series) -> list[Stretch]:
     for k, size in enumerate(sizes[:-1][:most], start=1):
         if size >= max(_RATIO * sizes[k], _SCALE * usual, LEAST[s.unit]):
             kept = k
-    never = [f for f in found[kept:] if s.unit == "degC" and impossible[f.first : f.last + 1].all()]
+    never = [f for f in found[kept:] if impossible[f.first : f.last + 1].all()]
     return sorted([*found[:kept], *never], key=lambda f: f.first)
 
 
