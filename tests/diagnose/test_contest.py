@@ -18,6 +18,7 @@ from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.contest import foremost, judged, proof, tried, worth
 from twin.diagnose.search.exact import _moved, beginning, exact, lowest, solved
+from twin.diagnose.search.forward import _as_refitted
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY
 from twin.diagnose.search.strained import strained
@@ -116,6 +117,30 @@ def test_a_joint_that_is_nearly_gone_is_compared_whatever_it_scores():
     found = foremost(detector, [*scored, gone, weaker, *[gone] * 9])
     assert found[: detector.policy.ahead] == scored[: detector.policy.ahead]
     assert found[detector.policy.ahead :] == [gone] * detector.policy.entrants
+
+
+def test_the_best_of_every_family_is_compared():
+    """Heat, where a dozen places in the sun score more."""
+    detector = small_case.made_detector()
+    heat = hypothesis()
+    suns = [
+        replace(heat, batch=replace(heat.batch, family="sun"), statistic=200.0 - i) for i in range(POLICY.ahead + 2)
+    ]
+    found = [h for (h,) in foremost(detector, [*((h,) for h in suns), (heat,), (replace(heat, statistic=90.0),)])]
+    assert found == [*suns[: POLICY.ahead], heat]
+
+
+def test_what_was_not_refitted_counts_by_what_is_left_of_its_family():
+    """Of a capacity, which saturates; heat is as its score says."""
+    detector = small_case.made_detector()
+    heat = hypothesis(places=3)
+    capacity = replace(heat, batch=replace(heat.batch, family="capacity", kind="capacity"), statistic=120.0)
+    others = [replace(h, place=place) for h in (capacity, heat) for place in (1, 2)]
+    refitted = [replace(capacity, statistic=30.0), replace(capacity, place=1, statistic=60.0)]
+    told = _as_refitted(detector, refitted, [[h] for h in (capacity, replace(capacity, place=1))], others)
+    assert [h.statistic for h in told] == [60.0, 60.0, 100.0, 100.0]
+    more = _as_refitted(detector, [replace(capacity, statistic=150.0)], [[capacity]], others)
+    assert [h.statistic for h in more] == [h.statistic for h in others]  # never more than they score
 
 
 def test_what_a_cause_may_be():

@@ -42,15 +42,19 @@ def proof(detector: Detector, h: Hypothesis) -> float:
 
 
 def foremost(detector: Detector, candidates: Sequence[Sequence[Hypothesis]]) -> list[Sequence[Hypothesis]]:
-    """Of candidates in all their starts, most worthy first, those that are compared: the first `ahead`, and of others
-    as many of a kind as are refitted where a score says little."""
+    """Of candidates in all their starts, most worthy first, those that are compared: the first `ahead`, the best of
+    every other family (of heat, where a dozen places in the sun score more), and where a score says little as many of a
+    kind as are refitted."""
     ahead, count = detector.policy.ahead, Counter[str]()
     found = list(candidates[:ahead])
+    families = {starts[0].family for starts in found}
     for starts in candidates[ahead:]:
-        kind = starts[0].batch.kind
-        if _told_badly(detector, starts[0]) and count[kind] < detector.policy.entrants:
+        kind, family = starts[0].batch.kind, starts[0].family
+        badly = _told_badly(detector, starts[0]) and count[kind] < detector.policy.entrants
+        if badly or family not in families:
             found.append(starts)
-            count[kind] += 1
+            count[kind] += badly
+            families.add(family)
     return found
 
 

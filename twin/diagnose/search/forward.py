@@ -100,7 +100,8 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         standing = _covering(detector, heat, step.parts, standing)
         if not standing:
             break
-        one, rivals = standing[0], _rivals(detector, fitted, standing[0], [*standing, *others, *ranked, *as_scores])
+        known = [*standing, *_as_refitted(detector, proved, more, [*others, *ranked]), *as_scores]
+        one, rivals = standing[0], _rivals(detector, fitted, standing[0], known)
         accepted.append(replace(as_scored(detector.study, one, detector.thresholds[one.family]), rivals=rivals))
         fitted, accepted = refit(detector, y, beginning(fitted.x, policy), accepted)
         while weak := [a for a in accepted if not stands(detector, a)]:
@@ -109,11 +110,12 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
         if in_turn := _in_turn(detector.study, accepted):
             imitated = True
             fitted, accepted = _without(detector, y, fitted, accepted, in_turn)
-    for untenable in (_uneven,) if imitated else (_leaking, _uneven):
-        if dropped := untenable(detector, accepted, steps[-1].parts):
-            fitted, accepted = _without(detector, y, fitted, accepted, dropped)
-            seen, _, step = look(detector, fitted)
-            steps.append(step)
+    if not imitated and (dropped := _leaking(detector, accepted, steps[-1].parts)):
+        fitted, accepted, seen, step = _seen_without(detector, y, fitted, accepted, dropped)
+        steps.append(step)
+    if dropped := uneven(detector, accepted):
+        fitted, accepted, seen, step = _seen_without(detector, y, fitted, accepted, dropped)
+        steps.append(step)
     if accepted:  # which may have been all that made it seem hotter
         x, covariance = settled(hotter(described, fitted.x), y, accepted)
     left = entering(detector, y, fitted, seen, steps[-1].parts, policy.entering)
@@ -191,6 +193,15 @@ def _without(
     """The fit with the accepted causes that are not dropped."""
     left = [a for a in accepted if a not in dropped]
     return refit(detector, y, fitted.x, left) if left else (detector.fitter(y), left)
+
+
+def _seen_without(
+    detector: Detector, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], dropped: Sequence[Accepted]
+) -> tuple[Fitted, list[Accepted], Sight, Step]:
+    """Likewise, with what is seen then."""
+    fitted, left = _without(detector, y, fitted, accepted, dropped)
+    seen, _, step = look(detector, fitted)
+    return fitted, left, seen, step
 
 
 def _starts(seen: Sight, h: Hypothesis, policy: SearchPolicy) -> list[Hypothesis]:
@@ -278,7 +289,7 @@ def _leaking(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, 
     ]  # fmt: skip
 
 
-def _uneven(detector: Detector, accepted: Sequence[Accepted], parts: dict[str, float]) -> list[Accepted]:
+def uneven(detector: Detector, accepted: Sequence[Accepted]) -> list[Accepted]:
     """Causes in the machine of another size in every run: what acts on readings may be set up anew for each."""
     faults = [fault_of(a.hypothesis) for a in accepted]
     return [
@@ -305,6 +316,21 @@ def stands(detector: Detector, a: Accepted) -> bool:
         and abs(first) >= detector.policy.stands * batch.smallest
         and possible(detector, a.hypothesis, first)
     )
+
+
+def _as_refitted(
+    detector: Detector, proved: Sequence[Hypothesis], begun: Sequence[Sequence[Hypothesis]],
+    others: Sequence[Hypothesis],
+) -> list[Hypothesis]:  # fmt: skip
+    """Others by what they would explain once they are refitted, where that is less than they score: the share that is
+    left of the best of their family. begun: the starts of those that were refitted."""
+    scores = {(starts[0].family, starts[0].name): max(s.statistic for s in starts) for starts in begun}
+    left = dict[str, float]()
+    for h in proved:
+        if bent(detector, h) and (score := scores.get((h.family, h.name), 0.0)) > 0.0:
+            left[h.family] = max(left.get(h.family, 0.0), h.statistic / score)
+    share = [min(left.get(h.family, 1.0), 1.0) if bent(detector, h) else 1.0 for h in others]
+    return [replace(h, statistic=part * h.statistic) for part, h in zip(share, others, strict=True)]
 
 
 def _rivals(
