@@ -1,15 +1,19 @@
-"""Effects that no entry of the catalogue has, hidden in drawn networks: `python -m benchmarks.drawn_outside FIRST N`.
+"""Effects that no description has, hidden in drawn networks: `python -m benchmarks.drawn_outside FIRST N`.
 
 As `benchmarks.drawn_machines`, of the same machines and beside their measurements with nothing hidden: heat of
-irregular histories that no log has, at one node or at two, and two nodes that are joined without the description
-knowing. The right verdict is "unknown"; a name is wrong. A row per trial goes to out/drawn/outside_SEED.jsonl, and
-files that are there are not made again.
+histories that no log has (irregular ones, at one node or at two; what follows a speed hours late), two nodes that are
+joined without the description knowing, and a joint that conducts more the faster something turns. Of heat the right
+verdict is "unknown", of the others "unknown" or their name; any other name is wrong. A row per trial goes to
+out/drawn/outside_SEED.jsonl, and files that are there are not made again.
 """
 
 from __future__ import annotations
 
+import re
 import sys
+from collections.abc import Set
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -29,61 +33,91 @@ from twin.machine.load import load_machine
 
 HOUR = 3600.0  # s
 SWITCH = "hidden_"  # columns that `twin hide` adds
+SPEEDS = ("m/s", "m/min", "1/s", "1/min")
+LAG = HOUR  # s
+FASTER = 4.0  # times the conductance at top speed
 
 
 @dataclass(frozen=True)
 class Outside:
     """An effect: slow (random levels of both signs, with ramps) or switched (on and off at random) heat at nodes, or
-    a joint between two."""
+    heat there that follows a speed late; a joint between two nodes; or a contact of the description that conducts more
+    the faster something turns ("faster")."""
 
     history: str
-    nodes: tuple[str, ...]
-    size: float  # W, or W/K of a joint
+    places: tuple[str, ...]  # nodes, or the contact
+    size: float  # W, W/K of a joint, or a factor of the conductance at top speed
+    signal: str = ""  # that it follows
 
 
 def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Outside]:
-    """One of each kind, places drawn from the machine's seed. power: W, of all sources in the mean."""
-    rng = np.random.default_rng([drawn.seed, 55])
-    nodes = list(machine.nodes)
+    """One of each kind, places drawn from the machine's seed; of what conducts where a source heats one side. power: W,
+    of all sources in the mean."""
+    rng, more = np.random.default_rng([drawn.seed, 55]), np.random.default_rng([drawn.seed, 56])
+    nodes, warm = list(machine.nodes), {str(s.surface) for s in machine.sources.values() if s.surface}
     heat = 2.0 * max(SHARE * power, 5.0)
 
     def some(n: int) -> tuple[str, ...]:
         return tuple(str(name) for name in rng.choice(nodes, n, replace=False))
 
     found = [Outside("slow", some(1), heat), Outside("switched", some(1), heat), Outside("switched", some(2), heat)]
-    joined = {frozenset(c.surfaces) for c in machine.contacts.values() if c.surfaces}
-    joined |= {frozenset(pair) for c in machine.contacts.values() for pair in c.pairs}
+    described = {name: c.surfaces for name, c in machine.contacts.items() if c.surfaces}
+    if speeds := [name for name, s in machine.signals.items() if s.unit in SPEEDS]:
+        signal = str(more.choice(speeds))
+        found.append(Outside("late", (str(more.choice(nodes)),), heat, signal))
+        if beside := [name for name, pair in described.items() if warm & set(pair)]:
+            found.append(Outside("faster", (f"contacts.{more.choice(beside)}",), FASTER, signal))
+    return [*found, *_joint(drawn, machine, rng, warm)]
+
+
+def _joint(drawn: DrawnMachine, machine: Machine, rng: np.random.Generator, warm: Set[str]) -> list[Outside]:
+    """Two nodes joined that no contact joins, one of them warm; none where there are no such."""
+    joined = {frozenset(pair) for c in machine.contacts.values() for pair in (c.surfaces or (), *c.pairs)}
     totals = [float(c.total) for c in machine.contacts.values() if c.total]
-    free = [(a, b) for i, a in enumerate(nodes) for b in nodes[i + 1 :] if frozenset((a, b)) not in joined]
+    free = [pair for pair in combinations(machine.nodes, 2) if frozenset(pair) not in joined and warm & set(pair)]
     for pair in rng.permutation(free).tolist() if totals else ():
-        own = Outside("joint", tuple(pair), float(np.median(totals)))
+        own = Outside("joint", tuple(pair), 2.0 * float(np.median(totals)))
         try:
             load_machine(Path("machine.toml"), with_joint(drawn.text, own))
         except TwinError:  # an axis would carry both sides of its guides
             continue
-        return [*found, own]
-    return found
+        return [own]
+    return []
 
 
 def with_joint(text: str, hidden: Outside) -> str:
     """A description with two nodes joined."""
-    a, b = hidden.nodes
+    a, b = hidden.places
     joint = f'kind = "fixed"\nsurfaces = ["{a}", "{b}"]\ntotal = "{hidden.size:.4g} W/K"\n'
     return f"{text}\n[contacts.unknown]\n{joint}"
 
 
-def slow(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:
+def slow(rng: np.random.Generator, time: np.ndarray, of: np.ndarray) -> np.ndarray:
     """The history of the five-axis trials at times (n,) s."""
     return telegraph(rng, time, np.diff(time, prepend=time[0]))
 
 
-def switched(rng: np.random.Generator, time: np.ndarray) -> np.ndarray:
+def switched(rng: np.random.Generator, time: np.ndarray, of: np.ndarray) -> np.ndarray:
     """0 or 1 for 0.2 h and 0.5 h more in the mean each, at times (n,) s."""
     edges = np.cumsum(rng.exponential(0.5 * HOUR, 100) + 0.2 * HOUR)
     return (np.searchsorted(edges, time) % 2).astype(float)
 
 
-HISTORIES = {"slow": slow, "switched": switched}
+def late(rng: np.random.Generator, time: np.ndarray, of: np.ndarray) -> np.ndarray:
+    """What it follows, of (n,), with a time constant of LAG: through a body that nobody described."""
+    found, now = np.empty(len(time)), 0.0
+    for i, step in enumerate(np.diff(time, prepend=time[0])):
+        now += (of[i] - now) * -np.expm1(-step / LAG)
+        found[i] = now
+    return found
+
+
+def faster(rng: np.random.Generator, time: np.ndarray, of: np.ndarray) -> np.ndarray:
+    """What it follows, of (n,)."""
+    return of
+
+
+HISTORIES = {"slow": slow, "switched": switched, "late": late, "faster": faster}
 
 
 def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Outside, seed: int) -> list[Path]:
@@ -94,8 +128,9 @@ def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Outside, seed
         (out / "real").mkdir(parents=True)
         (out / "real" / "machine.toml").write_text(with_joint(text, hidden), encoding="utf-8")
         return simulated(out / "real", logs, out, drawn, seed)
-    for i, node in enumerate(hidden.nodes):
-        told = ["heat_source", node, f"{hidden.size:.4g} W", str(real), "-o", str(out / f"real_{i}"), "--to", "1 h"]
+    family, unit = ("joint", "") if hidden.history == "faster" else ("heat_source", " W")
+    for i, place in enumerate(hidden.places):
+        told = [family, place, f"{hidden.size:.4g}{unit}", str(real), "-o", str(out / f"real_{i}"), "--to", "1 h"]
         if command(["hide", *told, *(word for log in logs for word in ("--run", str(log)))]):
             return []
         real = out / f"real_{i}"
@@ -107,7 +142,9 @@ def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Outside, seed
 def _with_histories(log: Path, hidden: Outside, rng: np.random.Generator) -> Path:
     """The log with a history in the column of each hidden switch."""
     run = read_run(log)
-    made = {c: HISTORIES[hidden.history](rng, run.loads.time) for c in run.loads.columns if c.startswith(SWITCH)}
+    of = np.abs(run.loads.columns[hidden.signal]) if hidden.signal else np.zeros(len(run.loads.time))
+    of = np.clip(of / max(float(of.max()), 1e-30), 0.0, 1.0)
+    made = {c: HISTORIES[hidden.history](rng, run.loads.time, of) for c in run.loads.columns if c.startswith(SWITCH)}
     write_run(log, replace(run, loads=replace(run.loads, columns={**run.loads.columns, **made})))
     return log
 
@@ -120,8 +157,14 @@ def _seen(run: Run) -> Run:
 
 
 def answer(row: Row) -> str:
-    """What a row is worth: "unknown", which is right, "too_poor", "nothing", or "wrong": a name."""
-    return row["verdict"] if row["verdict"] in ("unknown", "too_poor", "nothing") else "wrong"
+    """What a row is worth: "unknown", which is right, "too_poor", "nothing", "right" where what conducts is named, or
+    "wrong": any other name."""
+    history, *places, _ = row["hidden"]
+    if row["verdict"] in ("unknown", "too_poor", "nothing"):
+        return str(row["verdict"])
+    named = [{"missing_joint": "joint", "joint": "faster"}.get(c[0], "") for c in row["causes"]]
+    same = [set(re.split("<>", c[1])) == set(places) for c in row["causes"]]
+    return "right" if any(n == history and s for n, s in zip(named, same, strict=True)) else "wrong"
 
 
 def judged(seed: int) -> list[Row]:
@@ -137,7 +180,7 @@ def _judged(drawn: DrawnMachine, folder: Path) -> list[Row]:
     for i, hidden in enumerate(effects(drawn, machine, power_of(detector.study))):
         if made := measured(drawn, folder, folder / f"effect_{i}", hidden, 60 + i):
             own = [_seen(read_run(p)) for p in made]
-            row = said(detector, (hidden.history, *hidden.nodes, f"{hidden.size:.3g}"), own)
+            row = said(detector, (hidden.history, *hidden.places, f"{hidden.size:.3g}"), own)
             rows.append(row | {"moved": moved(own, sound)})
     return rows
 

@@ -125,7 +125,7 @@ def test_every_family_has_its_row():
     assert list(EDITS) == [
         "film_gain", "forced_convection", "heat_source", "loss_law", "joint", "zone", "sun", "coolant", "sensor",
         "signal", "scale_expansion", "expansion", "slip", "capacity", "initial_state", "coarse_model", "measurement",
-        "misplaced_source", "not_thermal",
+        "misplaced_source", "not_thermal", "missing_joint",
     ]  # fmt: skip
 
 

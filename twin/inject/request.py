@@ -21,6 +21,7 @@ UNITS: dict[str, tuple[str, ...]] = {  # of the size, by family; the first that 
     "film_gain": ("1", "W/(m^2*K)"), "forced_convection": ("W/(m^2*K)",), "heat_source": ("W",),
     "loss_law": ("1", "W"), "joint": ("1",), "zone": ("K", "K/m"), "sun": ("W",), "coolant": ("W/(m^2*K)",),
     "scale_expansion": ("1/K",), "expansion": ("1",), "capacity": ("J/K", "1"), "misplaced_source": (),
+    "missing_joint": ("W/K",),
 }  # fmt: skip
 SETTINGS: dict[str, dict[str, str | None]] = {  # by family: name and unit; "": that of the signal, None: a name
     "heat_source": {"reference": ""}, "loss_law": {"reference": "", "gain": "1"}, "zone": {"height": "m"},
@@ -28,7 +29,7 @@ SETTINGS: dict[str, dict[str, str | None]] = {  # by family: name and unit; "": 
     "scale_expansion": {"fixed_at": "m", "surface": None, "axis": None},
 }  # fmt: skip
 FOLLOWING = ("forced_convection", "heat_source", "loss_law", "sun")  # a power of their signal
-STEADY = ("expansion", "scale_expansion", "capacity", "misplaced_source")
+STEADY = ("expansion", "scale_expansion", "capacity", "misplaced_source", "missing_joint")
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from twin.diagnose.faults.table import FAMILIES
 from twin.errors import TwinError
 from twin.nearest import did_you_mean
 
-VERSION = "1"
+VERSION = "2"
 
 
 def family(name: str, families: Sequence[Family] = FAMILIES, option: str = "--explain") -> Family:

@@ -208,12 +208,8 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         lifted = probed.H[:, own_films] - pivot(study, e) * M[:, own_films]
         if np.abs(probed.H[:, own_films]).max(initial=0.0) > 0.0:
             add("gradient", environment.name, [own.convection[:, own_films] @ lifted.T for own in nominal], always)
-    for j, joint in enumerate(load.joints):
-        term = A[len(films) + j]
-        conductance = [np.asarray(run.drive.theta)[:, [len(films) + j]] for run in runs]
-        add("joint", joint.name, [-k * (x @ term.T) for k, x in zip(conductance, z, strict=True)], {}, True)
-    for c, name in enumerate(load.contacts):
-        add("contact", name, [_contact_flow(study, k, c, x) for k, x in enumerate(z)], {}, True)
+    for kind, name in conductances(load):
+        add(kind, name, [conducted(study, k, kind, name, x) for k, x in enumerate(z)], {}, True)
     powers = [_power_of(system, run.drive, own) for run, own in zip(runs, nominal, strict=True)]
     for j, source in enumerate(load.sources):
         heat = [emitted(study, k, j) for k in range(len(runs))]
@@ -267,14 +263,22 @@ def pivot(study: Study, e: int) -> float:
     return float((body.one @ probed.H[:, own]).sum() / area) if area > 0.0 else 0.0
 
 
-def _contact_flow(study: Study, k: int, c: int, z: np.ndarray) -> np.ndarray:
-    """-P Gamma_c P^T z (n, r) of one contact at its nominal conductance."""
-    probed = study.probed
-    loads = study.runs[k].run.loads
+def conductances(load: LoadModel) -> list[tuple[str, str]]:
+    """(kind, name) of all that conducts between parts."""
+    return [*(("joint", j.name) for j in load.joints), *(("contact", name) for name in load.contacts)]
+
+
+def conducted(study: Study, k: int, kind: str, name: str, z: np.ndarray) -> np.ndarray:
+    """(n, r) of states z (n, r) in run k, at the nominal conductance: -kappa A_j z of a joint, -P Gamma_c P^T z of a
+    contact."""
+    probed, run = study.probed, study.runs[k].run
+    load, n_films = probed.base.load_model, probed.layout.n_films
+    if kind == "joint":
+        at = n_films + [j.name for j in load.joints].index(name)
+        return np.asarray(-np.asarray(run.drive.theta)[:, [at]] * (z @ np.asarray(probed.system.A[0])[at].T))
     P = np.asarray(probed.system.P[0])
-    mask = np.zeros(len(probed.base.load_model.contacts))
-    mask[c] = 1.0
-    gamma = gammas(probed.contacts, loads, mask)
+    mask = np.array([float(c == name) for c in load.contacts])
+    gamma = gammas(probed.contacts, run.loads, mask)
     return np.asarray(-np.einsum("tij,tj->ti", gamma, z @ P) @ P.T)
 
 

@@ -16,6 +16,7 @@ from twin.diagnose.faults import (
     loss_law,
     measurement,
     misplaced_source,
+    missing_joint,
     missing_member,
     not_thermal,
     scale_expansion,
@@ -31,6 +32,7 @@ from twin.rom.parameter import Parameter
 _FILES = (
     film_gain, forced_convection, heat_source, loss_law, joint, zone, sun, coolant, sensor, signal, scale_expansion,
     expansion, slip, capacity, initial_state, coarse_model, measurement, misplaced_source, not_thermal, missing_member,
+    missing_joint,
 )  # fmt: skip
 FAMILIES: tuple[Family, ...] = tuple(file.FAMILY for file in _FILES)
 FAULTS: dict[tuple[str, str], Fault] = {(f.family, f.kind): f for file in _FILES for f in file.FAULTS}

@@ -38,6 +38,8 @@ def _located(machine: Machine, probed: ProbedModel, place: str) -> list[str]:
     of, name = spot.of, spot.name
     if place in places:
         return _surfaces([places[place]])
+    if spot.between:
+        return [m for side in (name, spot.partner) for m in _located(machine, probed, side)]
     if of is Of.FILM:
         return _surfaces([p for p in places.values() if p.film == name])
     if of is Of.CONTACT and name in machine.contacts:

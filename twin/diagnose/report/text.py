@@ -251,7 +251,7 @@ def chance(nulls: np.ndarray | None, threshold: float) -> str:
     values = np.asarray([] if nulls is None else nulls, dtype=float)
     values = values[np.isfinite(values)]
     n, above = len(values), int((values > threshold).sum())
-    if not n or not math.isfinite(threshold):
+    if not n or not math.isfinite(threshold) or not values.any():  # what is asked after all else is asked of none
         return ""
     # none of n: with 95 % confidence the rate is below 3 / n
     rare = "" if above else f", which makes it rarer than once in {max(1, round(n / 3))} with 95 % confidence"

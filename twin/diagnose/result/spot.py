@@ -38,7 +38,7 @@ class Of(Enum):
 @dataclass(frozen=True)
 class Spot:
     """A place, as "films.bed" or "bed.left" of a surface, or one with a partner: "sources.SOURCE>PLACE",
-    "axes.AXIS<PART", "signals.SIGNAL*FACTOR", "sensors.ONE<>OTHER".
+    "axes.AXIS<PART", "signals.SIGNAL*FACTOR", "sensors.ONE<>OTHER", "bed.left<>column.back".
     """
 
     text: str
@@ -55,7 +55,9 @@ class Spot:
 
     @property
     def words(self) -> str:
-        """As "film bed"; surfaces and the rest stay as they are."""
+        """As "film bed", or "motor and bed" of two that are joined; surfaces and the rest stay as they are."""
+        if self.between:
+            return f"{self.name} and {self.partner}"
         return f"{self.of.words} {self.text.partition('.')[2]}" if self.of.words else self.text
 
     @property
@@ -66,7 +68,7 @@ class Spot:
     @property
     def part(self) -> str:
         """The part of a surface; of anything else what it is of."""
-        return self.text.partition(".")[0]
+        return (self.name if self.of is Of.SURFACE else self.text).partition(".")[0]
 
     @property
     def within(self) -> str:
@@ -87,6 +89,11 @@ class Spot:
     def air(self) -> bool:
         """Whether it is a film, or what films give their heat to."""
         return self.of in (Of.FILM, Of.ENVIRONMENT)
+
+    @property
+    def between(self) -> bool:
+        """Whether it is two surfaces or nodes."""
+        return self.of is Of.SURFACE and bool(self.partner)
 
     @property
     def pad(self) -> bool:

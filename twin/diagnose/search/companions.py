@@ -50,7 +50,7 @@ def parts_of(study: Study, name: str) -> set[str]:
 
 
 def surfaces_of_place(study: Study, name: str) -> set[str]:
-    """A surface, all of a film, or the one that a source heats, or would heat in its place."""
+    """A surface, all of a film, the one that a source heats, or would heat in its place, or both that are joined."""
     spot, places = Spot.read(name), study.probed.places
     if spot.of is Of.FILM:
         return {p.name for p in places if p.film == spot.name}
@@ -58,4 +58,4 @@ def surfaces_of_place(study: Study, name: str) -> set[str]:
         sources = study.probed.base.load_model.sources
         own = [own_place(study, j) for j, s in enumerate(sources) if s.name == spot.name and not s.contact]
         return {places[p].name for p in own if p is not None} | ({spot.partner} if spot.partner else set())
-    return {name}
+    return {spot.name, spot.partner} if spot.between else {name}

@@ -44,6 +44,7 @@ from twin.diagnose.search.detector import FLOOR, Detector, weighted
 from twin.diagnose.search.exact import beginning, closer, exact, misfit_of_each, unexplained
 from twin.diagnose.search.forward import naming, search, search_again
 from twin.diagnose.search.look import Search, look
+from twin.diagnose.search.paths import otherwise
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.refit import refit
 from twin.diagnose.search.start import afresh, begun
@@ -78,7 +79,13 @@ class Dispersion:
 
 def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
     """Causes in measurements y (m,) of the fitted runs, NaN where something is missing, and the dispersion of the
-    first search, of channels as they leap: where that is no chance, causes must explain more (`raised`)."""
+    first search, of channels as they leap: where that is no chance, causes must explain more (`raised`). What one path
+    of heat explains better is that (`paths`)."""
+    found, own = _searched(detector, y)
+    return otherwise(found, y), own
+
+
+def _searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
     described = detector = afresh(detector)
     start = begun(detector, y)
     first, weight = search(detector, y, start), np.ones(len(y))

@@ -19,6 +19,7 @@ Per family one function, in the table EDITS. What `Effect.amplitude` means there
 | capacity | part.surface | J/K behind settings["conductance"] W/K |
 | capacity | NODE, tanks.X, materials.X | factor of its own, of unit "1" |
 | misplaced_source | sources.X | none: settings["surface"] |
+| missing_joint | NODE<>NODE | W/K between them |
 
 Without settings["reference"] that is the largest size in the certified range of the signal. Other families change
 nothing in a description. All SI; the names of new entries are found_1, found_2, ...
@@ -43,7 +44,10 @@ from twin.machine.extend import appended, changed, free_name
 from twin.machine.references import reference_problems
 from twin.nearest import did_you_mean
 
-_SIZES = {"sources": "gain", "films": "gain", "scales": "expansion", "tanks": "capacity", "materials": "expansion"}
+_SIZES = {
+    "sources": "gain", "films": "gain", "scales": "expansion", "tanks": "capacity", "materials": "expansion",
+    "contacts": "total",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -172,4 +176,5 @@ EDITS: dict[str, Callable[[Site, Effect], Change]] = {
     "measurement": _nothing,
     "misplaced_source": heat.misplaced_source,
     "not_thermal": _nothing,
+    "missing_joint": exchange.missing_joint,
 }

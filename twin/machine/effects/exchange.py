@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from twin.errors import DescriptionError
+from twin.machine.bodies import owner_of
 from twin.machine.effects.effect import Effect
 from twin.machine.effects.site import (
     Change,
@@ -74,6 +75,19 @@ def joint(site: Site, effect: Effect) -> Change:
     if contact.joint is not None:
         return Change(values={f"contacts.{name}.joint.gain": contact.joint.gain * effect.amplitude})
     return Change(values={f"contacts.{name}.conductance": float(contact.conductance or 0.0) * effect.amplitude})
+
+
+def missing_joint(site: Site, effect: Effect) -> Change:
+    """Two nodes or bars exchange heat that no contact joins."""
+    ends = effect.place.split("<>")
+    if len(ends) != 2:
+        raise DescriptionError("needs two places", effect.place, "write both, as 'motor<>bed'")
+    for end in ends:
+        if owner_of(*surfaces_of(site, end)) in site.machine.parts:
+            what = "no contact joins surfaces of two parts that do not touch"
+            raise DescriptionError(what, effect.place, "name nodes or bars of a lumped machine")
+    joint = {"kind": "fixed", "surfaces": ends, "total": quantity(effect.amplitude, "W/K")}
+    return Change(((f"contacts.{site.name}", joint),))
 
 
 def zone(site: Site, effect: Effect) -> Change:

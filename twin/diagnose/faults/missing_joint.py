@@ -1,0 +1,85 @@
+"""Two parts exchange heat that the description does not join: an oil line, a cable, chips, a face that touches."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from twin.build.places import Place
+from twin.diagnose.evidence.batch import Batch
+from twin.diagnose.faults.context import Context
+from twin.diagnose.faults.fault import Family, Fault, Slot
+from twin.diagnose.model.study import Study
+from twin.diagnose.result.diagnosis import Cause
+from twin.diagnose.result.spot import Spot
+
+LARGEST = 1000.0  # W/K: of a flow of 14 l/min of water, which brings all of its heat across
+# relative standard deviation of a size, as of described joints: 536 to 546 of `benchmarks.drawn_outside`, where it was
+# chosen, have true sizes of 0.5 to 1.9 times what is told
+OWN = 0.3
+
+
+@dataclass(frozen=True)
+class MissingJoint(Fault):
+    """Between two places; its own place is ONE<>OTHER."""
+
+    def fill(self, slot: Slot) -> None:
+        probed, names = slot.study.probed, [p.name for p in slot.study.probed.places]
+        spot = Spot.read(slot.unit.place)
+        d = probed.B[names.index(spot.name)] - probed.B[names.index(spot.partner)]
+        slot.slots.A[slot.s], slot.slots.gate[:, slot.s] = np.outer(d, d), slot.shape
+
+    def log_change(self, amplitude: float, sigma: float = 0.0) -> tuple[float, float]:
+        """Its own logarithm: a strong one makes two bodies one, and nothing tells how strong."""
+        return float(np.log(amplitude)), sigma / amplitude
+
+    def amplitude(self, change: float, sigma: float = 0.0) -> tuple[float, float]:
+        return float(np.exp(change)), float(np.exp(change)) * sigma
+
+
+FAULTS = (
+    MissingJoint(
+        "missing_joint", "path", "W/K", "", 1, 0.5, own=OWN, bent=True, saturates=True, largest=LARGEST,
+    ),
+)  # fmt: skip
+
+
+def pairs(study: Study, parts: Collection[frozenset[str]] | None = None) -> list[tuple[int, int]]:
+    """Places, by number, of two parts that no contact joins: the largest of each, or all of these parts, by two."""
+    probed = study.probed
+    own = [i for i, place in enumerate(probed.places) if not Spot.read(place.name).pad]
+    if parts is None:
+        largest = sorted(own, key=lambda i: (bool(probed.places[i].film), probed.places[i].area), reverse=True)
+        own = sorted({probed.places[i].members: i for i in reversed(largest)}.values())
+    found = [(i, j, _between(probed.places[i], probed.places[j])) for i, j in combinations(own, 2)]
+    return [
+        (i, j) for i, j, between in found
+        if all(len(pair) == 2 and pair not in probed.joined and (parts is None or pair in parts) for pair in between)
+    ]  # fmt: skip
+
+
+def _between(a: Place, b: Place) -> set[frozenset[str]]:
+    return {frozenset((m, n)) for m in a.members for n in b.members}
+
+
+def after_others(context: Context) -> list[Batch]:
+    """None before anything else was searched (`twin.diagnose.search.paths`)."""
+    return []
+
+
+def editable(cause: Cause) -> bool:
+    """Between nodes and bars: of parts no entry joins two that do not touch."""
+    return "." not in cause.place
+
+
+FAMILY = Family(
+    21, "missing_joint", "Two parts are joined, and not described so",
+    "Two parts exchange heat that no contact of the description joins: an oil line, a cable, chips, faces that touch.",
+    "-kappa d d^T x", "residuals of opposite sign on both, in proportion to their difference", "0.5 W/K", "positive",
+    "every surface or node with every one of another part that no contact joins to it, where something else was found; "
+    "always", "machine",
+    after_others, what="a joint that the description lacks", editable=editable,
+)  # fmt: skip

@@ -1,0 +1,133 @@
+"""Paths of heat that are asked after all else: two parts that the description does not join, and joints that conduct
+with a speed.
+
+They do what other causes do, nearly: an oil line from a warm motor to a bed is heat there with the motor's power, or
+the motor's heat elsewhere; a joint that conducts more while a spindle turns is a loss that falls with its own
+temperature. There are as many as pairs of places, and would raise the threshold of everything. So where a search has
+found something in the machine, or heat of any history, one path must explain clearly more than all of that together,
+and takes its place; where it explains as much it is its rival. A machine in which nothing was found is not asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.fitter import Fitted
+from twin.diagnose.faults.paths import Paths, paths_between, paths_of
+from twin.diagnose.faults.table import fault_of
+from twin.diagnose.model.bank import Nominal, nominal_run, respond
+from twin.diagnose.result.spot import Spot
+from twin.diagnose.search.accepted import Accepted, as_scored, exchanged, possible, readings_columns
+from twin.diagnose.search.contest import worth
+from twin.diagnose.search.detector import Detector
+from twin.diagnose.search.exact import closer, exact, left_less, misfit, unbent
+from twin.diagnose.search.forward import naming, stands, uneven
+from twin.diagnose.search.look import Search, with_cosines
+from twin.diagnose.search.refit import refit
+
+
+def otherwise(found: Search, y: np.ndarray) -> Search:
+    """A search in y (m,), or what it is where one path of heat explains more than all that it has found, or than all
+    but faulty sensors; with that path among the rivals where it explains as much."""
+    left = _heat(found)
+    if not found.accepted and not left:
+        return found
+    study, first = found.detector.study, found.detector.columns.raw.shape[1]
+    nominal = [nominal_run(study, k) for k in study.fitted]
+    detector, paths = _with(found.detector, nominal, paths_of(study, nominal, first))
+    if not paths:
+        return found
+    beside = [a for a in found.accepted if fault_of(a.hypothesis).read]
+    for others in ([], beside) if beside and (left or len(beside) < len(found.accepted)) else ([],):
+        if (told := _instead(found, detector, y, nominal, paths, others)) is not None:
+            return told
+    return found
+
+
+def _heat(found: Search) -> float:
+    """The evidence for heat of any history that a search has left, 0 where it does not pass."""
+    left = max(found.steps[-1].parts.values(), default=0.0)
+    return left if left > found.detector.thresholds["unknown"] else 0.0
+
+
+def _instead(
+    found: Search, detector: Detector, y: np.ndarray, nominal: Sequence[Nominal], paths: Sequence[Hypothesis],
+    others: Sequence[Accepted],
+) -> Search | None:  # fmt: skip
+    """The best path beside some other causes in place of all that a search has found, or among its rivals; None where
+    it explains less."""
+    policy = detector.policy
+    fitted, kept = refit(detector, y, found.fitted.x, others) if others else (detector.fitter(y), [])
+    rest = exchanged(detector.study, y, kept)
+    detector, likely = _nearer(detector, rest, fitted, nominal, _likely(detector, rest, fitted, paths))
+    passes = policy.window_passes  # a strong path is far from where the derivative of a weak one points
+    tried = [exact(detector, rest, fitted, h, passes) for h in likely]
+    tried = [h for h in tried if possible(detector, h, h.amplitude[0])]
+    explained = max(misfit(detector, fitted) - misfit(detector, found.fitted), 0.0)
+    best = max(tried, key=lambda h: worth(h, policy), default=None)
+    if best is None or best.statistic < (1.0 - policy.saturates) * (explained + _heat(found)):
+        return None
+    best = closer(detector, rest, fitted, best)
+    replaced = [a for a in found.accepted if all(a is not own for own in others)]
+    one = as_scored(detector.study, best, detector.thresholds[best.family])
+    now = naming(replace(found, detector=detector), y, fitted.x, [*kept, one])
+    if not all(stands(detector, a) for a in now.accepted[:-1]) or uneven(detector, now.accepted):
+        return None
+    gained = misfit(detector, fitted) - misfit(detector, now.fitted) - (best.statistic - worth(best, policy))
+    known = explained - sum(a.hypothesis.statistic - worth(a.hypothesis, policy) for a in replaced)
+    near = max(policy.close, policy.misfit * explained)
+    if _heat(found):
+        misfits = max(detector.thresholds["unknown"], policy.misfit * gained)
+        covered = _heat(now) <= misfits and gained > policy.covers * (explained + _heat(found))
+        return now if covered and gained > one.threshold else None
+    if gained > max(explained + near, one.threshold):
+        return now
+    if gained <= max(known - near, one.threshold):
+        return None
+    first = replaced[0]
+    rivals = (*first.rivals, *with_cosines(detector, fitted, first.hypothesis, [best]))
+    accepted = tuple(replace(a, rivals=rivals) if a is first else a for a in found.accepted)
+    return replace(found, detector=detector, accepted=accepted)
+
+
+def _nearer(
+    detector: Detector, y: np.ndarray, fitted: Fitted, nominal: Sequence[Nominal], likely: Sequence[Hypothesis]
+) -> tuple[Detector, list[Hypothesis]]:
+    """The most likely paths, those between parts of several surfaces at the best of these."""
+    spots = [Spot.read(h.name) for h in likely]
+    parts = {frozenset((s.part, Spot.read(s.partner).part)) for s in spots if s.between}
+    own = paths_between(detector.study, nominal, detector.columns.raw.shape[1], parts)
+    if len(own.columns) <= len(parts):
+        return detector, list(likely)
+    detector, between = _with(detector, nominal, own)
+    joints = [h for h, s in zip(likely, spots, strict=True) if not s.between]
+    return detector, _likely(detector, y, fitted, [*joints, *between])
+
+
+def _with(detector: Detector, nominal: Sequence[Nominal], own: Paths) -> tuple[Detector, list[Hypothesis]]:
+    """The detector with columns of paths behind all others, and each path as a hypothesis, not scored yet."""
+    known = detector.columns
+    raw = detector.whiten(respond(detector.study, nominal, own.vectors, own.columns).astype(float))
+    others = np.hstack([known.others, detector.fitter.others.T @ raw])
+    columns = replace(known, raw=np.hstack([known.raw, raw.astype(np.float32)]), others=others)
+    found = [Hypothesis(b, i, w, 0.0, (0.0,)) for b in own.batches for i in range(len(b.places)) for w in b.histories]
+    return replace(detector, columns=columns), found
+
+
+def _likely(detector: Detector, y: np.ndarray, fitted: Fitted, paths: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The paths that explain most to first order, as many as others of a kind are refitted."""
+    there = unbent(detector, y, fitted)
+    less, white = left_less(detector, there, fitted), detector.whiten(there.residual)
+    D = np.column_stack([readings_columns(detector, h) for h in paths])
+    PD = there.projector(D)
+    g, F = PD.T @ white, np.maximum((D * PD).sum(axis=0), 1e-30)
+    scored = [
+        replace(h, statistic=float(a * own - less), amplitude=(float(a),))
+        for h, a, own in zip(paths, g / F, g, strict=True) if h.batch.sign == 0 or h.batch.sign * a > 0.0
+    ]  # fmt: skip
+    best = sorted(scored, key=lambda h: -h.statistic)
+    return [h for h in best[: detector.policy.entrants] if h.statistic > 0.0]
