@@ -9,7 +9,6 @@ out/drawn/outside_SEED.jsonl, and files that are there are not made again.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Set
 from dataclasses import dataclass, replace
@@ -20,7 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.drawn_machines import OUT, SHARE, drawn_of, logs_of, moved, power_of, said, set_up, simulated
-from benchmarks.rows import Row, counted, of_seeds
+from benchmarks.rows import Row, counted, of_seeds, worth
 from twin.cli.main import run as command
 from twin.errors import TwinError
 from twin.inject.draw.histories import telegraph
@@ -157,14 +156,19 @@ def _seen(run: Run) -> Run:
 
 
 def answer(row: Row) -> str:
-    """What a row is worth: "unknown", which is right, "too_poor", "nothing", "right" where what conducts is named, or
-    "wrong": any other name."""
+    """What a row is worth: "unknown", which is right, "too_poor", "nothing"; of what conducts "right" where it is named
+    first, "among" where it is a rival; or "wrong": any other name."""
     history, *places, _ = row["hidden"]
     if row["verdict"] in ("unknown", "too_poor", "nothing"):
         return str(row["verdict"])
-    named = [{"missing_joint": "joint", "joint": "faster"}.get(c[0], "") for c in row["causes"]]
-    same = [set(re.split("<>", c[1])) == set(places) for c in row["causes"]]
-    return "right" if any(n == history and s for n, s in zip(named, same, strict=True)) else "wrong"
+
+    def sorted_ends(place: str) -> str:
+        return "<>".join(sorted(place.split("<>")))
+
+    right = {({"joint": "missing_joint", "faster": "joint"}.get(history, ""), sorted_ends("<>".join(places)))}
+    told = row["rivals"] if row["verdict"] == "ambiguous" else []
+    named, rivals = ([(c[0], sorted_ends(c[1])) for c in causes] for causes in (row["causes"], told))
+    return worth(named, rivals, right)
 
 
 def judged(seed: int) -> list[Row]:
