@@ -1,4 +1,4 @@
-"""A joint or contact conducts otherwise than described, always or since an event."""
+"""A joint or contact conducts otherwise than described, always or since an event; or with a speed (`paths`)."""
 
 from __future__ import annotations
 
@@ -38,8 +38,10 @@ def batches(context: Context) -> list[Batch]:
 
 FAMILY = Family(
     5, "joint", "Joint conductance wrong or lost",
-    "A joint or guide conducts otherwise than described, perhaps since an event: preload lost, oil film gone.",
+    "A joint or guide conducts otherwise than described, perhaps since an event: preload lost, oil film gone; or the "
+    "more the faster something turns.",
     "-kappa g(t) d d^T x", "residuals of opposite sign on both sides", "30 % of a conductance", "either",
-    "every contact; always, and from every hour on", "machine", batches,
+    "every contact; always, and from every hour on; where something else was found, with every speed", "machine",
+    batches,
     what="a joint that conducts otherwise than declared", times="times the declared", declared=True,
 )  # fmt: skip
