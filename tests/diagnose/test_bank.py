@@ -78,7 +78,7 @@ def test_against_differences(key):
 def test_every_fault_in_a_machine_is_compared():
     """But those that a lumped machine has not, a coolant, which is a film and heat, and what `test_paths` compares."""
     acting = {fault.kind for fault in FAULTS.values() if not fault.read}
-    assert acting - {"gradient", "moved", "coolant", "path"} == {kind for kind, _, _ in KEYS}
+    assert acting - {"gradient", "moved", "coolant", "between"} == {kind for kind, _, _ in KEYS}
 
 
 def test_reactions_of_laws_are_small():

@@ -16,7 +16,7 @@ from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.result.diagnosis import Window
 from twin.diagnose.search.accepted import Accepted
-from twin.diagnose.search.contest import foremost, judged, proof, tried, worth
+from twin.diagnose.search.contest import behind, foremost, judged, proof, tried, worth
 from twin.diagnose.search.exact import _moved, beginning, exact, lowest, solved
 from twin.diagnose.search.forward import _as_refitted
 from twin.diagnose.search.look import look
@@ -136,9 +136,12 @@ def test_what_was_not_refitted_counts_by_what_is_left_of_its_family():
     heat = hypothesis(places=3)
     capacity = replace(heat, batch=replace(heat.batch, family="capacity", kind="capacity"), statistic=120.0)
     others = [replace(h, place=place) for h in (capacity, heat) for place in (1, 2)]
-    refitted = [replace(capacity, statistic=30.0), replace(capacity, place=1, statistic=60.0)]
+    refitted = [replace(capacity, statistic=30.0), replace(capacity, place=1, statistic=90.0)]
     told = _as_refitted(detector, refitted, [[h] for h in (capacity, replace(capacity, place=1))], others)
-    assert [h.statistic for h in told] == [60.0, 60.0, 100.0, 100.0]
+    assert [h.statistic for h in told] == [90.0, 90.0, 100.0, 100.0]
+    least = 120.0 * (1.0 - behind(capacity, POLICY))  # what may overtake a leader by being refitted
+    told = _as_refitted(detector, refitted[:1], [[capacity]], others)
+    assert [h.statistic for h in told] == [least, least, 100.0, 100.0]
     more = _as_refitted(detector, [replace(capacity, statistic=150.0)], [[capacity]], others)
     assert [h.statistic for h in more] == [h.statistic for h in others]  # never more than they score
 

@@ -104,6 +104,7 @@ def test_only_parts_that_no_contact_joins_may_be_joined() -> None:
     ("place", "what"),
     [
         ("motor", "needs two places"),
+        ("motor<>head", "contacts.flange joins them already"),
         ("motor<>nowhere", "no such surface"),
         ("motor<>motor", "both ends are at one node"),
     ],
@@ -121,9 +122,9 @@ def test_responses_of_paths_against_differences() -> None:
     nominal = [nominal_run(study, k) for k in study.fitted]
     own, x = paths_of(study, nominal, 0), np.zeros(len(study.probed.parameters))
     D = respond(study, nominal, own.vectors, own.columns)
-    assert {b.kind for b in own.batches} == {"path", "joint", "contact"}
+    assert {b.kind for b in own.batches} == {"between", "joint", "contact"}
     for batch in own.batches:
-        little = 2e-3 if batch.kind == "path" else 5e-3  # W/K; of a conductance
+        little = 2e-3 if batch.kind == "between" else 5e-3  # W/K; of a conductance
         h = Hypothesis(batch, 0, batch.histories[-1], 0.0, (0.0,))
         got = D[:, batch.columns[0]] @ h.when.weights[0]
         parts = []

@@ -82,7 +82,7 @@ def _hide_in_machine(asked: Request, target: Path, out: Path, runs: Sequence[Pat
     text = written_out(path.read_bytes().decode("utf-8-sig"))
     logs = {folder: read_run(folder) for folder in runs}
     effect = effect_of(asked, machine, list(logs.values()))
-    for place in (effect.place, str(effect.settings.get("surface", ""))):
+    for place in (*effect.place.split("<>"), str(effect.settings.get("surface", ""))):
         _expect_surface(machine, place)
     edit = extended_description(text, [effect], "hidden")
     with atomic_folder(out) as new:

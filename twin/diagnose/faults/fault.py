@@ -257,6 +257,10 @@ def nothing_more(cause: Cause) -> list[str]:
     return []
 
 
+def never(cause: Cause) -> bool:
+    return False
+
+
 @dataclass(frozen=True)
 class Family:
     """An entry of the catalogue."""
@@ -280,6 +284,7 @@ class Family:
     weighed: bool = False  # its statistic is twice the gain of ln evidence, free numbers integrated out
     kind_told: bool = False  # its history says what kind it is, before its size
     said: Callable[[Cause], list[str]] = nothing_more  # what its size holds for, in words
+    last: Callable[[Cause], bool] = never  # whether it is asked after all others, and of no synthetic measurements
     edit: Callable[[Cause, Study], Effect] = as_found  # how the description says it
     told_of_edit: Callable[[Cause], list[str]] = nothing_more  # what the edit leaves to be done by hand
     editable: Callable[[Cause], bool] | None = None  # whether a description says it; of the machine's all, by default

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from twin.diagnose.evidence.batch import Batch
 from twin.diagnose.faults.context import Context, always, of_stretches, to_the_end
 from twin.diagnose.faults.fault import Curve, Family, Fault, Slot
+from twin.diagnose.result.diagnosis import Cause
 
 RANGE = 9.0  # conductances of joints scatter by a decade with pressure and roughness
 
@@ -36,6 +37,10 @@ def batches(context: Context) -> list[Batch]:
     return [batch for fault in FAULTS for batch in fault.batches(context.blocks(fault), histories)]
 
 
+def with_a_speed(cause: Cause) -> bool:
+    return bool(cause.signal)
+
+
 FAMILY = Family(
     5, "joint", "Joint conductance wrong or lost",
     "A joint or guide conducts otherwise than described, perhaps since an event: preload lost, oil film gone; or the "
@@ -44,4 +49,5 @@ FAMILY = Family(
     "every contact; always, and from every hour on; where something else was found, with every speed", "machine",
     batches,
     what="a joint that conducts otherwise than declared", times="times the declared", declared=True,
+    last=with_a_speed,
 )  # fmt: skip

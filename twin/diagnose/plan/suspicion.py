@@ -91,14 +91,16 @@ def worst_of_machine(detector: Detector, families: Sequence[Family]) -> list[Sus
 
 
 def pairs_of(found: Search) -> list[tuple[Hypothesis, Hypothesis]]:
-    """The first cause of an ambiguous verdict with the two likeliest rivals that these data do not separate from it."""
+    """The first cause of an ambiguous verdict with the two likeliest rivals that these data do not separate from it, of
+    causes that every search has columns of."""
     if not found.accepted:
         return []
     first = found.accepted[0]
     chosen = first.hypothesis
     near = [
         other for other, cosine in first.rivals
-        if min(chosen.statistic, other.statistic) * (1.0 - cosine**2) <= found.detector.policy.apart
+        if max(int(h.batch.columns.max()) for h in (chosen, other)) < len(found.detector.index)
+        and min(chosen.statistic, other.statistic) * (1.0 - cosine**2) <= found.detector.policy.apart
     ]  # fmt: skip
     return [(chosen, other) for other in near[:2]]
 

@@ -87,7 +87,8 @@ def cause_words(cause: Cause | Rival) -> str:
     if entry and entry.channel and where:
         head = f"{where} is at fault"
     else:
-        head = what(cause.family) + (f" {'in' if where.startswith('run ') else 'at'} {where}" if where else "")
+        link = "between" if Spot.read(cause.place).between else "in" if where.startswith("run ") else "at"
+        head = what(cause.family) + (f" {link} {where}" if where else "")
     size = size_words(cause.amplitude, cause.ci95, cause.unit)
     if size and (whose := times(cause.family, cause.unit)):
         size = f"{size} {whose}"
@@ -251,7 +252,7 @@ def chance(nulls: np.ndarray | None, threshold: float) -> str:
     values = np.asarray([] if nulls is None else nulls, dtype=float)
     values = values[np.isfinite(values)]
     n, above = len(values), int((values > threshold).sum())
-    if not n or not math.isfinite(threshold) or not values.any():  # what is asked after all else is asked of none
+    if not n or not math.isfinite(threshold):
         return ""
     # none of n: with 95 % confidence the rate is below 3 / n
     rare = "" if above else f", which makes it rarer than once in {max(1, round(n / 3))} with 95 % confidence"
@@ -281,7 +282,8 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
     if c.history.endswith(REFUTED):
         return f"All other channels refute it: a statistic of {number(c.statistic)}; {number(c.threshold)} is needed."
     if c.threshold == d.thresholds.get(c.family, c.threshold):
-        return evidence_sentence(d, c.family, c.statistic, c.threshold)
+        asked = not (entry and entry.last(c))
+        return evidence_sentence(d, c.family if asked else "", c.statistic, c.threshold)
     # a declared number: both are squares, of its distance from the declared one
     far, needed = (number(math.sqrt(max(v, 0.0))) for v in (c.statistic, c.threshold))
     if c.history == "always":  # freed of its tolerance

@@ -62,7 +62,9 @@ class Spot:
 
     @property
     def owner(self) -> str:
-        """What it belongs to: the part of a surface, or what it is without its partner."""
+        """What it belongs to: the part of a surface, both of two, or what it is without its partner."""
+        if self.between:
+            return "<>".join(sorted((self.part, Spot.read(self.partner).part)))
         return self.part if self.of is Of.SURFACE else f"{self.of.value}.{self.name}"
 
     @property

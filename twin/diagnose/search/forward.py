@@ -323,14 +323,19 @@ def _as_refitted(
     others: Sequence[Hypothesis],
 ) -> list[Hypothesis]:  # fmt: skip
     """Others by what they would explain once they are refitted, where that is less than they score: the share that is
-    left of the best of their family. begun: the starts of those that were refitted."""
-    scores = {(starts[0].family, starts[0].name): max(s.statistic for s in starts) for starts in begun}
-    left = dict[str, float]()
+    left of the best of their family and kind, but no less than what may overtake a leader by being refitted has. begun:
+    the starts of those that were refitted."""
+    scores = {_kind(starts[0]) + (starts[0].name,): max(s.statistic for s in starts) for starts in begun}
+    left = dict[tuple[str, str], float]()
     for h in proved:
-        if bent(detector, h) and (score := scores.get((h.family, h.name), 0.0)) > 0.0:
-            left[h.family] = max(left.get(h.family, 0.0), h.statistic / score)
-    share = [min(left.get(h.family, 1.0), 1.0) if bent(detector, h) else 1.0 for h in others]
-    return [replace(h, statistic=part * h.statistic) for part, h in zip(share, others, strict=True)]
+        if bent(detector, h) and (score := scores.get((*_kind(h), h.name), 0.0)) > 0.0:
+            left[_kind(h)] = max(left.get(_kind(h), 0.0), h.statistic / score)
+    share = [np.clip(left.get(_kind(h), 1.0), 1.0 - behind(h, detector.policy), 1.0) for h in others]
+    return [replace(h, statistic=float(part) * h.statistic) for part, h in zip(share, others, strict=True)]
+
+
+def _kind(h: Hypothesis) -> tuple[str, str]:
+    return h.family, h.batch.kind
 
 
 def _rivals(

@@ -3,15 +3,16 @@ with a speed.
 
 They do what other causes do, nearly: an oil line from a warm motor to a bed is heat there with the motor's power, or
 the motor's heat elsewhere; a joint that conducts more while a spindle turns is a loss that falls with its own
-temperature. There are as many as pairs of places, and would raise the threshold of everything. So where a search has
-found something in the machine, or heat of any history, one path must explain clearly more than all of that together,
-and takes its place; where it explains as much it is its rival. A machine in which nothing was found is not asked.
+temperature; and at a part that shows what two causes do, a sensor is at fault. There are as many as pairs of places,
+and would raise the threshold of everything. So where a search has found anything, or heat of any history, one path must
+explain clearly more than all of that together, and takes its place; where it explains as much it is its rival. A
+machine in which nothing was found is not asked.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,20 +33,29 @@ from twin.diagnose.search.refit import refit
 
 def otherwise(found: Search, y: np.ndarray) -> Search:
     """A search in y (m,), or what it is where one path of heat explains more than all that it has found, or than all
-    but faulty sensors; with that path among the rivals where it explains as much."""
-    left = _heat(found)
-    if not found.accepted and not left:
+    but faults of readings; with that path among the rivals where it explains as much."""
+    if not found.accepted and not _heat(found):
         return found
     study, first = found.detector.study, found.detector.columns.raw.shape[1]
     nominal = [nominal_run(study, k) for k in study.fitted]
     detector, paths = _with(found.detector, nominal, paths_of(study, nominal, first))
+    paths = [h for h in paths if h.family in detector.thresholds]
     if not paths:
         return found
     beside = [a for a in found.accepted if fault_of(a.hypothesis).read]
-    for others in ([], beside) if beside and (left or len(beside) < len(found.accepted)) else ([],):
-        if (told := _instead(found, detector, y, nominal, paths, others)) is not None:
-            return told
-    return found
+    told = list[_Told]()
+    for others in (beside, []) if beside and (_heat(found) or len(beside) < len(found.accepted)) else ([],):
+        told += _instead(found, detector, y, nominal, paths, others)
+    return max(told, key=lambda one: (one.instead, one.gained), default=_Told(found, False, 0.0)).search
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A search with a path."""
+
+    search: Search
+    instead: bool  # in place of what was found, not a rival
+    gained: float  # misfit that is removed
 
 
 def _heat(found: Search) -> float:
@@ -57,41 +67,59 @@ def _heat(found: Search) -> float:
 def _instead(
     found: Search, detector: Detector, y: np.ndarray, nominal: Sequence[Nominal], paths: Sequence[Hypothesis],
     others: Sequence[Accepted],
-) -> Search | None:  # fmt: skip
-    """The best path beside some other causes in place of all that a search has found, or among its rivals; None where
-    it explains less."""
+) -> list[_Told]:  # fmt: skip
+    """The best path beside some other causes in place of the rest that a search has found, or among its rivals; none
+    where it explains less."""
     policy = detector.policy
-    fitted, kept = refit(detector, y, found.fitted.x, others) if others else (detector.fitter(y), [])
+    start = detector.fitter(y)
+    fitted, kept = refit(detector, y, found.fitted.x, others) if others else (start, [])
     rest = exchanged(detector.study, y, kept)
     detector, likely = _nearer(detector, rest, fitted, nominal, _likely(detector, rest, fitted, paths))
     passes = policy.window_passes  # a strong path is far from where the derivative of a weak one points
     tried = [exact(detector, rest, fitted, h, passes) for h in likely]
-    tried = [h for h in tried if possible(detector, h, h.amplitude[0])]
-    explained = max(misfit(detector, fitted) - misfit(detector, found.fitted), 0.0)
+    tried = [h for h in tried if _possible(detector, h, h.amplitude[0])]
+    replaced = [a for a in found.accepted if all(a is not own for own in others)]
+    removed = misfit(detector, fitted) - misfit(detector, found.fitted)
+    explained = max([removed, 0.0, *(a.statistic for a in replaced)])
     best = max(tried, key=lambda h: worth(h, policy), default=None)
     if best is None or best.statistic < (1.0 - policy.saturates) * (explained + _heat(found)):
-        return None
+        return []
+    near = [h for h in tried if h is not best and h.statistic > best.statistic - policy.rival]
     best = closer(detector, rest, fitted, best)
-    replaced = [a for a in found.accepted if all(a is not own for own in others)]
     one = as_scored(detector.study, best, detector.thresholds[best.family])
-    now = naming(replace(found, detector=detector), y, fitted.x, [*kept, one])
-    if not all(stands(detector, a) for a in now.accepted[:-1]) or uneven(detector, now.accepted):
-        return None
-    gained = misfit(detector, fitted) - misfit(detector, now.fitted) - (best.statistic - worth(best, policy))
+    one = replace(one, rivals=with_cosines(detector, fitted, best, near))
+    now = naming(replace(found, detector=detector), y, fitted.x, [one, *(replace(a, rivals=()) for a in kept)])
+    path, *kept = now.accepted
+    stand = _possible(detector, best, float(path.amplitude[0])) and all(stands(detector, a) for a in kept)
+    if not stand or uneven(detector, now.accepted):
+        return []
+    price = best.statistic - worth(best, policy)
+    gained = misfit(detector, fitted) - misfit(detector, now.fitted) - price
+    instead = _Told(now, True, misfit(detector, start) - misfit(detector, now.fitted) - price)
+    margin = max(policy.close, policy.misfit * explained)
+    if gained > max(explained + margin, one.threshold):
+        if (heat := _heat(found)) and (
+            gained < policy.covers * (explained + heat) or _heat(now) > _misfits(now, gained)
+        ):
+            return []
+        return [instead]
     known = explained - sum(a.hypothesis.statistic - worth(a.hypothesis, policy) for a in replaced)
-    near = max(policy.close, policy.misfit * explained)
-    if _heat(found):
-        misfits = max(detector.thresholds["unknown"], policy.misfit * gained)
-        covered = _heat(now) <= misfits and gained > policy.covers * (explained + _heat(found))
-        return now if covered and gained > one.threshold else None
-    if gained > max(explained + near, one.threshold):
-        return now
-    if gained <= max(known - near, one.threshold):
-        return None
-    first = replaced[0]
-    rivals = (*first.rivals, *with_cosines(detector, fitted, first.hypothesis, [best]))
-    accepted = tuple(replace(a, rivals=rivals) if a is first else a for a in found.accepted)
-    return replace(found, detector=detector, accepted=accepted)
+    if _heat(found) or gained <= max(known - margin, one.threshold):
+        return []
+    lead = next(a for a in replaced if others or not fault_of(a.hypothesis).read or len(replaced) == 1)
+    rivals = (*lead.rivals, *with_cosines(detector, fitted, lead.hypothesis, [best]))
+    accepted = tuple(replace(a, rivals=rivals) if a is lead else a for a in found.accepted)
+    return [_Told(replace(found, detector=detector, accepted=accepted), False, gained)]
+
+
+def _possible(detector: Detector, h: Hypothesis, size: float) -> bool:
+    """Whether a path of a size is worth a name, and physics allows it."""
+    return abs(size) >= detector.policy.stands * h.batch.smallest and possible(detector, h, size)
+
+
+def _misfits(now: Search, explained: float) -> float:
+    """Heat that a path may leave because the model is not the machine."""
+    return max(now.detector.thresholds["unknown"], now.detector.policy.misfit * explained)
 
 
 def _nearer(

@@ -77,7 +77,7 @@ def parts(place: str, described: Mapping[str, Any]) -> set[str]:
     """What a place belongs to: parts where the description tells, else the name up to its details."""
     head, _, rest = place.partition(".")
     if head not in PREFIXES:
-        return {head}
+        return {side.partition(".")[0] for side in place.split("<>")}
     name = rest.split(".")[0].split(":")[0].split(">")[0].split("<")[0]
     entry = described.get(head, {}).get(name, {})
     surfaces = [entry[key] for key in ("surface", "part") if key in entry] + list(entry.get("surfaces", ()))

@@ -78,14 +78,19 @@ def joint(site: Site, effect: Effect) -> Change:
 
 
 def missing_joint(site: Site, effect: Effect) -> Change:
-    """Two nodes or bars exchange heat that no contact joins."""
+    """Two nodes exchange heat that no contact joins; one that an axis moves against the other the description
+    refuses."""
     ends = effect.place.split("<>")
     if len(ends) != 2:
         raise DescriptionError("needs two places", effect.place, "write both, as 'motor<>bed'")
     for end in ends:
         if owner_of(*surfaces_of(site, end)) in site.machine.parts:
             what = "no contact joins surfaces of two parts that do not touch"
-            raise DescriptionError(what, effect.place, "name nodes or bars of a lumped machine")
+            raise DescriptionError(what, effect.place, "name two nodes of a lumped machine")
+    for name, contact in site.machine.contacts.items():
+        if any(set(ends) == set(map(owner_of, pair)) for pair in (contact.surfaces or (), *contact.pairs)):
+            remedy = f"change it: joint at contacts.{name}"
+            raise DescriptionError(f"contacts.{name} joins them already", effect.place, remedy)
     joint = {"kind": "fixed", "surfaces": ends, "total": quantity(effect.amplitude, "W/K")}
     return Change(((f"contacts.{site.name}", joint),))
 
