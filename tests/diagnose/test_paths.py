@@ -14,7 +14,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.extend import write_extension
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.missing_joint import pairs
-from twin.diagnose.faults.paths import paths_of
+from twin.diagnose.faults.paths import STRONG, paths_of
 from twin.diagnose.faults.table import family_of
 from twin.diagnose.model.bank import nominal_run, respond
 from twin.diagnose.pipeline import Result, Settings, diagnose
@@ -123,9 +123,18 @@ def test_responses_of_paths_against_differences() -> None:
     own, x = paths_of(study, nominal, 0), np.zeros(len(study.probed.parameters))
     D = respond(study, nominal, own.vectors, own.columns)
     assert {b.kind for b in own.batches} == {"between", "joint", "contact"}
+    strong = next(b for b in own.batches if b.kind == "between")
+    for when, size in zip(strong.histories[1:], STRONG, strict=True):
+        h, parts = Hypothesis(strong, 0, when, 0.0, (size,)), []
+        for k in study.fitted:
+            slots = slots_with(study, elements, units_of(study, h), k)
+            parts.append(study.outputs(k, x, slots, [size]) - study.outputs(k, x))
+        got, wanted = size * D[:, strong.columns[0]] @ when.weights[0], np.concatenate(parts)
+        assert np.linalg.norm(got - wanted) < 0.03 * np.linalg.norm(wanted)
     for batch in own.batches:
         little = 2e-3 if batch.kind == "between" else 5e-3  # W/K; of a conductance
-        h = Hypothesis(batch, 0, batch.histories[-1], 0.0, (0.0,))
+        when = batch.histories[0 if batch.kind == "between" else -1]
+        h = Hypothesis(batch, 0, when, 0.0, (0.0,))
         got = D[:, batch.columns[0]] @ h.when.weights[0]
         parts = []
         for k in study.fitted:

@@ -18,6 +18,8 @@ from twin.diagnose.faults.elements import conductances, conducted
 from twin.diagnose.model.bank import Column, Nominal
 from twin.diagnose.model.study import Study
 
+STRONG = (10.0, 100.0)  # W/K, of a cable and of a flow of 3 l/min of oil: sizes at which a missing joint is scored
+
 
 @dataclass(frozen=True)
 class Paths:
@@ -37,12 +39,15 @@ class _Made:
     vectors: list[list[np.ndarray]]
     columns: list[Column] = field(default_factory=list)
 
-    def add(self, of_run: Sequence[np.ndarray], acting: Sequence[Sequence[np.ndarray]]) -> list[int]:
-        """A vector per fitted run, as a column for each history."""
+    def add(
+        self, of_run: Sequence[np.ndarray], acting: Sequence[Sequence[np.ndarray]], across: Sequence[float] = ()
+    ) -> list[int]:
+        """A vector per fitted run, as a column for each history, with what conducts beside it."""
         for own, vector in zip(self.vectors, of_run, strict=True):
             own.append(vector)
-        begin, none = self.first + len(self.columns), (None,) * (self.runs - len(of_run))
-        self.columns.extend(Column(len(self.vectors[0]) - 1, (*values, *none)) for values in acting)
+        begin, none, v = self.first + len(self.columns), (None,) * (self.runs - len(of_run)), len(self.vectors[0]) - 1
+        beside = across or [0.0] * len(acting)
+        self.columns.extend(Column(v, (*own, *none), across=k) for own, k in zip(acting, beside, strict=True))
         return list(range(begin, self.first + len(self.columns)))
 
     def paths(self, batches: Sequence[Batch]) -> Paths:
@@ -75,14 +80,17 @@ def paths_between(study: Study, nominal: Sequence[Nominal], first: int, parts: C
 def _between(
     study: Study, nominal: Sequence[Nominal], made: _Made, parts: Collection[frozenset[str]] | None
 ) -> list[Batch]:
-    places, B = study.probed.places, study.probed.B
+    """Each pair by its derivative, and by what it does at some sizes: a strong one moves two bodies together, which the
+    derivative of a weak one does not tell."""
+    places, B, sizes = study.probed.places, study.probed.B, (0.0, *STRONG)
     rows = []
     for i, j in missing_joint.pairs(study, parts):
         d = B[i] - B[j]
-        flow = [[-(own.middle @ d) for own in nominal]]
-        rows.append((f"{places[i].name}<>{places[j].name}", made.add([d for _ in nominal], flow)))
-    always = History("always", np.ones((1, 1)))
-    return [batch for fault in missing_joint.FAULTS for batch in fault.batches(rows, (always,))]
+        flow = [-(own.middle @ d) for own in nominal]
+        columns = made.add([d for _ in nominal], [flow] * len(sizes), sizes)
+        rows.append((f"{places[i].name}<>{places[j].name}", columns))
+    always = [History("always", row[None]) for row in np.eye(len(sizes))]
+    return [batch for fault in missing_joint.FAULTS for batch in fault.batches(rows, always)]
 
 
 def _speeds(study: Study) -> list[tuple[History, list[np.ndarray]]]:

@@ -73,6 +73,7 @@ class Column:
     vector: int  # index of the vector
     histories: tuple[np.ndarray | None, ...]  # per run of the study; None: not in that run
     at_start: bool = False  # no forcing: the vector is what the state begins with there, and the history is zero
+    across: float = 0.0  # W/K that conduct beside the forcing, between the two sides of a constant vector
 
 
 def respond(
@@ -113,9 +114,15 @@ def _integrated(
         V[:, j] = vectors[v] if vectors[v].ndim == 1 else 0.0
     changing = [(j, vectors[v]) for j, v in enumerate(used) if vectors[v].ndim == 2]
     rate = np.float32(nominal.rate / SDIRK2.diagonal)
+    across = np.array([c.across for c in columns], dtype=np.float32)
+    conducts = np.flatnonzero(across)
+    kappa, d = across[conducts], V[:, which[conducts]]
 
     def solve(t: int, right: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         X = nominal.inverse[t] @ right
+        if len(conducts):  # (S + kappa d d^T)^-1 from S^-1 (Sherman, Morrison, Ann. Math. Stat. 21, 1950)
+            W = nominal.inverse[t] @ d
+            X[:, conducts] -= W * (kappa * (d * X[:, conducts]).sum(axis=0) / (1.0 + kappa * (d * W).sum(axis=0)))
         return X, X
 
     for t in range(n_steps):

@@ -79,8 +79,9 @@ def _instead(
     tried = [exact(detector, rest, fitted, h, passes) for h in likely]
     tried = [h for h in tried if _possible(detector, h, h.amplitude[0])]
     replaced = [a for a in found.accepted if all(a is not own for own in others)]
-    removed = misfit(detector, fitted) - misfit(detector, found.fitted)
-    explained = max([removed, 0.0, *(a.statistic for a in replaced)])
+    removed = max(misfit(detector, fitted) - misfit(detector, found.fitted), 0.0)
+    likely_one = max((a.statistic for a in replaced), default=0.0)
+    explained = max(removed, likely_one)
     best = max(tried, key=lambda h: worth(h, policy), default=None)
     if best is None or best.statistic < (1.0 - policy.saturates) * (explained + _heat(found)):
         return []
@@ -94,19 +95,21 @@ def _instead(
     if not stand or uneven(detector, now.accepted):
         return []
     price = best.statistic - worth(best, policy)
+    freedom = sum(a.hypothesis.statistic - worth(a.hypothesis, policy) for a in replaced)
     gained = misfit(detector, fitted) - misfit(detector, now.fitted) - price
-    instead = _Told(now, True, misfit(detector, start) - misfit(detector, now.fitted) - price)
+    # refitted with all, and as candidates are compared: far from linear the two differ by more than chance
+    more = gained - removed, worth(best, policy) - likely_one
     margin = max(policy.close, policy.misfit * explained)
-    if gained > max(explained + margin, one.threshold):
-        if (heat := _heat(found)) and (
-            gained < policy.covers * (explained + heat) or _heat(now) > _misfits(now, gained)
-        ):
-            return []
-        return [instead]
-    known = explained - sum(a.hypothesis.statistic - worth(a.hypothesis, policy) for a in replaced)
-    if _heat(found) or gained <= max(known - margin, one.threshold):
+    heat = _heat(found)
+    covers = not heat or (gained > policy.covers * (explained + heat) and _heat(now) <= _misfits(now, gained))
+    if gained <= one.threshold or not covers:
+        return []
+    if min(more) > margin:
+        return [_Told(now, True, misfit(detector, start) - misfit(detector, now.fitted) - price)]
+    if heat or max(more) + freedom <= -margin:
         return []
     lead = next(a for a in replaced if others or not fault_of(a.hypothesis).read or len(replaced) == 1)
+    best = replace(best, statistic=max(best.statistic, gained + price))
     rivals = (*lead.rivals, *with_cosines(detector, fitted, lead.hypothesis, [best]))
     accepted = tuple(replace(a, rivals=rivals) if a is lead else a for a in found.accepted)
     return [_Told(replace(found, detector=detector, accepted=accepted), False, gained)]
@@ -129,7 +132,7 @@ def _nearer(
     spots = [Spot.read(h.name) for h in likely]
     parts = {frozenset((s.part, Spot.read(s.partner).part)) for s in spots if s.between}
     own = paths_between(detector.study, nominal, detector.columns.raw.shape[1], parts)
-    if len(own.columns) <= len(parts):
+    if sum(len(b.places) for b in own.batches) <= len(parts):
         return detector, list(likely)
     detector, between = _with(detector, nominal, own)
     joints = [h for h, s in zip(likely, spots, strict=True) if not s.between]
@@ -147,7 +150,7 @@ def _with(detector: Detector, nominal: Sequence[Nominal], own: Paths) -> tuple[D
 
 
 def _likely(detector: Detector, y: np.ndarray, fitted: Fitted, paths: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The paths that explain most to first order, as many as others of a kind are refitted."""
+    """The paths that explain most by their scores, as many as others of a kind are refitted."""
     there = unbent(detector, y, fitted)
     less, white = left_less(detector, there, fitted), detector.whiten(there.residual)
     D = np.column_stack([readings_columns(detector, h) for h in paths])
@@ -157,5 +160,7 @@ def _likely(detector: Detector, y: np.ndarray, fitted: Fitted, paths: Sequence[H
         replace(h, statistic=float(a * own - less), amplitude=(float(a),))
         for h, a, own in zip(paths, g / F, g, strict=True) if h.batch.sign == 0 or h.batch.sign * a > 0.0
     ]  # fmt: skip
-    best = sorted(scored, key=lambda h: -h.statistic)
-    return [h for h in best[: detector.policy.entrants] if h.statistic > 0.0]
+    best = dict[tuple[str, str, str], Hypothesis]()
+    for h in sorted(scored, key=lambda h: -h.statistic):
+        best.setdefault((h.family, h.name, h.when.signal), h)
+    return [h for h in list(best.values())[: detector.policy.entrants] if h.statistic > 0.0]
