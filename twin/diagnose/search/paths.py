@@ -108,7 +108,7 @@ def _instead(
         return [_Told(now, True, misfit(detector, start) - misfit(detector, now.fitted) - price)]
     if heat or max(more) + freedom <= -margin:
         return []
-    lead = next(a for a in replaced if others or not fault_of(a.hypothesis).read or len(replaced) == 1)
+    lead = next((a for a in replaced if not fault_of(a.hypothesis).read), replaced[0])
     best = replace(best, statistic=max(best.statistic, gained + price))
     rivals = (*lead.rivals, *with_cosines(detector, fitted, lead.hypothesis, [best]))
     accepted = tuple(replace(a, rivals=rivals) if a is lead else a for a in found.accepted)
