@@ -239,7 +239,7 @@ def diagnose(
     notes += sealed_alone(series, settings.policy)
     pulls = pulls_of(shown)
     first = found.steps[0]
-    asked = {"unknown", *(b.family for b in detector.columns.batches)}  # of synthetic measurements
+    of_nulls = {"unknown", *(b.family for b in detector.columns.batches)}  # asked of synthetic measurements
     heat = unknown_of(found) if verdict == "unknown" else None
     planned = None
     if settings.plan is not None:
@@ -257,7 +257,7 @@ def diagnose(
         gain=gains,
         ranked=tuple(rival_of(h, float(first.cosine[0, i])) for i, h in enumerate(first.ranked)),
         cosine=first.cosine,
-        nulls={name: values for name, values in detector.nulls.items() if name in asked},
+        nulls={name: values for name, values in detector.nulls.items() if name in of_nulls},
         thresholds=detector.thresholds,
         observed=first.observed,
         whiteness=_whiteness(series),
