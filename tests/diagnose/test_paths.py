@@ -14,7 +14,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.extend import write_extension
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.missing_joint import pairs
-from twin.diagnose.faults.paths import STRONG, paths_of
+from twin.diagnose.faults.paths import paths_of
 from twin.diagnose.faults.table import family_of
 from twin.diagnose.model.bank import nominal_run, respond
 from twin.diagnose.pipeline import Result, Settings, diagnose
@@ -124,7 +124,8 @@ def test_responses_of_paths_against_differences() -> None:
     D = respond(study, nominal, own.vectors, own.columns)
     assert {b.kind for b in own.batches} == {"between", "joint", "contact"}
     strong = next(b for b in own.batches if b.kind == "between")
-    for when, size in zip(strong.histories[1:], STRONG, strict=True):
+    for when, column in zip(strong.histories[1:], strong.columns[0][1:], strict=True):
+        size = own.columns[column].across
         h, parts = Hypothesis(strong, 0, when, 0.0, (size,)), []
         for k in study.fitted:
             slots = slots_with(study, elements, units_of(study, h), k)
