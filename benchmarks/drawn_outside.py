@@ -21,18 +21,21 @@ import numpy as np
 from benchmarks.drawn_machines import OUT, SHARE, drawn_of, logs_of, moved, power_of, said, set_up, simulated
 from benchmarks.rows import Row, counted, of_seeds, worth
 from twin.cli.main import run as command
+from twin.diagnose.evidence.speeds import SPEEDS
 from twin.errors import TwinError
 from twin.inject.draw.histories import telegraph
 from twin.inject.machines.drawn import DrawnMachine
 from twin.logs.read import read_run
 from twin.logs.run import Run
 from twin.logs.write import write_run
+from twin.machine import wiring
+from twin.machine.bodies import joined
 from twin.machine.description import Machine
-from twin.machine.load import load_machine
+from twin.machine.effects.edits import extended_description
+from twin.machine.effects.effect import Effect
 
 HOUR = 3600.0  # s
 SWITCH = "hidden_"  # columns that `twin hide` adds
-SPEEDS = ("m/s", "m/min", "1/s", "1/min")
 LAG = HOUR  # s
 FASTER = 4.0  # times the conductance at top speed
 
@@ -61,7 +64,7 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Outside
 
     found = [Outside("slow", some(1), heat), Outside("switched", some(1), heat), Outside("switched", some(2), heat)]
     described = {name: c.surfaces for name, c in machine.contacts.items() if c.surfaces}
-    if speeds := [name for name, s in machine.signals.items() if s.unit in SPEEDS]:
+    if speeds := [name for name, s in machine.signals.items() if wiring.signal(name, s).unit in SPEEDS]:
         signal = str(more.choice(speeds))
         found.append(Outside("late", (str(more.choice(nodes)),), heat, signal))
         if beside := [name for name, pair in described.items() if warm & set(pair)]:
@@ -71,24 +74,18 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Outside
 
 def _joint(drawn: DrawnMachine, machine: Machine, rng: np.random.Generator, warm: Set[str]) -> list[Outside]:
     """Two nodes joined that no contact joins, one of them warm; none where there are no such."""
-    joined = {frozenset(pair) for c in machine.contacts.values() for pair in (c.surfaces or (), *c.pairs)}
     totals = [float(c.total) for c in machine.contacts.values() if c.total]
-    free = [pair for pair in combinations(machine.nodes, 2) if frozenset(pair) not in joined and warm & set(pair)]
+    free = [
+        pair for pair in combinations(machine.nodes, 2) if frozenset(pair) not in joined(machine) and warm & set(pair)
+    ]
     for pair in rng.permutation(free).tolist() if totals else ():
         own = Outside("joint", tuple(pair), 2.0 * float(np.median(totals)))
         try:
-            load_machine(Path("machine.toml"), with_joint(drawn.text, own))
+            extended_description(drawn.text, [Effect("missing_joint", "<>".join(pair), own.size, "W/K", "always")])
         except TwinError:  # an axis would carry both sides of its guides
             continue
         return [own]
     return []
-
-
-def with_joint(text: str, hidden: Outside) -> str:
-    """A description with two nodes joined."""
-    a, b = hidden.places
-    joint = f'kind = "fixed"\nsurfaces = ["{a}", "{b}"]\ntotal = "{hidden.size:.4g} W/K"\n'
-    return f"{text}\n[contacts.unknown]\n{joint}"
 
 
 def slow(rng: np.random.Generator, time: np.ndarray, of: np.ndarray) -> np.ndarray:
@@ -123,10 +120,8 @@ def measured(drawn: DrawnMachine, folder: Path, out: Path, hidden: Outside, seed
     """Runs of a real machine with an effect; none where it cannot be hidden there."""
     real, logs = folder / "real_0", logs_of(folder)
     if hidden.history == "joint":
-        text = (real / "machine.toml").read_text(encoding="utf-8")
-        (out / "real").mkdir(parents=True)
-        (out / "real" / "machine.toml").write_text(with_joint(text, hidden), encoding="utf-8")
-        return simulated(out / "real", logs, out, drawn, seed)
+        told = ["missing_joint", "<>".join(hidden.places), f"{hidden.size:.4g} W/K", str(real), "-o", str(out / "real")]
+        return [] if command(["hide", *told]) else simulated(out / "real", logs, out, drawn, seed)
     family, unit = ("joint", "") if hidden.history == "faster" else ("heat_source", " W")
     for i, place in enumerate(hidden.places):
         told = [family, place, f"{hidden.size:.4g}{unit}", str(real), "-o", str(out / f"real_{i}"), "--to", "1 h"]

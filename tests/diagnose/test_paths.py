@@ -59,7 +59,8 @@ def test_a_line_between_two_nodes_is_named_and_written(artefact: Path, tmp_path:
     (cause,) = result.diagnosis.causes
     assert (result.diagnosis.verdict, cause.family, cause.place) == ("named", "missing_joint", "motor<>bed")
     assert cause.ci95[0] < LINE < cause.ci95[1] < 4.0 * LINE
-    assert all(g.extended < 0.5 * g.recalibrated for g in result.diagnosis.gain if g.channel == "bed")
+    (gain,) = (g for g in result.diagnosis.gain if g.channel == "bed")
+    assert gain.extended < 0.5 * gain.recalibrated
     runs = [read_run(log) for log in logs[:2]]
     machine = load_machine(MACHINE)
     diagnosis, said = write_extension(result, read_artefact(artefact), machine, runs, tmp_path / "diagnosis")
@@ -142,8 +143,6 @@ def test_responses_of_paths_against_differences() -> None:
             slots = slots_with(study, elements, units_of(study, h), k)
             parts.append((study.outputs(k, x, slots, [little]) - study.outputs(k, x, slots, [-little])) / (2 * little))
         wanted = np.concatenate(parts)
-        most = (
-            0.2 if batch.kind == "contact" else 0.02
-        )  # within a step a flow follows the state, of which it sees a mean
+        most = 0.2 if batch.kind == "contact" else 0.02  # flows follow the state within a step
         assert got @ wanted / (wanted @ wanted) == pytest.approx(1.0, abs=most)
         assert np.linalg.norm(got - wanted) < most * np.linalg.norm(wanted)

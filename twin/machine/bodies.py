@@ -34,6 +34,12 @@ def owner_of(place: str) -> str:
     return place.partition(".")[0]
 
 
+def joined(machine: Machine) -> frozenset[frozenset[str]]:
+    """The parts, or nodes and bars, that a contact joins, by two."""
+    sides = [pair for c in machine.contacts.values() for pair in (*([c.surfaces] if c.surfaces else ()), *c.pairs)]
+    return frozenset(frozenset(map(owner_of, pair)) for pair in sides)
+
+
 def tanks_on(machine: Machine, members: tuple[str, ...]) -> dict[str, Tank]:
     """The tanks on these parts, nodes or bars by the names they have as members of a body, "tanks.NAME"."""
     return {f"{TANKS}{name}": tank for name, tank in machine.tanks.items() if owner_of(tank.surface) in members}

@@ -17,10 +17,10 @@ from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.spot import Spot
 
 LARGEST = 1000.0  # W/K: of a flow of 14 l/min of water, which brings all of its heat across
-# W/K, standard deviation of what is likely, a flow of 3 l/min of oil: one that makes two bodies one has no size else
+# W/K, prior standard deviation, a flow of 3 l/min of oil: without it one that makes two bodies one would have no size
 USUAL = 100.0
-# relative standard deviation of a size, as of described joints: 536 to 546 of `benchmarks.drawn_outside`, where it was
-# chosen, have true sizes of 0.5 to 1.9 times what is told
+# relative standard deviation of a size, chosen on 536 to 546 of `benchmarks.drawn_outside`: true sizes are 0.5 to 1.9
+# times what is told there
 OWN = 0.3
 
 
@@ -80,7 +80,7 @@ def after_others(context: Context) -> list[Batch]:
 
 
 FAMILY = Family(
-    21, "missing_joint", "Two parts are joined, and not described so",
+    21, "missing_joint", "Joint missing",
     "Two parts exchange heat that no contact of the description joins: an oil line, a cable, chips, faces that touch.",
     "-kappa d d^T x", "residuals of opposite sign on both, in proportion to their difference", "0.5 W/K", "positive",
     "every surface or node with every one of another part that no contact joins to it, where something else was found; "

@@ -1,4 +1,4 @@
-"""Paths of heat that no search begins with: parts that the description does not join, joints that conduct with a speed.
+"""Paths of heat that no search begins with: parts that the description does not join, joints that follow a speed.
 
 There are as many as pairs of places: pairs of parts come first, each by its largest surface. Their columns, as those of
 `elements`, are made when they are asked for.

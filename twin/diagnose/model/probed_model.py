@@ -26,7 +26,7 @@ from twin.diagnose.model.rich_probed_model import Mesh, RichProbedModel, rich_pr
 from twin.errors import LogError
 from twin.logs.run import Run
 from twin.logs.signals import signal_values
-from twin.machine.bodies import owner_of
+from twin.machine.bodies import joined
 from twin.machine.description import Machine
 from twin.progress import Progress, silent
 from twin.rom.contact_matrix import ContactPlaces
@@ -156,12 +156,6 @@ def make_probed_model(
         inputs = (machine_hash(machine), mesh.name, tuple(nominal_of), known, starts, arrays_hash((*logged, *fields)))
         V, reduction = cached("window", __name__, inputs, make)
     return replace(_assembled(rich, V, parameters, runs, names, drives, begins, reduction), joined=joined(machine))
-
-
-def joined(machine: Machine) -> frozenset[frozenset[str]]:
-    """The parts, or nodes and bars, that a contact joins, by two."""
-    sides = [pair for c in machine.contacts.values() for pair in (*([c.surfaces] if c.surfaces else ()), *c.pairs)]
-    return frozenset(frozenset(map(owner_of, pair)) for pair in sides)
 
 
 def _logged(load: LoadModel, runs: Sequence[Run]) -> Iterator[np.ndarray]:

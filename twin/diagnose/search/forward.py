@@ -198,7 +198,7 @@ def _without(
 def _seen_without(
     detector: Detector, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], dropped: Sequence[Accepted]
 ) -> tuple[Fitted, list[Accepted], Sight, Step]:
-    """Likewise, with what is seen then."""
+    """The fit without those that are dropped, the causes that are left, and the scores of all hypotheses there."""
     fitted, left = _without(detector, y, fitted, accepted, dropped)
     seen, _, step = look(detector, fitted)
     return fitted, left, seen, step
@@ -325,7 +325,7 @@ def _as_refitted(
     """Others by what they would explain once they are refitted, where that is less than they score: the share that is
     left of the best of their family and kind, but no less than what may overtake a leader by being refitted has. begun:
     the starts of those that were refitted."""
-    scores = {_kind(starts[0]) + (starts[0].name,): max(s.statistic for s in starts) for starts in begun}
+    scores = {(*_kind(starts[0]), starts[0].name): max(s.statistic for s in starts) for starts in begun}
     left = dict[tuple[str, str], float]()
     for h in proved:
         if bent(detector, h) and (score := scores.get((*_kind(h), h.name), 0.0)) > 0.0:

@@ -1,5 +1,5 @@
-"""Paths of heat that are asked after all else: two parts that the description does not join, and joints that conduct
-with a speed.
+"""Paths of heat that are asked after all else: two parts that the description does not join, and joints whose
+conductance follows a speed.
 
 They do what other causes do, nearly: an oil line from a warm motor to a bed is heat there with the motor's power, or
 the motor's heat elsewhere; a joint that conducts more while a spindle turns is a loss that falls with its own
@@ -70,7 +70,7 @@ def _instead(
 ) -> list[_Told]:  # fmt: skip
     """The best path beside some other causes in place of the rest that a search has found, or among its rivals; none
     where it explains less."""
-    policy = detector.policy
+    policy, heat = detector.policy, _heat(found)
     start = detector.fitter(y)
     fitted, kept = refit(detector, y, found.fitted.x, others) if others else (start, [])
     rest = exchanged(detector.study, y, kept)
@@ -80,10 +80,10 @@ def _instead(
     tried = [h for h in tried if _possible(detector, h, h.amplitude[0])]
     replaced = [a for a in found.accepted if all(a is not own for own in others)]
     removed = max(misfit(detector, fitted) - misfit(detector, found.fitted), 0.0)
-    likely_one = max((a.statistic for a in replaced), default=0.0)
-    explained = max(removed, likely_one)
+    strongest = max((a.statistic for a in replaced), default=0.0)
+    explained = max(removed, strongest)
     best = max(tried, key=lambda h: worth(h, policy), default=None)
-    if best is None or best.statistic < (1.0 - policy.saturates) * (explained + _heat(found)):
+    if best is None or best.statistic < (1.0 - policy.saturates) * (explained + heat):
         return []
     near = [h for h in tried if h is not best and h.statistic > best.statistic - policy.rival]
     best = closer(detector, rest, fitted, best)
@@ -98,9 +98,8 @@ def _instead(
     freedom = sum(a.hypothesis.statistic - worth(a.hypothesis, policy) for a in replaced)
     gained = misfit(detector, fitted) - misfit(detector, now.fitted) - price
     # refitted with all, and as candidates are compared: far from linear the two differ by more than chance
-    more = gained - removed, worth(best, policy) - likely_one
+    more = gained - removed, worth(best, policy) - strongest
     margin = max(policy.close, policy.misfit * explained)
-    heat = _heat(found)
     covers = not heat or (gained > policy.covers * (explained + heat) and _heat(now) <= _misfits(now, gained))
     if gained <= one.threshold or not covers:
         return []
