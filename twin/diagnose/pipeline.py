@@ -10,7 +10,7 @@ import numpy as np
 
 from twin import __version__
 from twin.build.cache import arrays_hash, cached, machine_hash
-from twin.calibrate.channels.judge import Judgement, judge
+from twin.calibrate.channels.judge import Judgement
 from twin.calibrate.channels.table import channel_rows, with_findings
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
@@ -20,7 +20,7 @@ from twin.diagnose.evidence.film_laws import with_film_laws
 from twin.diagnose.evidence.nulls import Form
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import VERSION
-from twin.diagnose.faults.channels_check import channels_at_fault, warm_place_note
+from twin.diagnose.faults.channels_check import channels_at_fault, judged_channels, warm_place_note
 from twin.diagnose.faults.coarse_model import too_coarse
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import FAMILIES
@@ -181,7 +181,7 @@ def diagnose(
     fitted = names[: len(runs)]
     sensors = [s for s in artefact.model.sensors if s not in settings.exclude]
     logged = {n for run in runs if run.temperatures is not None for n in run.temperatures.columns}
-    judgement = judge(runs, logged - set(settings.exclude), artefact.model.all_sensors)
+    judgement = judged_channels(runs, artefact.model, logged - set(settings.exclude))
     if settings.plan:
         known_family(settings.plan, settings.families)  # now, not after minutes
 

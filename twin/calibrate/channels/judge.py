@@ -39,10 +39,10 @@ def judge(
 ) -> Judgement:  # fmt: skip
     """Find broken and stuck channels and splices in each run, then what all channels together say of each of them.
 
-    within: columns that may be judged, all temperatures by default; all take part as witnesses. sensors: of the model,
-    all columns by default: of others nothing says how warm their place may be (of a real spindle one of 16 is 7 K above
-    the others at all times), so that an offset in all runs is none. explained: whether something else than the others
-    explains what these refute. Nothing is changed.
+    within: columns that may be judged, all temperatures by default; all take part as witnesses. sensors: of which an
+    offset in all runs is a fault, all columns by default: of those that no model has nothing says how warm their place
+    may be (of a real spindle one of 16 is 7 K above the others at all times). explained: whether something else than
+    the others explains what these refute. Nothing is changed.
     """
     found = judged([emptied(run) for run in runs], within, explained)
     return found if sensors is None else _without_warm_places(found, sensors, len(runs))
@@ -70,7 +70,7 @@ def judged(
 
 
 def _without_warm_places(judgement: Judgement, sensors: Collection[str], n_runs: int) -> Judgement:
-    """With offsets in all of n_runs of channels that are none of a model's sensors for themselves."""
+    """With offsets in all of n_runs of channels that are none of these sensors for themselves."""
     warm = tuple(
         f for f in judgement.findings
         if f.what == "offset" and len(f.runs) == n_runs and f.channels[0] not in sensors

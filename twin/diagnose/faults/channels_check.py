@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from twin.calibrate.channels.finding import UNITS, Finding
-from twin.calibrate.channels.judge import Judgement, set_aside
+from twin.calibrate.channels.judge import Judgement, judge, set_aside
 from twin.diagnose.faults.elements import Elements
 from twin.diagnose.result.diagnosis import Cause, Window
 from twin.diagnose.result.numbers import size_words
 from twin.logs.faults.usable import BROKEN, usable
 from twin.logs.run import Run
+from twin.rom.model import MachineModel
 
 FAMILY = "sensor"  # of everything here
 NO_INTERVAL = math.nan, math.nan  # 95 % interval of what rows of a run itself show
@@ -33,6 +35,14 @@ def channels_at_fault(
     told = {(k, channel) for f in judgement.findings for k in f.runs for channel in f.channels}
     causes = [_cause(f, runs, names) for f in judgement.findings]
     return sound, causes + _leaps(sound, sensors, names, told)
+
+
+def judged_channels(runs: Sequence[Run], model: MachineModel, within: Collection[str] | None = None) -> Judgement:
+    """What is wrong with the channels of runs, but for offsets of the machine's sensors in all of them: where a source
+    warms one place at all times the others refute its sensor, too, and only a search compares the two."""
+    air = {name for name, _ in model.ambient_sensors}
+    found = judge(runs, within, air)
+    return replace(found, warm=tuple(f for f in found.warm if f.channels[0] not in model.sensors))
 
 
 def warm_place_note(f: Finding) -> str:

@@ -34,12 +34,15 @@ class Entering:
 
 
 def entering(
-    detector: Detector, y: np.ndarray, fitted: Fitted, seen: Sight, parts: dict[str, float], places: int = 1
-) -> tuple[Entering, ...]:
+    detector: Detector, y: np.ndarray, fitted: Fitted, seen: Sight, parts: dict[str, float], places: int = 1,
+    share: float | None = None,
+) -> tuple[Entering, ...]:  # fmt: skip
     """Heat that a fit of measurements y (m,) leaves, at so many places at most; parts: evidence by the hour, of which
     the first are asked. None where no part has the evidence that heat needs. Where the fit has bent parameters, which
-    then stand for some of the heat, it is told beside the description."""
+    then stand for some of the heat, it is told beside the description. share: of the first place's evidence, that a
+    second one needs; by default what a name may lack of it, as no block is as short as a switch."""
     least, policy, study = detector.thresholds["unknown"], detector.policy, detector.study
+    share = 1.0 - policy.covers if share is None else share
     if max(parts.values(), default=0.0) <= least:
         return ()
     ordered = sorted(parts, key=lambda p: -parts[p])[: policy.others]
@@ -65,7 +68,7 @@ def entering(
     found = list[Entering]()
     while len(found) < min(places, len(asked)) and (best := best_beside(found)).evidence > least:
         found.append(best)
-        least = max(least, (1.0 - policy.covers) * found[0].evidence)  # as no block is as short as a switch
+        least = max(least, share * found[0].evidence)
     if len(found) < 2:
         return tuple(found)
     first = best_beside(found[1:])  # which another part may have stood for

@@ -30,8 +30,9 @@ hides itself: so they are learned twice, the second time beside what explains mo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -39,15 +40,16 @@ import scipy.linalg
 from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.search.accepted import as_scored
+from twin.diagnose.search.any_heat import Entering, entering
 from twin.diagnose.search.contest import worth
 from twin.diagnose.search.detector import FLOOR, Detector, weighted
-from twin.diagnose.search.exact import beginning, closer, exact, misfit_of_each, unexplained
+from twin.diagnose.search.exact import beginning, closer, exact, misfit, misfit_of_each, unexplained
 from twin.diagnose.search.forward import naming, search, search_again
 from twin.diagnose.search.look import Search, look
 from twin.diagnose.search.paths import otherwise
 from twin.diagnose.search.policy import POLICY, SearchPolicy
 from twin.diagnose.search.refit import refit
-from twin.diagnose.search.start import afresh, begun
+from twin.diagnose.search.start import Start, afresh, begun
 
 
 @dataclass(frozen=True)
@@ -96,19 +98,47 @@ def _searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
         weight, detector = now, weighted(described, now)
         start = begun(detector, y)
         first = search(detector, y, start)
+    own = dispersion_of(first)
+    if own.heat or own.share > detector.policy.dispersed:
+        first = _rather_heat(start, y, first)
     own = replace(dispersion_of(first), weight=weight)
     if own.share > detector.policy.dispersed:
         poor = _with_errors(own, detector, y)
         wide = raised(described, poor)
         found = search(wide, y, begun(wide, y))
         if (heat := explained_by_heat(first)) > 0.0:
-            if (named := _closely(detector, y, first, found, heat)) is not None:
+            named = _closely(detector, y, first, found, heat)
+            if named is not None and _rather_heat(start, y, named) is named:
                 return named, replace(dispersion_of(named), weight=weight)
             return first, replace(own, left=float(first.left.sum()) - heat, heat=True)
         return (found if found.accepted else search_again(detector, y, start, first, math.inf)), poor
     if not (least := own.least(detector.policy)):
         return first, own
     return search_again(detector, y, start, first, least), own
+
+
+def _rather_heat(start: Start, y: np.ndarray, found: Search) -> Search:
+    """The search in y (m,) as it began, where heat of any history alone explains more than all that was named and the
+    heat that this has left. A name needs nine tenths of what heat explains: of many thousand units the tenth is far
+    more than noise leaves, and one window may tell nine tenths of what changes for hours."""
+    detector, policy = start.detector, start.detector.policy
+    fitted, (seen, _, step) = start.fitted, start.glance
+    enter = partial(entering, detector, y, fitted, seen, step.parts, policy.entering)
+    before, heat = misfit(detector, fitted), enter()
+    if (
+        before - _evidence(heat) > policy.dispersed * dispersion_of(found).measured
+    ):  # a second place has little
+        heat = enter(share=policy.misfit)
+    named = before - misfit(detector, found.fitted) + _evidence(found.entering)
+    if _evidence(heat) <= named + policy.close:
+        return found
+    return replace(
+        found, x=start.x0, accepted=(), steps=(step,), fitted=fitted, entering=heat, covariance=start.covariance
+    )
+
+
+def _evidence(heat: Sequence[Entering]) -> float:
+    return sum(own.evidence for own in heat)
 
 
 def _closely(detector: Detector, y: np.ndarray, first: Search, found: Search, heat: float) -> Search | None:
@@ -139,11 +169,13 @@ def explained_by_heat(found: Search) -> float:
     Kass, Raftery, J. Am. Stat. Assoc. 90, 1995). Of heat at one surface they hold the misfits of the response, too; two
     surfaces are free enough to explain the errors of few channels. It may leave as much as a number out of its
     tolerance may, since no block is as short as a switch."""
-    policy, evidence = found.detector.policy, sum(own.evidence for own in found.entering)
+    policy, evidence = found.detector.policy, _evidence(found.entering)
+    left = float(found.left.sum())
     misfits = policy.misfit * evidence if len(found.entering) == 1 else 0.0
-    if not evidence or evidence + misfits < _evidence_of_errors(found.detector, found.fitted):
+    better = left - misfit(found.detector, found.fitted)  # parameters, which neither of the two is
+    if not evidence or evidence + misfits + better < _evidence_of_errors(found.detector, found.fitted):
         return 0.0
-    excess = float(found.left.sum()) - int(np.isfinite(found.residual).sum())
+    excess = left - int(np.isfinite(found.residual).sum())
     return evidence + float(np.clip(excess - evidence, 0.0, (1.0 - policy.covers) * evidence))
 
 

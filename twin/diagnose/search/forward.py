@@ -174,7 +174,7 @@ def _covering(
     free = [finer if _in_hours(h) else by_hour for h in standing]
     return [
         h for h, own in zip(standing, free, strict=True)
-        if (h.statistic > min(policy.covers * own, own - detector.no_evidence) or fault_of(h).several)
+        if (proof(detector, h) > min(policy.covers * own, own - detector.no_evidence) or fault_of(h).several)
         and (len(h.when.windows) <= policy.switches or h.when.bell is not None or fault_of(h).everywhere)
     ]  # fmt: skip
 

@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.calibrate.channels.finding import Finding
-from twin.calibrate.channels.judge import Judgement, judge, set_aside, share
+from twin.calibrate.channels.judge import Judgement, set_aside, share
 from twin.calibrate.fit.measured import Measured, measured
 from twin.diagnose.evidence.fitter import Fitted, Fitter
 from twin.diagnose.evidence.whiten import Projector, measured_of
-from twin.diagnose.faults.channels_check import FAMILY, channels_at_fault, warmer_air
+from twin.diagnose.faults.channels_check import FAMILY, channels_at_fault, judged_channels, warmer_air
 from twin.diagnose.model.study import Study, with_measured
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import readings_columns
@@ -54,7 +54,7 @@ def other_measurements(detector: Detector, runs: Sequence[Run]) -> Measurements:
     """Other measurements of the runs that a detector was made for, sealed ones last. For campaigns: `twin diagnose`
     makes a detector of its own."""
     fitted = runs[: len(detector.study.fitted)]
-    told = judge(fitted, sensors=detector.study.probed.base.all_sensors)
+    told = judged_channels(fitted, detector.study.probed.base)
     own = measurements(detector, runs, told)
     kept = upheld(own.detector, own.plans, fitted, told)
     return own if len(kept.findings) == len(told.findings) else measurements(detector, runs, kept)

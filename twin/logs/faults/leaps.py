@@ -111,7 +111,10 @@ def _located(s: Series, c: Changes, peak: int) -> tuple[int, float]:
     near = np.arange(peak - 1, peak + 2)
     steps = s.values[near] - s.values[near - 1]
     best = int(np.argmax(steps * np.sign(c.excess[peak])))
-    done = abs(steps[best]) >= _AT_ONCE * abs(c.change[near[best]])
+    at = int(near[best])
+    # a bearing that cooled while its spindle stood begins at its last reading, not at the median of the three before
+    whole = max(abs(float(np.median(s.values[at : at + _SIDE]) - s.values[at - 1])), abs(c.change[at]))
+    done = abs(steps[best]) >= _AT_ONCE * whole
     return int(near[best]), float(c.excess[peak]) if done else 0.0
 
 
