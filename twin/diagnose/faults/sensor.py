@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.evidence.batch import Batch
-from twin.diagnose.faults.context import Context, Singly, of_stretches, to_the_end
+from twin.diagnose.faults.context import Context, Singly, alone, of_stretches, to_the_end
 from twin.diagnose.faults.fault import Family, Fault
 from twin.diagnose.faults.readings import lagged
 from twin.diagnose.model.study import Study
@@ -24,10 +24,10 @@ class Lag(Fault):
 
 
 SHIFT = Fault("sensor", "shift", "K", "sensors.", 0, 0.3, 100.0, read=True, grows=False)
+DRIFT = Fault("sensor", "drift", "K/day", "sensors.", 0, 0.1, 20.0, read=True)
 SINGLE = (
     # K: a converter at its rail
     Fault("sensor", "offset", "K", "sensors.", 0, 0.15, 100.0, read=True, called="offset"),
-    Fault("sensor", "drift", "K/day", "sensors.", 0, 0.1, 20.0, read=True, called="drift"),
     Lag(
         "sensor", "lag", "s", "sensors.", 1, 120.0, 7200.0, read=True, sizes=(200.0, 600.0, 1800.0, 5400.0),
         called="lag",
@@ -36,16 +36,22 @@ SINGLE = (
     Fault("sensor", "detached", "1", "sensors.", 1, 0.05, 1.5, read=True, called="detached"),
     Fault("sensor", "swapped", "1", "sensors.", 1, 0.0, fixed=True, read=True, exchanges=True, called="swapped"),
 )  # fmt: skip
-FAULTS = (*SINGLE, SHIFT)
+FAULTS = (*SINGLE, DRIFT, SHIFT)
 
 
 def batches(context: Context) -> list[Batch]:
-    """Every sensor and every pair; offsets also from every hour on, in its run or for good."""
+    """Every sensor and every pair; offsets also from every hour on, in its run or for good, drifts also of one run."""
     rows: dict[str, list[int]] = {}
     for place, _, column in context.named(SHIFT.kind):
         rows.setdefault(place, []).append(column)
     since = [replace(h, name=f"offset {h.name}") for h in of_stretches(to_the_end(context))]
-    return [*Singly(SINGLE)(context), *SHIFT.batches(list(rows.items()), since)]
+    drifts = [
+        batch for history in dict.fromkeys(h for _, h, _ in context.named(DRIFT.kind))
+        for batch in DRIFT.batches(
+            context.rows(DRIFT, history), [alone(context, history, "drift" if history == "always" else "")]
+        )
+    ]  # fmt: skip
+    return [*Singly(SINGLE)(context), *drifts, *SHIFT.batches(list(rows.items()), since)]
 
 
 def said(cause: Cause) -> list[str]:
@@ -57,6 +63,7 @@ FAMILY = Family(
     9, "sensor", "A temperature sensor is at fault",
     "Offset, drift, lag, contact to the part lost, stuck, or two sensors swapped. The machine model is left alone.",
     "y + a;  a t;  filter;  (1 - w) y + w T_air", "one channel only: neighbours and TCP agree with the model",
-    "0.15 K, 0.1 K/day, 2 min, 5 %", "either", "every sensor, offsets also from every hour on; every pair", "sensor",
+    "0.15 K, 0.1 K/day, 2 min, 5 %", "either",
+    "every sensor, offsets also from every hour on, drifts in every run or one; every pair", "sensor",
     batches, what="a temperature sensor at fault", channel=True, kind_told=True, said=said,
 )  # fmt: skip

@@ -125,9 +125,7 @@ def _rather_heat(start: Start, y: np.ndarray, found: Search) -> Search:
     fitted, (seen, _, step) = start.fitted, start.glance
     enter = partial(entering, detector, y, fitted, seen, step.parts, policy.entering)
     before, heat = misfit(detector, fitted), enter()
-    if (
-        before - _evidence(heat) > policy.dispersed * dispersion_of(found).measured
-    ):  # a second place has little
+    if before - _evidence(heat) > policy.dispersed * dispersion_of(found).measured:  # a second place has little
         heat = enter(share=policy.misfit)
     named = before - misfit(detector, found.fitted) + _evidence(found.entering)
     if _evidence(heat) <= named + policy.close:
