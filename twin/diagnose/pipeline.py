@@ -299,7 +299,7 @@ def _left_open(run: ProbedRun) -> Iterator[str]:
             f"{begins.temperature:.1f} degC, every part within {begins.apart:.2g} K (standard deviation)"
         )
     if lost := sum(end - first for first, end in run.unlogged):
-        yield f"{dt * lost / 3600.0:.2g} h without a row of its loads, in which any heat of the sources is allowed for"
+        yield f"{dt * lost / 3600.0:.2g} h without load data; the heat of the sources is left free there"
 
 
 def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unknown: Unknown | None) -> Scene | None:

@@ -206,7 +206,7 @@ def diagnose(
     every = [*looked_at, *listed(sealed)]
     places = {Path(r).resolve() if isinstance(r, str | Path) else id(r) for r in every}
     if len(places) < len(every):
-        raise TwinError("a run is given twice", "RUNS, --sealed", "a run that is looked at cannot judge the gain")
+        raise TwinError("a run is given twice", "RUNS, --sealed", "the gain cannot be measured on a diagnosed run")
     options = options or DiagnoseOptions()
     if report is not None:
         _refuse_folder(Path(report))

@@ -48,6 +48,6 @@ FAMILY = Family(
     "-kappa g(t) d d^T x", "residuals of opposite sign on both sides", "30 % of a conductance", "either",
     "every contact; always, and from every hour on; where something else was found, with every speed", "machine",
     batches,
-    what="a joint that conducts otherwise than declared", times="times the declared", declared=True,
+    what="wrong joint conductance", times="times the declared", declared=True,
     last=with_a_speed,
 )  # fmt: skip

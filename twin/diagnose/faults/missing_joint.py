@@ -85,5 +85,5 @@ FAMILY = Family(
     "-kappa d d^T x", "residuals of opposite sign on both, in proportion to their difference", "0.5 W/K", "positive",
     "every surface or node with every one of another part that no contact joins to it, where something else was found; "
     "always", "machine",
-    after_others, what="a joint that the description lacks", last=always_last,
+    after_others, what="missing joint", last=always_last,
 )  # fmt: skip
