@@ -47,7 +47,7 @@ def standing(
     for run, again in () if whole.confirmed else _recurring(found, opened):
         told = held_against(again, found)
         if told.confirmed or (told.extension and (whole.refuted or whole.size)):
-            return again, replace(told, less=f"the sealed run is predicted with what switches, at the hours of {run}")
+            return again, replace(told, less=f"the sealed run is predicted with what switches, at its hours of {run}")
     now, told, gone = found, whole, list[Accepted]()
     while told.refuted and (weakest := _weakest(now, families)):
         gone.append(weakest)
