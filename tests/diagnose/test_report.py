@@ -309,7 +309,7 @@ def test_decimals_follow_the_interval():
             "1.62 W/(m²·K), to a medium of 14.00 °C (95 % interval 13.02 to 14.98 °C)",
         ),
         ("scale_expansion", "1/K", {"part": "bed"}, "162 %/K, with the temperature of bed"),
-        ("heat_source", "W", {"reference": 8.0, "reference_unit": "A"}, "1.62 W, where x_current is 8.00 A"),
+        ("heat_source", "W", {"reference": 8.0, "reference_unit": "A"}, "1.62 W, at x_current = 8.00 A"),
     ],
 )
 def test_a_size_says_what_it_holds_for(family, unit, settings, wanted):

@@ -65,7 +65,7 @@ class DiagnoseOptions:
 class Diagnosis:
     """A verdict, its causes with their evidence, and the gain on sealed runs."""
 
-    model: Model  # that was looked at
+    model: Model  # that was diagnosed
     runs: tuple[Run, ...] = field(repr=False)  # sealed ones last
     machine: Description = field(repr=False)
     result: Result = field(repr=False)
@@ -82,7 +82,7 @@ class Diagnosis:
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """What the description lacks or has wrong, and channels at fault."""
+        """What is missing or wrong in the description, and channels at fault."""
         return self.findings.causes
 
     def __str__(self) -> str:

@@ -69,7 +69,7 @@ def setting_words(cause: Cause) -> str:
     if entry := family_of(cause.family):
         said += entry.said(cause)
     if (reference := settings.get("reference")) and cause.signal:
-        said.append(f"where {cause.signal} is {quantity(float(reference), str(settings.get('reference_unit', '')))}")
+        said.append(f"at {cause.signal} = {quantity(float(reference), str(settings.get('reference_unit', '')))}")
     if height := settings.get("height"):
         said.append(f"about {number(float(height))} m")
     return ", ".join(said)

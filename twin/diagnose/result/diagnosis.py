@@ -36,7 +36,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class Cause:
-    """One thing that the description lacks or has wrong, or one channel that is at fault."""
+    """One thing missing or wrong in the description, or one channel at fault."""
 
     family: str  # name in the catalogue: "heat_source"
     place: str  # "bed.x_motor", "films.bed", "contacts.x_guide", "sensors.x_nut", "signals.x_current", "runs.NAME"
