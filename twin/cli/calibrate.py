@@ -35,7 +35,7 @@ def _options() -> type[Any]:
 @click.option("--noise", default="0.1 K", show_default=True, type=Quantity("K"),
               help="standard deviation of one temperature sample")  # fmt: skip
 @click.option("--tcp-noise", default="1 um", show_default=True, type=Quantity("m"),
-              help="of a TCP deviation, where tcp.csv has no sigma")  # fmt: skip
+              help="standard deviation of a TCP row where tcp.csv has no sigma")  # fmt: skip
 @click.option("--initial", default="0.3 K", show_default=True, type=Quantity("K", zero=True),
               help="initial-temperature uncertainty where a run states none")  # fmt: skip
 @click.option("--form", default=0.03, show_default=True, type=click.FloatRange(0, 1),

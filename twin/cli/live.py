@@ -54,7 +54,7 @@ class _Remembering(click.Command):
 @click.option("--speed", type=float, default=1.0, show_default=True, help="factor of a replay; 0: as fast as possible")
 @click.option("--limit", type=Quantity("m"), default="200 um", show_default=True, help="largest offset of an axis")
 @click.option("--slew", type=Quantity("m/s"), default="0.2 um/s", show_default=True, help="fastest change of an offset")
-@click.option("--period", type=Quantity("s"), default="1 s", show_default=True, help="between steps of the outputs")
+@click.option("--period", type=Quantity("s"), default="1 s", show_default=True, help="time between outputs")
 @click.option("--freeze", type=Quantity("s"), default="60 s", show_default=True,
               help="age of inputs at which the correction freezes")  # fmt: skip
 @click.option("--neutral", type=Quantity("s"), default="600 s", show_default=True,
