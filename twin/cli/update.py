@@ -47,10 +47,10 @@ def _options() -> type[Any]:
 def command(
     artefact: str, run: str, earlier: tuple[str, ...], output: str | None, as_json: bool, options: UpdateOptions
 ) -> None:
-    """Replay RUN online with the model of ARTEFACT as beside the machine: what is measured corrects what follows.
+    """Replay RUN online with the model of ARTEFACT, as beside the machine: measurements correct what follows.
 
     Every row of the run's tcp.csv is predicted before it is used. The model itself stays as it is; the correction is
-    kept beside it, with the standard deviation of what it leaves.
+    kept beside it, with the standard deviation of what it leaves. The default method of `twin live` is gain.
     """
     import json
 

@@ -173,7 +173,7 @@ def diagnose(
     artefact: Artefact, machine: Machine, runs: Sequence[Run], sealed: Sequence[Run] = (),
     settings: Settings = Settings(), progress: Progress = silent,
 ) -> Result:  # fmt: skip
-    """The diagnosis of measured runs. Sealed runs are opened after everything else is decided.
+    """The diagnosis of measured runs. Sealed runs are opened last: they measure the gain, and may withdraw a cause.
 
     Raises LogError and TwinError for runs and descriptions that cannot be used.
     """
