@@ -327,7 +327,7 @@ def unknown_lines(d: Diagnosis) -> list[str]:
 
 def pull_lines(d: Diagnosis) -> list[str]:
     far = [] if d.verdict == "out_of_tolerance" else beyond(d.pulls, 2.0)
-    return [f"Worth a look: {joined([pull_words(p) for p in far[:2]])}."] if far else []
+    return [f"Check: {joined([pull_words(p) for p in far[:2]])}."] if far else []
 
 
 def _seen(d: Diagnosis) -> list[Limit]:
