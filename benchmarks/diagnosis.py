@@ -43,7 +43,7 @@ def main() -> None:
         print(f"   {c['family']} at {c['place']}, {c['history']}: {size}")
     helped = [g for g in found["gain"] if g["ci95"][0] > 0.0]
     best = max(found["gain"], key=lambda g: g["recalibrated"] / g["extended"])
-    print(f"   sealed run: {len(helped)} of {len(found['gain'])} channels better beyond chance; ", end="")
+    print(f"   sealed run: {len(helped)} of {len(found['gain'])} channels significantly better; ", end="")
     print(f"most {best['channel']}, rms", end="")
     print("".join(f" {best[m]:.3g} {best['unit']} {m}" for m in ("delivered", "recalibrated", "extended")))
     print(

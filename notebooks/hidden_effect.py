@@ -12,14 +12,14 @@
 # ---
 
 # %% [markdown]
-# # A hidden effect
+# # A hidden fault
 #
 # A machine misbehaves, and its simulation does not say why. `twin diagnose` compares measured runs with the
-# simulation, names what the description lacks, with size and interval, writes the extended description and says
-# what it is worth on a run that it has not looked at.
+# simulation, names what is missing in the description, with size and interval, writes the extended description and
+# measures its gain on a run that it was not fitted to.
 #
 # The machine here is a lumped one of four nodes, so that a diagnosis takes less than a minute. Its measurements are
-# made: we hide an effect in *another* machine and let `twin diagnose` look for it. Everything below is Python; the
+# made: we hide a fault in *another* machine and let `twin diagnose` find it. Everything below is Python; the
 # commands `twin build`, `hide`, `simulate` and `diagnose` do the same.
 
 # %%
@@ -59,7 +59,7 @@ print(f"sensors: {', '.join(model.sensors)}")
 # %% [markdown]
 # ## The machine that misbehaves
 #
-# It must not be the model under test, or finding the effect would prove nothing. Gains of sources and films, and
+# It must not be the model under test, or finding the fault would prove nothing. Gains of sources and films, and
 # conductances, are off by up to 10 %, as no designer knows them better; the machine is stepped three times finer than
 # the model; sensors and probe have noise.
 #
@@ -80,8 +80,8 @@ for path, factor in off.items():
 # ## Three days of production
 #
 # Jobs of 10 to 60 min at their own speeds and motor currents, pauses between them, a pump that goes on and off, air
-# that swings. Monday and Tuesday are looked at. Wednesday is sealed: it is opened when everything is decided, to
-# measure the gain.
+# that swings. Monday and Tuesday are diagnosed. Wednesday is sealed: it is opened last, measures the gain, and may
+# withdraw a cause.
 
 
 # %%
@@ -120,9 +120,9 @@ print(f"a day: {len(monday.temperatures.time)} rows of temperatures, {len(monday
 # %% [markdown]
 # ## The diagnosis
 #
-# First everything that can be calibrated is calibrated; a cause must explain what that leaves. How much chance and
-# model discrepancy explain is known from simulated measurements without any effect: 40 here, 200 by default. They set
-# the threshold that a cause must pass.
+# First everything that can be calibrated is calibrated; a cause must explain the residual. How much noise and
+# model discrepancy explain is known from fault-free simulations: 40 here, 100 by default. They set the threshold that
+# a cause must pass.
 
 # %%
 options = twin.DiagnoseOptions(nulls=40)
@@ -133,7 +133,7 @@ print(found)
 
 # %% [markdown]
 # These are the lines that the command prints; `index.html` shows the pictures. Beside the cause stand its rivals. Their
-# cosine says how alike the traces are in these data, with everything that can be calibrated projected out.
+# cosine says how similar the responses are in these data, with everything that can be calibrated projected out.
 
 # %%
 print(f"{'candidate':<14} {'at':<14} {'statistic':>9} {'cosine':>7}   history")
@@ -156,7 +156,7 @@ print(f"hidden:  {HEAT:.1f} W")
 # %% [markdown]
 # ## The extended model
 #
-# The description gets the effect as an entry of its own, and the refitted values of what it declares already. It is
+# The description gets the cause as an entry of its own, and the refitted values of what it declares already. It is
 # text: read it, change it, take it out again. `extended.h5` is the artefact built from it.
 
 # %%
@@ -169,8 +169,8 @@ extended = report.model
 # ## What it is worth
 #
 # Root mean square of measured minus simulated on Wednesday, noise included. Only the step from *recalibrated* to
-# *extended* is the diagnosis' own. Column and bed are where the pump's heat is felt; motor and head are upstream of it,
-# and what they lack is a matter of calibration.
+# *extended* is due to the diagnosis. The pump's heat warms column and bed; motor and head are upstream of it, and
+# their residual is a matter of calibration.
 
 # %%
 print(f"{'channel':<8} {'delivered':>11} {'recalibrated':>13} {'extended':>11}   gain, 95 % interval")

@@ -128,8 +128,8 @@ print(logs["monday"].read_text("utf-8")[:260])
 # ## A twin from nothing but the files
 #
 # Columns are taken for what their headers and values say. A column that broke is used in no run, and of a spliced file
-# what comes before the splice; both are told. What remains: bodies that follow a logged temperature or a heat with some
-# lag and move the tool. Friday is kept aside.
+# what comes before the splice; both are listed. What remains: bodies that follow a logged temperature or heat with some
+# lag and move the tool. Friday is sealed.
 
 # %%
 training = ["monday", "tuesday", "wednesday", "thursday"]

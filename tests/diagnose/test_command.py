@@ -111,7 +111,7 @@ def test_a_machine_that_has_moved(artefact, tmp_path, capsys):
 def test_defaults_are_those_of_the_library():
     options = {p.name: p for p in command.params}
     assert options["nulls"].default == Settings().nulls
-    assert f"; {Settings().form} more show model discrepancy" in options["nulls"].help
+    assert f"; {Settings().form} more for model discrepancy" in options["nulls"].help
 
 
 def test_a_seed_that_is_none(artefact, tmp_path, capsys):

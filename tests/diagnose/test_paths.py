@@ -64,7 +64,7 @@ def test_a_line_between_two_nodes_is_named_and_written(artefact: Path, tmp_path:
     runs = [read_run(log) for log in logs[:2]]
     machine = load_machine(MACHINE)
     diagnosis, said = write_extension(result, read_artefact(artefact), machine, runs, tmp_path / "diagnosis")
-    assert said == [f"description with the effect: {tmp_path / 'diagnosis' / 'machine.toml'}"]
+    assert said == [f"description with the cause: {tmp_path / 'diagnosis' / 'machine.toml'}"]
     joint = load_machine(tmp_path / "diagnosis").contacts["found_1"]
     assert (joint.surfaces, joint.total) == (("motor", "bed"), pytest.approx(cause.amplitude, rel=1e-4))
     assert diagnosis.causes[0].parameter == "contacts.found_1.total"

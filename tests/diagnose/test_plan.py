@@ -124,10 +124,10 @@ def test_a_terminal_gets_a_table_by_gain_and_the_page_a_section():
     lines = plan_lines(replace(planned(), pairs=()))
     assert (
         lines[0]
-        == "Next experiment for heat_source bed.left: today seen from 40.0 W, with the longest run again from 20.0 W"
+        == "Next experiment for heat_source bed.left: detection limit 40.0 W today, 20.0 W with the longest run again"
     )
-    assert lines[1].split()[:5] == ["8.00", "x", "from", "5.00", "W,"]
-    assert "today seen not up to 5.00 times the declared" in lines[3]
+    assert lines[1].split()[:4] == ["8.00", "x", "5.00", "W,"]
+    assert "detection limit above 5.00 times the declared today" in lines[3]
     html = plan_section(planned())
     assert html.count("<details>") == 4
     assert "sensor at bed.left" in html

@@ -108,16 +108,18 @@ def written(tmp_path_factory):
 
 SAID = {  # what the reader of each verdict must find
     "named": ("cause named", "85.0 W (95 % interval 80.2 to 89.7 W), following x_current²", "scale x: 11.30 µm/(m·K)"),
-    "ambiguous": ("either heat that", "; or a loss other than declared", "71.0 W",
-                  "To tell rivals apart: a sensor on bed.x_motor"),
+    "ambiguous": ("fit either missing heat source", "; or wrong loss law or coefficient", "71.0 W",
+                  "To separate rivals: a sensor on bed.x_motor"),
     "unknown": ("part column, mostly at column.top", "its peak is 40 W (95 % interval 28 to 52 W)", "hydraulics"),
-    "out_of_tolerance": ("Declared values cannot hold: sources.x_motor.gain is 1.620 (95 % interval 1.550 to 1.700) "
-                         "instead of 1.00 (+2.2 standard deviations", "sources.x_motor.gain (free of its tolerance)"),
+    "out_of_tolerance": ("Wrong declared values: sources.x_motor.gain is 1.620 (95 % interval 1.550 to 1.700) "
+                         "instead of 1.00 (+2.2 prior standard deviations",
+                         "sources.x_motor.gain (free of its tolerance)"),
     "sensor": ("sensor x_nut is at fault: drift, 0.81 K/day (95 % interval 0.70 to 0.92 K/day)",
-               "The model of the machine is left as it is"),
+               "The model of the machine is unchanged"),
     "signal": ("signal x_current is at fault: factor, 0.500", "0.480 to 0.520"),
     "too_poor": ("model is too poor",),
-    "nothing": ("nothing else is missing that these data could show", "would have shown, in 95 of 100 cases:", "11.6 W",
+    "nothing": ("nothing else is missing that these data could show",
+                "Detection limits (median location, probability 95 %):", "11.6 W",
                 "3.40 W/(m²·K)", "0.310 K/day", "2.30 µm", "No family of causes passes its threshold"),
 }  # fmt: skip
 
@@ -126,13 +128,13 @@ SAID = {  # what the reader of each verdict must find
 def test_the_page_of_every_verdict_says_it_first_and_has_every_section(written, verdict):
     reader = read((written(verdict) / "index.html").read_text(encoding="utf-8"))
     sentence = verdict_sentence(diagnosis(verdict))
-    assert reader.text.index(sentence) < reader.text.index("What it rests on")
+    assert reader.text.index(sentence) < reader.text.index("Evidence")
     for text in SAID[verdict]:
         assert text in reader.text, text
     assert set(reader.sections) == SECTIONS | ({"unknown"} if verdict == "unknown" else set())
     assert reader.sections[0] == ("limits" if verdict == "nothing" else "evidence")
     for shown in ("Residuals of run_1", "Residuals of sealed_run (sealed", "Measured and computed", "posterior sigma",
-                  "largest without an effect", "from bin to bin"):  # fmt: skip
+                  "largest of fault-free data", "Lag-1 autocorrelation"):  # fmt: skip
         assert shown in reader.text, shown
     assert ("Heat into column that nothing explains" in reader.text) == (verdict == "unknown")
     assert ("gain over recalibrated" in reader.text) == (verdict != "nothing")
@@ -186,8 +188,8 @@ def test_a_terminal_gets_at_most_ten_lines_with_the_verdict(verdict):
     assert len(lines) <= 10
     assert all(line and "\n" not in line for line in lines)
     assert verdict_sentence(diagnosis(verdict)) == lines[1]
-    assert any("would have shown, in 95" in line for line in lines) == (verdict in ("nothing", "too_poor"))
-    assert any("left as it is" in line for line in lines) == (verdict == "sensor")
+    assert any("Detection limits (median" in line for line in lines) == (verdict in ("nothing", "too_poor"))
+    assert any("machine is unchanged" in line for line in lines) == (verdict == "sensor")
     assert any("corrects the declaration" in line for line in lines) == (verdict == "signal")
 
 
@@ -307,7 +309,7 @@ def test_decimals_follow_the_interval():
             "1.62 W/(m²·K), to a medium of 14.00 °C (95 % interval 13.02 to 14.98 °C)",
         ),
         ("scale_expansion", "1/K", {"part": "bed"}, "162 %/K, with the temperature of bed"),
-        ("heat_source", "W", {"reference": 8.0, "reference_unit": "A"}, "1.62 W, where x_current is 8.00 A"),
+        ("heat_source", "W", {"reference": 8.0, "reference_unit": "A"}, "1.62 W, at x_current = 8.00 A"),
     ],
 )
 def test_a_size_says_what_it_holds_for(family, unit, settings, wanted):
@@ -315,18 +317,17 @@ def test_a_size_says_what_it_holds_for(family, unit, settings, wanted):
     assert wanted in cause_words(cause)
 
 
-def test_chance_counts_what_data_without_an_effect_gave():
+def test_chance_counts_what_fault_free_data_gave():
     values = np.arange(1.0, 101.0)
     some, none = chance(values, 90.0), chance(values, 100.0)
-    assert some.startswith("Of 100 simulated data sets ")
-    assert "10 gave more than 90.0; the largest gave 100" in some
-    assert "none gave more than 100, which makes it rarer than once in 33 with 95 % confidence" in none  # 3 / n
+    assert some.startswith("10 of 100 simulated fault-free data sets exceeded 90.0; the largest gave 100")
+    assert (
+        "None of 100 simulated fault-free data sets exceeded 100, so at most 1 in 33 would (95 % confidence)" in none
+    )  # 3 / n
     assert chance(np.zeros(0), 3.0) == chance(None, 3.0) == chance(values, np.nan) == ""
     d = replace(diagnosis("named"), nulls={"heat_source": values})
-    assert evidence_sentence(d, "heat_source", 431.2, 95.0).startswith(
-        "These data give a statistic of 431; 95.0 is needed."
-    )
-    assert "5 gave more than 95.0" in evidence_sentence(d, "heat_source", 431.2, 95.0)
+    assert evidence_sentence(d, "heat_source", 431.2, 95.0).startswith("The statistic is 431, its threshold 95.0.")
+    assert "5 of 100 simulated fault-free data sets exceeded 95.0" in evidence_sentence(d, "heat_source", 431.2, 95.0)
 
 
 def test_what_is_out_of_tolerance_leads_whatever_else_is_pulled():
@@ -338,7 +339,7 @@ def test_what_is_out_of_tolerance_leads_whatever_else_is_pulled():
     assert "12.6 standard deviations of its fit" in text
     table_of_pulls = pulls_table(d)
     assert table_of_pulls.index("sources.x_motor.gain (free") < table_of_pulls.index("films.bed.gain")
-    assert "Declared values cannot hold: films.bed.gain is 3.00 instead of 1.00 (+4.6" in verdict_sentence(
+    assert "Wrong declared values: films.bed.gain is 3.00 instead of 1.00 (+4.6" in verdict_sentence(
         replace(d, causes=())
     )
 
@@ -368,7 +369,7 @@ def test_a_source_that_was_freed_is_the_pull_and_is_written_once(tmp_path):
     assert pull.pull == pytest.approx(4.5, abs=0.5)
     assert pull.value == pytest.approx(pull.nominal * causes[0].amplitude)
     assert 0.0 < pull.sigma < 1.0
-    assert verdict_sentence(d).startswith(f"Declared values cannot hold: {path} is {pull.value / pull.nominal:.1f}")
+    assert verdict_sentence(d).startswith(f"Wrong declared values: {path} is {pull.value / pull.nominal:.1f}")
     told = channels_of(found, 2, study.runs[2].measured, (np.ones(3), np.ones(3)))
     assert {g.run for g in told} == {study.runs[2].run.name}
     result = Result(replace(d, series=()), found, causes)
@@ -392,24 +393,27 @@ def test_a_pull_of_a_conductance_is_a_relative_change_and_may_lie_beyond_its_bou
 
 def test_chance_is_told_of_what_was_held_against_synthetic_measurements_alone():
     d = diagnosis("named")
-    assert "simulated data sets" in cause_evidence(d, d.causes[0])
+    assert "simulated fault-free data sets" in cause_evidence(d, d.causes[0])
     stuck = Cause("sensor", "sensors.a", "", np.nan, (np.nan, np.nan), "K", np.inf, 0.0, "stuck",
                   windows=(Window("run_1", 0.0, 9000.0),))  # fmt: skip
     calibrated = replace(STRAINED, statistic=9.0, history="by calibration")
     for cause, told in (
-        (stuck, "stood still for 2.50 h"),
-        (STRAINED, "12.6 standard deviations of its fit from what was declared; 2.50 are needed"),
-        (calibrated, "Calibration moves it 3.00 times as far as all but 3 % of simulated data sets"),
+        (stuck, "constant for 2.50 h"),
+        (STRAINED, "12.6 standard deviations of its fit from the declared value; the threshold is 2.50"),
+        (calibrated, "Calibration shifts it by 3.00 times the 97 % quantile of simulated fault-free data sets"),
     ):
         one = replace(diagnosis("out_of_tolerance"), causes=(cause,), series=(), whiteness=(), ranked=(), gain=())
         assert told in cause_evidence(one, cause)
         assert told in "".join(summary_lines(one))
-        for word in ("once in", "statistic of", *([] if cause is calibrated else ["simulated"])):
+        for word in ("at most 1 in", "The statistic is", *([] if cause is calibrated else ["simulated"])):
             assert word not in cause_evidence(one, cause)
 
 
 def test_a_sensor_beside_does_not_lead_what_is_ambiguous_or_out_of_tolerance():
-    for verdict, told in (("ambiguous", "what: either heat that"), ("out_of_tolerance", "hold: sources.x_motor.gain")):
+    for verdict, told in (
+        ("ambiguous", "fit either missing heat"),
+        ("out_of_tolerance", "values: sources.x_motor.gain"),
+    ):
         d = diagnosis(verdict)
         text = verdict_sentence(replace(d, causes=(SENSOR, *d.causes)))
         assert told in text
@@ -423,14 +427,14 @@ def test_other_faces_of_a_part_that_look_the_same_are_told():
         Rival("heat_source", place, "always", 70.0, "W", 402.0, 0.99, remedy) for place, remedy in told.items()
     )
     text = verdict_sentence(replace(diagnosis("named"), causes=(heat(rivals=rivals),)))
-    assert text.endswith(" (these data do not tell bed.x_motor from bed.left).")
-    assert "do not tell" not in verdict_sentence(replace(diagnosis("named"), causes=(heat(rivals=rivals[1:]),)))
+    assert text.endswith(" (data cannot separate bed.x_motor from bed.left).")
+    assert "cannot separate" not in verdict_sentence(replace(diagnosis("named"), causes=(heat(rivals=rivals[1:]),)))
 
 
 def test_a_clock_that_is_off_changes_no_description():
     clock = replace(SIGNAL, place="runs.run_1", parameter="", history="clock", amplitude=120.0, unit="s")
     lines = summary_lines(replace(diagnosis("signal"), causes=(clock,)))
-    assert "The model of the machine is left as it is." in lines
+    assert "The model of the machine is unchanged." in lines
 
 
 def test_a_channel_that_an_extension_makes_worse_than_it_was_delivered_is_told():
@@ -442,9 +446,9 @@ def test_a_channel_that_an_extension_makes_worse_than_it_was_delivered_is_told()
     d = replace(diagnosis("named"), gain=(gain, replace(gain, channel="dx", ci95_delivered=(-1e-6, 1e-6))))
     (line,) = gain_lines(d)
     assert " extended (root mean square" in line
-    (refused,) = gain_lines(replace(d, notes=("withdrawn: heat source at bed. It explains nothing",)))
+    (refused,) = gain_lines(replace(d, notes=("withdrawn: missing heat source at bed. It explains nothing",)))
     assert " with what was withdrawn (root mean square" in refused
-    assert line.endswith("better beyond chance in 2, worse in 0; worse than as delivered: dz.")
+    assert line.endswith("significantly better in 2, worse in 0; worse than as delivered: dz.")
     assert gain_table(d).count("better, worse than as delivered") == 1
 
 
@@ -497,7 +501,7 @@ def test_the_loudest_sensors_are_shown():
 def test_what_comes_nearest_to_its_threshold_leads_the_families():
     d = diagnosis("named")
     text = families_table(d)
-    assert text.index("heat that the description lacks") < text.index("heat transfer other than declared")
+    assert text.index("missing heat source") < text.index("wrong film coefficient")
     assert text.count("<tr>") == 1 + len({*d.observed, *d.thresholds, *d.nulls})
 
 
@@ -506,9 +510,9 @@ def test_no_gain_is_told_with_its_reason(verdict):
     d = replace(diagnosis(verdict), gain=())
     open_only = tuple(s for s in d.series if not s.sealed)
     assert len(open_only) < len(d.series)
-    assert "no gain to report: no run was kept aside." in read(page(replace(d, series=open_only))).text
+    assert "no gain to report: no run was sealed." in read(page(replace(d, series=open_only))).text
     bare = tuple(replace(s, sealed=True) for s in open_only)
-    assert "no gain to report: nothing was measured in the run kept aside." in read(page(replace(d, series=bare))).text
+    assert "no gain to report: nothing was measured in the sealed run." in read(page(replace(d, series=bare))).text
 
 
 def test_long_tables_are_cut_and_say_so():
@@ -523,13 +527,13 @@ def test_nothing_says_first_what_calibration_had_to_change():
     still = replace(d, series=tuple(runs))
     white = tuple((name, before, 0.0) for name, before, _ in d.whiteness)
     quiet = replace(still, whiteness=white)
-    assert "within their noise the description explains them" in verdict_sentence(quiet)
+    assert "the description explains them within their noise" in verdict_sentence(quiet)
     run = next(s for s in still.series if not s.sealed)
     moved = replace(run, recalibrated=run.delivered - 2.0, tcp_recalibrated=run.tcp_delivered - [0.0, 9e-6, 0.0])
     pull = Pull("sources.spindle.gain", 1.0, 1.35, 0.5, 1.4, "1", changes={"sensor_0": 2.0, "dy": 8e-6})
     text = verdict_sentence(replace(quiet, series=(moved,), pulls=(*d.pulls, pull)))
     assert "within their noise" not in text
-    assert text.startswith("The description as delivered is not right: calibration moved")
+    assert text.startswith("The description as delivered is wrong: calibration moved")
     assert "Nothing is missing" not in text
     for words in ("by 2.00 K", "dy by 9.00 µm", "most of it by sources.spindle.gain, 1.35"):
         assert words in text
@@ -544,4 +548,4 @@ def test_nothing_says_first_what_calibration_had_to_change():
     text = verdict_sentence(replace(quiet, series=(moved,), pulls=(unsure,)))
     assert text.startswith("Within the tolerances of the description calibration moved")
     left = tuple((name, before, 0.5) for name, before, _ in d.whiteness)
-    assert "correlated by 0.50" in verdict_sentence(replace(quiet, whiteness=left))
+    assert "lag-1 correlation 0.50" in verdict_sentence(replace(quiet, whiteness=left))

@@ -53,13 +53,12 @@ def test_a_name_that_makes_the_sealed_run_worse_is_withdrawn(monkeypatch):
     refuted, extension, note = opened(-0.5)
     assert (refuted, extension) == ("unknown", 0)
     assert cause.place in note
-    assert "housing, of which it leaves 1.50 K (rms), and a calibration without it 1.00 K" in note
+    assert "most of all housing: residual 1.50 K (rms) with it, 1.00 K recalibrated" in note
     assert "nearly as likely" not in note
     rival = Rival("joint", "contacts.rail", "always", 0.5, "1", 40.0, 0.99, "")
     told = judged(found, y, verdict, [replace(cause, rivals=(rival, rival))], FAMILIES, sealed, 1)
-    assert (
-        told.note == f"{note}. Not asked of the sealed run, and nearly as likely in the others: joint at contacts.rail"
-    )
+    others = "Not tested on the sealed run, and nearly as likely in the others"
+    assert told.note == f"{note}. {others}: wrong joint conductance at contacts.rail"
     none = dict.fromkeys(found.steps[0].parts, 0.0)  # no heat of any history, and a name that has just passed
     faint = replace(
         found, steps=(replace(found.steps[0], parts=none),),

@@ -19,7 +19,7 @@ def test_what_a_sealed_run_alone_holds_is_told_with_its_channel(more, told):
     notes = sealed_alone([*runs, sealed], POLICY)
     assert bool(notes) is told
     if told:
-        assert notes[0].startswith("wednesday: something is at work that the other runs do not have: sensor_3 is left")
+        assert notes[0].startswith("wednesday: effect absent from the other runs: residual of sensor_3 ")
 
 
 def test_a_channel_that_only_the_sealed_run_has_says_nothing():

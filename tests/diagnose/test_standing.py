@@ -60,7 +60,7 @@ def test_the_weakest_is_withdrawn_alone():
     found, y, opened = found_beside(always("slide", 5000.0, 40.0))
     now, told = standing(found, y, FAMILIES, (), opened, 1)
     assert (told.verdict, [c.place for c in told.causes], told.note) == ("named", ["housing"], "")
-    assert told.less.startswith("withdrawn: heat source at slide")
+    assert told.less.startswith("withdrawn: missing heat source at slide")
     assert [a.hypothesis.name for a in now.accepted] == ["housing"]
     assert now.accepted[0].amplitude[0] == pytest.approx(400.0, rel=0.1)
 
@@ -70,7 +70,7 @@ def test_the_last_one_is_withdrawn_as_a_whole():
     alone = replace(found, accepted=found.accepted[1:])
     now, told = standing(alone, y, FAMILIES, (), opened, 1)
     assert (told.verdict, told.causes, told.less) == ("unknown", (), "")
-    assert told.note.startswith("withdrawn: heat source at slide")
+    assert told.note.startswith("withdrawn: missing heat source at slide")
     assert now is alone
 
 
@@ -88,7 +88,7 @@ def test_what_ended_with_the_runs_that_were_looked_at_is_told_until_then():
     opened = [replace(study.runs[2].measured, temperature=T, tcp=w)]
     now, told = standing(found, y, FAMILIES, (), opened, 1)
     assert (told.verdict, [c.place for c in told.causes], told.note) == ("named", ["housing"], "")
-    assert told.less.startswith("told until the end of the runs that were looked at: heat source at housing")
+    assert told.less.startswith("named until the end of the diagnosed runs: missing heat source at housing")
     (one,) = now.accepted
     assert not lasts(study, one.hypothesis.when.windows)
     assert not one.units[0].shapes[2].any()

@@ -21,7 +21,7 @@ import click
 @click.option(
     "--substeps",
     type=click.IntRange(1),
-    help="of the time integrator per step [default: as few of 1, 2, 4 as keep its error below half of the limits]",
+    help="substeps of the time integrator [default: as few of 1, 2, 4 as keep its error below half of the limits]",
 )
 def command(
     machine: str, output: str, method: str, states: int, samples: int, training: int, substeps: int | None

@@ -35,9 +35,9 @@ def _options() -> type[Any]:
 @click.option("--noise", default="0.1 K", show_default=True, type=Quantity("K"),
               help="standard deviation of one temperature sample")  # fmt: skip
 @click.option("--tcp-noise", default="1 um", show_default=True, type=Quantity("m"),
-              help="of a TCP deviation, where tcp.csv has no sigma")  # fmt: skip
+              help="standard deviation of a TCP row where tcp.csv has no sigma")  # fmt: skip
 @click.option("--initial", default="0.3 K", show_default=True, type=Quantity("K", zero=True),
-              help="how far parts may be from it in runs without a known start")  # fmt: skip
+              help="initial-temperature uncertainty where a run states none")  # fmt: skip
 @click.option("--form", default=0.03, show_default=True, type=click.FloatRange(0, 1),
               help="share by which the model's response to each source may be wrong")  # fmt: skip
 @click.option("--exclude", multiple=True, help="sensor to leave out; repeatable")

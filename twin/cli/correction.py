@@ -26,14 +26,14 @@ def _options() -> type[Any]:
 @click.option(
     "--time", type=Quantity("s", zero=True), help="since the start of the run, e.g. '4 h'  [default: its end]"
 )
-@click.option("--degree", help="of the polynomial along every axis, '2', or 'x=4,y=2'  "
+@click.option("--degree", help="degree of the polynomial along every axis, '2', or 'x=4,y=2'  "
               "[default: 2, or 4 where there is one axis]")  # fmt: skip
 @click.option("--form", type=click.Choice(["full", "product"]), default="full", show_default=True,
               help="all products of powers, or one factor per axis, smaller and worse")  # fmt: skip
 @click.option("--zero-at", type=Quantity("m", negative=True),
               help="position of the only axis where the error is held at zero, e.g. '-500 mm': "
               "the fixed bearing, if it does not move; within the stroke  [default: a constant is fitted]")  # fmt: skip
-@click.option("--angles", help="of rotary axes that turn tool or work, 'b=30 deg,c=90 deg'  [default: zero]")
+@click.option("--angles", help="angles of rotary axes that turn tool or work, 'b=30 deg,c=90 deg'  [default: zero]")
 @click.option("--rotary", is_flag=True, help="offsets of the rotary axes besides, which take up tilt about them")
 @bundled(_options)
 def command(

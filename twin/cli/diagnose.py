@@ -1,4 +1,4 @@
-"""twin diagnose: find what the simulation gets wrong, name the cause, extend the model, measure the gain."""
+"""twin diagnose: find why simulation and measurement differ, name the cause, extend the model, measure the gain."""
 
 from __future__ import annotations
 
@@ -26,34 +26,34 @@ def _options() -> type[Any]:
 @click.argument("artefact", type=click.Path(), required=False)
 @click.argument("runs", type=click.Path(), nargs=-1)
 @click.option(
-    "--sealed", multiple=True, cls=Several, type=click.Path(), help="runs that are opened last, to measure the gain"
+    "--sealed", multiple=True, cls=Several, type=click.Path(), help="validation runs, never fitted to; used last"
 )
 @click.option("-o", "--output", type=click.Path(), help="folder of the report")
 @click.option("--noise", default="0.1 K", show_default=True, type=Quantity("K"),
               help="standard deviation of one temperature reading")  # fmt: skip
 @click.option("--tcp-noise", default="1 um", show_default=True, type=Quantity("m"),
-              help="of a TCP deviation, where tcp.csv has no sigma")  # fmt: skip
+              help="standard deviation of a TCP row where tcp.csv has no sigma")  # fmt: skip
 @click.option("--exclude", multiple=True, help="sensor to leave out; repeatable")
 @click.option("--nulls", default=100, show_default=True, type=click.IntRange(20),
-              help="synthetic runs without a cause, for thresholds; 60 more show model discrepancy")  # fmt: skip
+              help="fault-free simulations for thresholds; 60 more for model discrepancy")  # fmt: skip
 @click.option("--catalogue", type=click.Path(), help="Python file with entries of your own (FAMILIES)")
 @click.option("--machine", type=click.Path(), help="description with its meshes, where it has moved since the build")
 @click.option("--no-build", is_flag=True, help="write the extended description, but do not build its artefact")
 @click.option("--plan", metavar="[SUSPICION]", is_flag=False, flag_value="",
               help="propose the next experiment for a suspicion ('FAMILY PLACE', as report.json prints them; FAMILY "
-              "alone: its worst place; none: what the verdict leaves open)")  # fmt: skip
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(0), help="of the bootstrap")
+              "alone: its worst place; none: what the verdict does not separate)")  # fmt: skip
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(0), help="seed of the bootstrap")
 @click.option("--explain", metavar="FAMILY", help="print an entry of the catalogue, or 'all'")
 @bundled(_options)
 def command(
     artefact: str | None, runs: tuple[str, ...], sealed: tuple[str, ...], output: str | None, machine: str | None,
     no_build: bool, explain: str | None, options: DiagnoseOptions,
 ) -> int:  # fmt: skip
-    """Say what ARTEFACT gets wrong about the measured RUNS, and what it gains to know.
+    """Find why ARTEFACT differs from the measured RUNS; write a corrected description.
 
     Writes OUTPUT/index.html (readable as it is), OUTPUT/report.json, and, where a cause belongs into the description,
-    OUTPUT/machine.toml with the effect added and OUTPUT/extended.h5 built from it. What a former diagnosis left in
-    OUTPUT is replaced. The artefact stays untouched.
+    OUTPUT/machine.toml with the cause added and OUTPUT/extended.h5 built from it. Files of an earlier diagnosis in
+    OUTPUT are replaced. The artefact stays untouched.
     """
     from pathlib import Path
 

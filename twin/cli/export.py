@@ -26,7 +26,7 @@ def _options() -> type[Any]:
 @click.option("--format", "name", required=True, help="; ".join(f"{k}: {f.help}" for k, f in FORMATS.items()))
 @click.option("-o", "--output", required=True, type=click.Path(), help="file to write; heidenhain, vtk: folder")
 @click.option("--precision", type=click.Choice(["double", "single"]), default="double", show_default=True,
-              help="of the numbers in C")  # fmt: skip
+              help="precision of the numbers in C")  # fmt: skip
 @click.option("--run", type=click.Path(path_type=Path),
               help="C: run folder on which the error against `twin run` is measured")  # fmt: skip
 @click.option("--poses", is_flag=True, help="FMUs: the TCP errors at all poses are outputs too")

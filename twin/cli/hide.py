@@ -1,4 +1,4 @@
-"""twin hide: a machine or a log with something in it that the description does not know."""
+"""twin hide: a machine or a log with a fault that is not in the description."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _settings(context: click.Context, option: click.Parameter, given: tuple[str,
 @click.option("-o", "--output", required=True, type=click.Path(), help="folder to write")
 @click.option("--history", default="", help="kind of a fault of a log: offset, drift, lag, ...")
 @click.option("--signal", default="", help="logged signal that it follows")
-@click.option("--exponent", default=1.0, show_default=True, help="of that signal")
+@click.option("--exponent", default=1.0, show_default=True, help="exponent of that signal")
 @click.option("--from", "start", type=Quantity("s", negative=True), help="time at which it begins, e.g. '4 h'")
 @click.option("--to", "end", type=Quantity("s", negative=True), help="time at which it ends")
 @click.option(
@@ -52,9 +52,9 @@ def _settings(context: click.Context, option: click.Parameter, given: tuple[str,
 def command(
     family: str, place: str, size: str, target: str, output: str, options: HideOptions, runs: tuple[str, ...]
 ) -> None:
-    """Hide an effect of SIZE ('10 W', '0.6 K', '3') at PLACE in a copy of a machine, or of a log.
+    """Inject a fault of SIZE ('10 W', '0.6 K', '3') at PLACE in a copy of a machine, or of a log.
 
-    FAMILY is one of `twin diagnose`. `twin simulate` of a machine's copy is an experiment with a hidden effect; sensor,
+    FAMILY is one of `twin diagnose`. `twin simulate` of a machine's copy is an experiment with a hidden fault; sensor,
     signal, slip, measurement, initial_state and not_thermal damage the copy of a run folder. hidden.json says what was
     hidden.
     """

@@ -47,7 +47,7 @@ def _names(context: click.Context, option: click.Parameter, given: tuple[str, ..
               help="certified range of films [W/(m^2 K)], surroundings [degC], inputs [W where B sums to 1]; repeat  "
               "[default: films=2..40, surroundings=10..40, inputs=0..1000]")  # fmt: skip
 @click.option("--names", multiple=True, callback=_names, metavar="outputs=A,B",
-              help="of all outputs, or of all inputs, in their order; repeat")  # fmt: skip
+              help="names of all outputs, or of all inputs, in order; repeat")  # fmt: skip
 @click.option("--reference", default=20.0, show_default=True, help="temperature that x is counted from [degC]")
 @click.option("--method", type=click.Choice(["galerkin", "balanced"]), default="galerkin", show_default=True,
               help="as of twin build; galerkin of up to 64 states fits its basis, in half a minute")  # fmt: skip

@@ -51,14 +51,14 @@ class _Remembering(click.Command):
               help="offsets of every axis at the poses, or coefficients")  # fmt: skip
 @click.option("--initial", type=Quantity("degC", negative=True),
               help="temperature of the whole machine at a fresh start  [default: of the air around it]")  # fmt: skip
-@click.option("--speed", type=float, default=1.0, show_default=True, help="of a replay; 0: as fast as it goes")
+@click.option("--speed", type=float, default=1.0, show_default=True, help="factor of a replay; 0: as fast as possible")
 @click.option("--limit", type=Quantity("m"), default="200 um", show_default=True, help="largest offset of an axis")
 @click.option("--slew", type=Quantity("m/s"), default="0.2 um/s", show_default=True, help="fastest change of an offset")
-@click.option("--period", type=Quantity("s"), default="1 s", show_default=True, help="between steps of the outputs")
+@click.option("--period", type=Quantity("s"), default="1 s", show_default=True, help="time between outputs")
 @click.option("--freeze", type=Quantity("s"), default="60 s", show_default=True,
-              help="age of inputs from which on the correction stands still")  # fmt: skip
+              help="age of inputs at which the correction freezes")  # fmt: skip
 @click.option("--neutral", type=Quantity("s"), default="600 s", show_default=True,
-              help="age from which on it goes to neutral")  # fmt: skip
+              help="age at which it returns to zero offsets")  # fmt: skip
 @click.option("--journal", type=click.IntRange(1), default=256, show_default=True, help="MB of past blocks to keep")
 @click.option(
     "--channels", type=click.Path(), help="TOML file: nodes of OPC UA, users and certificates, limits of values"
@@ -76,7 +76,7 @@ def command(
 ) -> None:
     """Run ARTEFACT beside the machine: load blocks in, axis offsets out, until the source ends or a signal comes.
 
-    Killed at any moment it goes on where it was. STATE/health.json says how it is.
+    Killed at any time, it resumes where it was. STATE/health.json has its state.
     """
     if print_unit:
         from twin.live.install.unit import unit_of

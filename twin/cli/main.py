@@ -1,6 +1,7 @@
 """The command `twin`: finds the command asked for, imports only that, and turns errors into one block and a status.
 
-Exit status: 0 done, 1 the check that the command makes has failed, 2 bad input, 130 interrupted.
+Exit status: 0 done, 1 the check that the command makes has failed, 2 bad input (also errors that `check` finds), 130
+interrupted.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ COMMANDS = {
     "score": "Score an artefact on measured runs, beside naive baselines.",
     "calibrate": "Fit an artefact's parameters to measured runs.",
     "update": "Correct an artefact online by sparse TCP measurements.",
-    "diagnose": "Find what an artefact gets wrong, name the cause, extend the model.",
+    "diagnose": "Find why an artefact differs from measured runs, name the cause, extend the model.",
     "rtest": "Find single axis errors (ISO 230-1) from R-tests.",
     "info": "Show what is in an artefact.",
-    "hide": "Hide an effect in a copy of a machine or a log, as a truth for experiments.",
+    "hide": "Inject a fault into a copy of a machine or a log, as a truth for experiments.",
     "report": "Draw the pictures of a result, and its page.",
     "serve": "Show a result or a running machine in a browser, and by OPC UA.",
     "poses": "Find the pose grid that suffices for a run, and the shares of the volumetric error.",
@@ -89,7 +90,8 @@ class LazyGroup(click.Group):
 def cli(traceback: bool) -> None:
     """Compile a machine-tool description into a reduced thermo-elastic model and run it beside the machine.
 
-    Exit status: 0 done, 1 the check that a command makes has failed, 2 bad input.
+    Exit status: 0 done, 1 the check that a command makes has failed, 2 bad input (also errors that `twin check`
+    finds), 130 interrupted.
     """
 
 

@@ -35,8 +35,10 @@ def _options() -> type[Any]:
 )
 @click.option("--random", default=200, show_default=True, type=click.IntRange(1), help="random poses")
 @click.option("--most", default=7, show_default=True, type=click.IntRange(2, 13), help="most positions per axis")
-@click.option("--steps", default=72, show_default=True, type=click.IntRange(1), help="of the full model over the run")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="of the random poses")
+@click.option(
+    "--steps", default=72, show_default=True, type=click.IntRange(1), help="steps of the full model over the run"
+)
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="seed of the random poses")
 @click.option("--json", "as_json", is_flag=True, help="machine-readable")
 @bundled(_options)
 def command(machine: str, run: str, as_json: bool, options: PoseOptions) -> int:

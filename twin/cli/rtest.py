@@ -34,7 +34,7 @@ def _options() -> type[Any]:
 @click.option("--sigma", type=Quantity("m"),
               help="standard deviation of each reading  [default: that in tcp.csv, else of the residuals]")  # fmt: skip
 @click.option(
-    "--result", type=click.Path(), help="of `twin run`: the same errors of the model beside the measured ones"
+    "--result", type=click.Path(), help="result of `twin run`: the same errors of the model, beside the measured ones"
 )
 @click.option("-o", "--output", type=click.Path(), help="folder for axis_errors.csv and rtest.json")
 @click.option("--json", "as_json", is_flag=True, help="machine-readable")

@@ -24,7 +24,7 @@ def _checkpoints() -> type[Any]:
 @click.argument("run", type=click.Path())
 @click.option("-o", "--output", required=True, type=click.Path(), help="folder for the results")
 @click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
-@click.option("--substeps", type=click.IntRange(1), help="of the integrator per step; default: as the certificate says")
+@click.option("--substeps", type=click.IntRange(1), help="substeps of the integrator; default: as the certificate says")
 @click.option("--initial", help="temperature at the start, e.g. '20 degC', or a result.h5 to go on from  "
               "[default: the run's own, else of the air around it]")  # fmt: skip
 @click.option("--checkpoint", default=1440, show_default=True, type=click.IntRange(1), help="steps between checkpoints")

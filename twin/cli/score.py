@@ -47,7 +47,7 @@ def _names(ctx: click.Context, param: click.Parameter, value: str | None) -> tup
 @click.option("--temperature-uncertainty", default="0.1 K", show_default=True, type=Quantity("K"),
               help="standard deviation of a sensor")  # fmt: skip
 @click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
-@click.option("--substeps", type=click.IntRange(1), help="of the integrator per step; default: as the certificate says")
+@click.option("--substeps", type=click.IntRange(1), help="substeps of the integrator; default: as the certificate says")
 @click.option("-o", "--output", type=click.Path(), help="folder for score.json and score.csv")
 @click.option("--json", "as_json", is_flag=True, help="print everything as JSON")
 @bundled(_options)

@@ -28,10 +28,10 @@ def _options() -> type[Any]:
 @click.option("--token", envvar="TWIN_TOKEN", help="who gives it may read, 16 characters at least  [default: a random "
               "one where others reach the page]")  # fmt: skip
 @click.option("--certificate", type=click.Path(), help="PEM; with --key, the page goes by https")
-@click.option("--key", type=click.Path(), help="of the certificate, PEM without a password")
+@click.option("--key", type=click.Path(), help="key of the certificate, PEM without a password")
 @click.option("--name", multiple=True, help="a name of this computer that browsers may ask for; may be given again")
 @click.option("--opcua", help="also an OPC UA server there, e.g. opc.tcp://127.0.0.1:4840/twin")
-@click.option("--user", default="twin", show_default=True, help="of OPC UA")
+@click.option("--user", default="twin", show_default=True, help="user name of OPC UA")
 @click.option("--password-file", type=click.Path(), help="its password  [default: a random one, printed]")
 @click.option("--pki", type=click.Path(), help="folder of server.der, server.pem (made where missing) and trusted/  "
               "[default: ~/.config/twin/opcua]")  # fmt: skip

@@ -40,7 +40,7 @@ def _options() -> type[Any]:
               help="standard deviation at sensors")  # fmt: skip
 @click.option("--noise-tcp", default="0 um", show_default=True, type=Quantity("m", zero=True),
               help="standard deviation of TCP rows")  # fmt: skip
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="of the noise")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="seed of the noise")
 @bundled(_options)
 def command(machine: str, run: str, output: str, options: SimulateOptions) -> None:
     """Step the full model of MACHINE through the loads of RUN; writes temperatures and TCP rows to OUTPUT."""

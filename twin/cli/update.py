@@ -37,9 +37,9 @@ def _options() -> type[Any]:
 @click.option("--slew", default="5 um", show_default=True, type=Quantity("m"),
               help="most by which the correction moves in a minute")  # fmt: skip
 @click.option("--tcp-noise", default="1 um", show_default=True, type=Quantity("m"),
-              help="of TCP measurements without a sigma")  # fmt: skip
+              help="standard deviation of TCP measurements without a sigma")  # fmt: skip
 @click.option("--sensor-noise", default="0.1 K", show_default=True, type=Quantity("delta_degC"),
-              help="of a temperature reading")  # fmt: skip
+              help="standard deviation of a temperature reading")  # fmt: skip
 @click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
 @click.option("-o", "--output", type=click.Path(), help="folder for update.h5, tcp.csv, summary.json, state")
 @click.option("--json", "as_json", is_flag=True, help="print the summary as JSON")
@@ -47,10 +47,10 @@ def _options() -> type[Any]:
 def command(
     artefact: str, run: str, earlier: tuple[str, ...], output: str | None, as_json: bool, options: UpdateOptions
 ) -> None:
-    """Replay RUN online with the model of ARTEFACT as beside the machine: what is measured corrects what follows.
+    """Replay RUN online with the model of ARTEFACT, as beside the machine: measurements correct what follows.
 
     Every row of the run's tcp.csv is predicted before it is used. The model itself stays as it is; the correction is
-    kept beside it, with the standard deviation of what it leaves.
+    kept beside it, with the standard deviation of what it leaves. The default method of `twin live` is gain.
     """
     import json
 

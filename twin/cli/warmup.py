@@ -11,7 +11,9 @@ from twin.cli.quantity import Quantity
 
 @click.command(epilog="Example: twin warmup out/experiment_a --tolerance '2 um'")
 @click.argument("result", type=click.Path())
-@click.option("--tolerance", default="1 um", show_default=True, type=Quantity("m"), help="of the TCP displacement")
+@click.option(
+    "--tolerance", default="1 um", show_default=True, type=Quantity("m"), help="tolerance of the TCP displacement"
+)
 @click.option("--temperature", default="0.1 K", show_default=True, type=Quantity("delta_degC"),
               help="tolerance of the sensors")  # fmt: skip
 @click.option("--horizon", default="1 h", show_default=True, type=Quantity("s"),

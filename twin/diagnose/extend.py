@@ -121,7 +121,7 @@ def _write_description(
     parameters: dict[tuple[str, str], str] = {}
     if result.description:
         (new / DESCRIPTION).write_text(with_files(result.description, machine, new), encoding="utf-8")
-        return parameters, [f"description with the members that it lacked: {target / DESCRIPTION}"]
+        return parameters, [f"description with the missing members: {target / DESCRIPTION}"]
     if not result.causes:
         told = [n for n in diagnosis.notes if n.startswith(("withdrawn", "not written"))] or ["no extension is written"]
         return parameters, told
@@ -145,7 +145,7 @@ def _write_description(
     if not parameters:
         return parameters, said
     (new / DESCRIPTION).write_text(with_files(text, machine, new), encoding="utf-8")
-    said.append(f"description with the effect: {target / DESCRIPTION}")
+    said.append(f"description with the cause: {target / DESCRIPTION}")
     for run, name in zip(runs, run_names(runs), strict=True) if signals else ():
         write_run(new / "runs" / name, replace(loads_with(run, signals, name), machine=None))
         said.append(f"loads with {', '.join(signals)}: {target / 'runs' / name}")

@@ -173,7 +173,7 @@ def diagnose(
     artefact: Artefact, machine: Machine, runs: Sequence[Run], sealed: Sequence[Run] = (),
     settings: Settings = Settings(), progress: Progress = silent,
 ) -> Result:  # fmt: skip
-    """The diagnosis of measured runs. Sealed runs are opened after everything else is decided.
+    """The diagnosis of measured runs. Sealed runs are opened last: they measure the gain, and may withdraw a cause.
 
     Raises LogError and TwinError for runs and descriptions that cannot be used.
     """
@@ -299,7 +299,7 @@ def _left_open(run: ProbedRun) -> Iterator[str]:
             f"{begins.temperature:.1f} degC, every part within {begins.apart:.2g} K (standard deviation)"
         )
     if lost := sum(end - first for first, end in run.unlogged):
-        yield f"{dt * lost / 3600.0:.2g} h without a row of its loads, in which any heat of the sources is allowed for"
+        yield f"{dt * lost / 3600.0:.2g} h without load data; the heat of the sources is left free there"
 
 
 def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unknown: Unknown | None) -> Scene | None:

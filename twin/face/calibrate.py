@@ -36,7 +36,7 @@ class CalibrateOptions:
     budget: Quantity = "10 min"  # stop after this time
     noise: Quantity = "0.1 K"  # standard deviation of one temperature sample
     tcp_noise: Quantity = "1 um"  # of a TCP deviation, where tcp.csv has no sigma
-    initial: Quantity = "0.3 K"  # how far parts may be from it in runs without a known start
+    initial: Quantity = "0.3 K"  # initial-temperature uncertainty where a run states none
     form: float = 0.03  # share by which the model's response to each source may be wrong
     exclude: Sequence[str] = ()  # sensors to leave out
     window: Quantity | None = None  # fit on sliding windows of this length, through one run
@@ -164,9 +164,9 @@ def calibrate(
 ) -> Calibration:
     """Fit the parameters of a model to the temperatures and TCP deviations measured in runs.
 
-    Temperatures are first judged by each other, over all runs: what they refute is not used, and told in `channels` of
-    the report; a leap that the model makes, too, is none. only, hold: parameters to fit and to leave as they are, each
-    a path or a pattern such as "sources.*".
+    Temperatures are first tested against each other, over all runs: what they refute is not used, and reported in
+    `channels` of the report; a leap that the model makes, too, is none. only, hold: parameters to fit and to
+    leave as they are, each a path or a pattern such as "sources.*".
     Bounded least squares with priors; an interrupt keeps the best values so far. on_iteration, on_window: told of each
     as it comes. Raises LogError for runs that hold nothing to compare, TwinError for parameters and sensors that there
     are not.

@@ -31,13 +31,13 @@ class DiagnoseOptions:
     """How a diagnosis is made."""
 
     noise: Quantity = "0.1 K"  # standard deviation of one temperature reading
-    tcp_noise: Quantity = "1 um"  # of a TCP deviation, where tcp.csv has no sigma
+    tcp_noise: Quantity = "1 um"  # standard deviation of a TCP row, where tcp.csv has no sigma
     exclude: Sequence[str] = ()  # sensors to leave out
-    nulls: int = 100  # synthetic runs without a cause that thresholds come from
+    nulls: int = 100  # fault-free simulations that thresholds come from
     catalogue: str | Path | None = None  # Python file with entries of your own (FAMILIES)
     seed: int = 1  # of the bootstrap
     plan: str | None = (
-        None  # a suspicion, "FAMILY PLACE", to plan the next experiment for; "": what the verdict leaves open
+        None  # a suspicion, "FAMILY PLACE", to plan the next experiment for; "": what the verdict does not separate
     )
 
     def families(self) -> tuple[Family, ...]:
@@ -65,7 +65,7 @@ class DiagnoseOptions:
 class Diagnosis:
     """A verdict, its causes with their evidence, and the gain on sealed runs."""
 
-    model: Model  # that was looked at
+    model: Model  # that was diagnosed
     runs: tuple[Run, ...] = field(repr=False)  # sealed ones last
     machine: Description = field(repr=False)
     result: Result = field(repr=False)
@@ -82,7 +82,7 @@ class Diagnosis:
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """What the description lacks or has wrong, and channels at fault."""
+        """What is missing or wrong in the description, and channels at fault."""
         return self.findings.causes
 
     def __str__(self) -> str:
@@ -118,7 +118,7 @@ class Diagnosis:
 
     def report(self, folder: str | Path, build: bool = True, progress: Progress | bool | None = None) -> Report:
         """Write index.html and report.json, and, where a cause belongs into the description, machine.toml with the
-        effect added and extended.h5 built from it. What a former diagnosis left in the folder is replaced.
+        cause added and extended.h5 built from it. Files of an earlier diagnosis in the folder are replaced.
 
         Raises TwinError where the folder holds what is read, or files of others.
         """
@@ -179,11 +179,11 @@ def diagnose(
     report: str | Path | None = None,
     progress: Progress | bool | None = None,
 ) -> Diagnosis:
-    """Say what a model gets wrong about measured runs, name the cause, and measure the gain.
+    """Find why a model differs from measured runs, name the cause, and measure the gain.
 
-    sealed: runs that are opened last, to measure the gain. machine: the description with its meshes, where it has moved
-    since the build. report: folder that `Diagnosis.report` will write to; whether it can is looked at before hours are
-    spent.
+    sealed: validation runs, never fitted to and opened last: they measure the gain, and may withdraw a cause. machine:
+    the description with its meshes, where it has moved since the build. report: folder that `Diagnosis.report` will
+    write to; it is checked before hours are spent.
     Raises LogError and TwinError for runs and descriptions that cannot be used.
 
     >>> import twin
@@ -206,7 +206,7 @@ def diagnose(
     every = [*looked_at, *listed(sealed)]
     places = {Path(r).resolve() if isinstance(r, str | Path) else id(r) for r in every}
     if len(places) < len(every):
-        raise TwinError("a run is given twice", "RUNS, --sealed", "a run that is looked at cannot judge the gain")
+        raise TwinError("a run is given twice", "RUNS, --sealed", "the gain cannot be measured on a diagnosed run")
     options = options or DiagnoseOptions()
     if report is not None:
         _refuse_folder(Path(report))

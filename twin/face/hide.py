@@ -36,7 +36,7 @@ def hide(
     options: HideOptions | None = None,
     runs: Sequence[str | Path] = (),
 ) -> Machine | Run:
-    """Hide an effect of `size` ("10 W") at `place` in a copy of a machine, or of a run folder, written to `output`.
+    """Inject a fault of `size` ("10 W") at `place` in a copy of a machine, or of a run folder, written to `output`.
 
     family: one of `twin diagnose` (docs/hiding.md). runs: run folders that get the switch of a hidden history.
     Returns the copy; of a machine it is a truth for `twin.simulate`.

@@ -30,8 +30,8 @@ class LiveOptions:
     limit: Quantity = "200 um"
     slew: Quantity = "0.2 um/s"  # ten times the fastest drift in experiment A of the five-axis machine
     period: Quantity = "1 s"  # between steps of the outputs
-    freeze: Quantity = "60 s"  # age of inputs from which on the correction stands still
-    neutral: Quantity = "600 s"  # from which on it goes to neutral
+    freeze: Quantity = "60 s"  # age of inputs at which the correction freezes
+    neutral: Quantity = "600 s"  # age at which it returns to zero offsets
     journal: int = 256  # MB
     channels: str | Path | None = None  # file with nodes of OPC UA and limits of values
     events: str | Path | None = None  # file or folder of measured TCP errors, which correct the model

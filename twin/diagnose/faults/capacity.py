@@ -34,9 +34,9 @@ def edit(cause: Cause, study: Study) -> Effect:
 
 
 FAMILY = Family(
-    14, "capacity", "Heat capacity missing",
+    14, "capacity", "Heat capacity wrong or missing",
     "An oil tank, a workpiece, a fixture takes part and is not described; or a body stores otherwise than declared.",
     "C_t x_t' = k (T_surface - x_t)", "an extra slow pole at one place", "2 kJ/K", "positive",
     "every surface; every declared capacity", "machine", Singly(FAULTS),
-    what="stored heat that the description lacks", times="times the declared", edit=edit,
+    what="wrong heat capacity", times="times the declared", edit=edit,
 )  # fmt: skip

@@ -23,7 +23,7 @@ FAMILY = Family(
     "The artefact does not follow its own full model on this input: a note, never a cause.",
     "none: more states, a shorter step", "the artefact differs from the full model; the full model fits",
     "the noise of one reading (rms)", "-", "the artefact's runtime against the larger model of the diagnosis",
-    "reading", Singly(FAULTS), what="a model too coarse",
+    "reading", Singly(FAULTS), what="model too coarse",
 )  # fmt: skip
 
 

@@ -131,5 +131,5 @@ FAMILY = Family(
     "A liquid of its own temperature wets a surface while a valve is open.",
     "g(t) h (-A_p x + M_p (T_medium - T_ref))", "sharp onset and end; pulls the surface to one temperature",
     "5 W/(m^2 K)", "positive", "every surface with a film; every window of hours", "machine", batches,
-    what="a medium that exchanges heat", said=said, edit=edit,
+    what="coolant or chips", said=said, edit=edit,
 )  # fmt: skip

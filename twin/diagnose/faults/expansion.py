@@ -52,5 +52,5 @@ FAMILY = Family(
     "A part grows more or less per kelvin than its material says: other alloy, other reference temperature.",
     "a C_part x", "displacements scale while temperatures fit", "5 %", "either",
     "every part, every material, every node", "machine", batches,
-    what="thermal expansion other than declared", times="times the declared", declared=True, edit=edit,
+    what="wrong expansion coefficient", times="times the declared", declared=True, edit=edit,
 )  # fmt: skip

@@ -71,5 +71,5 @@ FAMILY = Family(
     "residual goes with surface minus air, changes sign when the machine is colder than the air; time constants move",
     "1 W/(m^2 K) on a surface, 20 % of a film", "either",
     "every film, always and in whole runs; every surface with one, always", "machine", batches,
-    what="heat transfer other than declared", times="times the declared", declared=True,
+    what="wrong film coefficient", times="times the declared", declared=True,
 )  # fmt: skip

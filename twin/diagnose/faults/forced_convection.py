@@ -59,10 +59,10 @@ def edit(cause: Cause, study: Study) -> Effect:
 
 
 FAMILY = Family(
-    2, "forced_convection", "Convection by motion missing",
+    2, "forced_convection", "Forced convection missing",
     "A moving part, or one that a moving part blows on, is cooled only while it moves.",
     "a |v|^0.6 (-A_f x + M_f (T_air - T_ref))",
     "cools only while an axis or the spindle turns", "1 W/(m^2 K) at top speed", "positive",
     "every film and surface with every logged speed", "machine", batches,
-    what="cooling by air that motion drives", edit=edit,
+    what="missing forced convection", edit=edit,
 )  # fmt: skip

@@ -39,5 +39,5 @@ FAMILY = Family(
     "Something makes heat that the description does not have: electronics, hydraulics, a bearing, a lamp.",
     "b_place s(t)", "follows its own on and off, or a logged signal; independent of the air", "1 W", "positive",
     "every surface; always, every load signal, every window of hours", "machine", batches,
-    what="heat that the description lacks",
+    what="missing heat source",
 )  # fmt: skip

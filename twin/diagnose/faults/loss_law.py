@@ -103,5 +103,5 @@ FAMILY = Family(
     "15 % of a source, 30 % from an hour on, 0.3 %/K", "either",
     "every source: its gain, always, from every hour on, less with its hours; other exponents; its own temperature",
     "machine",
-    batches, what="a loss other than declared", times="times the declared", declared=True, edit=edit,
+    batches, what="wrong loss law or coefficient", times="times the declared", declared=True, edit=edit,
 )  # fmt: skip

@@ -16,9 +16,9 @@ FAULTS = (
 )  # fmt: skip
 
 FAMILY = Family(
-    17, "measurement", "The measurement itself",
+    17, "measurement", "TCP measurement at fault",
     "The probe drifts, the measuring frame is skewed, or measuring heats the machine.",
     "w + a t;  w + a position;  event input", "only in TCP rows; no sensor shares it", "1 um, 2 um/m", "either",
     "every TCP component: drift, every axis, growth within a measurement", "reading", Singly(FAULTS),
-    what="a TCP measurement at fault", kind_told=True,
+    what="TCP measurement at fault", kind_told=True,
 )  # fmt: skip

@@ -42,9 +42,9 @@ def told_of_edit(cause: Cause) -> list[str]:
 
 
 FAMILY = Family(
-    18, "misplaced_source", "A heat source is elsewhere",
+    18, "misplaced_source", "Heat source misplaced",
     "The heat of a described source enters at another face of its part.",
     "P_j(t) (b_other - b_described)", "surplus here, lack there, both with one drive's power", "20 % of the heat",
     "positive", "every surface source to every face of its part", "machine", Singly(FAULTS),
-    what="a source declared at the wrong surface", times="times what it emits", told_of_edit=told_of_edit,
+    what="misplaced heat source", times="times what it emits", told_of_edit=told_of_edit,
 )  # fmt: skip

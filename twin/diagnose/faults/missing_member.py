@@ -22,6 +22,6 @@ FAMILY = Family(
     "A probe holder, cover, column or foundation follows an air, a measured temperature or a heat, and moves the tool.",
     "w + sum_k a_k (tau_k-lag of a logged column)", "displacements that no heat in the machine explains",
     "3 in ln evidence", "either", "every logged temperature, speed and power, with lags of 1 min to 5.3 h", "machine",
-    Singly(FAULTS), what="a body that follows it, and that the description lacks,", kind_told=True, weighed=True,
+    Singly(FAULTS), what="missing member", kind_told=True, weighed=True,
     editable=written_elsewhere,
 )  # fmt: skip

@@ -29,9 +29,9 @@ def batches(context: Context) -> list[Batch]:
 
 
 FAMILY = Family(
-    19, "not_thermal", "Not thermal",
+    19, "not_thermal", "Non-thermal deviation",
     "A step at a tool change or a crash, or a displacement that follows a load at once.",
     "w + a 1(t > t0);  w + a |load|", "faster than the fastest pole of the machine", "2 um", "either",
     "every TCP component: a step from every measurement on, every current", "reading", batches,
-    what="a deviation that is not thermal", kind_told=True,
+    what="non-thermal deviation", kind_told=True,
 )  # fmt: skip

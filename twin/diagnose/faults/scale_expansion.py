@@ -28,9 +28,9 @@ def edit(cause: Cause, study: Study) -> Effect:
 
 
 FAMILY = Family(
-    11, "scale_expansion", "Encoder scale grows, and the description does not know",
-    "A scale or a screw as scale grows with its part: the error grows with the position.",
+    11, "scale_expansion", "Scale expansion undescribed",
+    "An encoder scale, or a screw as scale, expands with its part: the error grows with the position.",
     "-a (T_scale - T_ref) position", "TCP error linear in an axis position, with a part's temperature",
     "0.3 um/(m K)", "either", "every axis with every part", "machine", Singly(FAULTS),
-    what="growth of a scale that the description lacks", edit=edit,
+    what="undescribed scale expansion", edit=edit,
 )  # fmt: skip

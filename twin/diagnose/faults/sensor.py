@@ -60,10 +60,10 @@ def said(cause: Cause) -> list[str]:
 
 
 FAMILY = Family(
-    9, "sensor", "A temperature sensor is at fault",
+    9, "sensor", "Temperature sensor at fault",
     "Offset, drift, lag, contact to the part lost, stuck, or two sensors swapped. The machine model is left alone.",
     "y + a;  a t;  filter;  (1 - w) y + w T_air", "one channel only: neighbours and TCP agree with the model",
     "0.15 K, 0.1 K/day, 2 min, 5 %", "either",
     "every sensor, offsets also from every hour on, drifts in every run or one; every pair", "sensor",
-    batches, what="a temperature sensor at fault", channel=True, kind_told=True, said=said,
+    batches, what="temperature sensor at fault", channel=True, kind_told=True, said=said,
 )  # fmt: skip

@@ -52,11 +52,11 @@ def editable(cause: Cause) -> bool:
 
 
 FAMILY = Family(
-    10, "signal", "A load signal is declared wrongly",
-    "Peak logged as rms, line as phase current, 1/s as 1/min, or a clock that is off.",
+    10, "signal", "Load signal at fault",
+    "Declared otherwise than logged: peak logged as rms, line as phase current, 1/s as 1/min, or a clock that is off.",
     "u_k times an exact factor;  y(t - a)", "an exact factor in everything that reads the signal; a shift of all",
     "an exact factor; 0.5 min", "-",
     "currents by 2, sqrt 2, sqrt 3, powers by 2, sqrt 3, speeds by 2, 60; the clock of every run",
-    "signal", Singly(FAULTS), what="a logged signal at fault", channel=True, kind_told=True,
+    "signal", Singly(FAULTS), what="load signal at fault", channel=True, kind_told=True,
     editable=editable,
 )  # fmt: skip

@@ -29,9 +29,9 @@ SLIP = Slip(
 FAULTS = (SLIP, replace(SLIP, kind="probed", called="when measured"))
 
 FAMILY = Family(
-    13, "slip", "A support or anchor slips",
+    13, "slip", "Support or anchor slips",
     "Friction in a support holds the structure back until it slips: heating and cooling take different paths.",
     "play(w_thermal)", "displacement lags its own reversal by a fixed width; temperatures fit", "1 um", "positive",
     "every TCP component, of the machine and of the measuring device", "reading", Singly(FAULTS),
-    what="a fixing that slips",
+    what="slipping support or anchor",
 )  # fmt: skip

@@ -56,7 +56,7 @@ def batches(context: Context) -> list[Batch]:
 FAMILY = Family(
     7, "sun", "Sun or a hot neighbour on one side",
     "Radiation warms one side for some hours of the day; clouds make each day another.",
-    "a_day b_side w(t)", "a bell of hours on one side, another height every day", "2 W", "positive",
-    "every outer surface; bells of 4 to 10 h, an amplitude per run", "machine", batches,
+    "a_day b_side w(t)", "a half sine of hours on one side, another height every day", "2 W", "positive",
+    "every outer surface; half sines of 4 to 10 h, an amplitude per run", "machine", batches,
     what="heat from the sun",
 )  # fmt: skip

@@ -50,6 +50,12 @@ def family_of(name: str) -> Family | None:
     return next((f for f in FAMILIES if f.name == name), None)
 
 
+def what(name: str) -> str:
+    """What a family is in words: one name for it in sentences, tables and notes."""
+    entry = family_of(name)
+    return (entry and entry.what) or name.replace("_", " ")
+
+
 # Of kinds of declared parameters, see `twin.rom.parameter`
 _OF_PARAMETER = {
     "source": loss_law, "film": film_gain, "contact": joint, "joint": joint, "capacity": capacity,

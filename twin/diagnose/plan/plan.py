@@ -34,10 +34,10 @@ LEAST = 0.05  # of the information without learned modes that today's has with t
 SENSORS = 8  # places of another sensor that a plan lists for a suspicion: their gains differ little then
 ASSUMPTIONS = (
     "one more run, as long as the longest of these, with its instruments (noise, bins, TCP rows) and in the same air",
-    "the description as it is, and its discrepancy from the machine as large in the new run as in these",
-    "the thresholds of today: a run of other loads gets its own, and what heats a machine more may raise them",
+    "the description is unchanged, and its discrepancy from the machine is as large in the new run as in these",
+    "the thresholds are today's: a run of other loads has its own, and loads that heat a machine more may raise them",
     "another sensor reads the mean temperature of its surface or node, with the noise of the median sensor",
-    "what switches does so in the new run at the same hours as in these; the cause lasts",
+    "a switching cause acts in the new run at the same hours as in these, and persists",
 )
 
 

@@ -26,6 +26,6 @@ def heat_picture(unknown: Unknown) -> Picture | None:
     return Picture(
         f"Heat into {unknown.part} that nothing explains",
         "The line is the heat that would make the simulation agree, the band its 95 % interval; where the band leaves "
-        "zero, look what the machine did at that time.",
+        "zero, check what the machine did at that time.",
         fig,
     )

@@ -15,6 +15,7 @@ import matplotlib
 import numpy as np
 
 from twin.atomic import atomic_path, check_folder
+from twin.diagnose.faults.table import what
 from twin.diagnose.report import tables
 from twin.diagnose.report import text as words
 from twin.diagnose.report.heat import heat_picture
@@ -65,12 +66,12 @@ def sections(d: Diagnosis) -> list[Section]:
     quiet, told = d.verdict in ("nothing", "too_poor"), words.evidence_lines(d)
     return sorted(
         [
-            Section("evidence", "What it rests on", told, lambda: _evidence(d), not told),
+            Section("evidence", "Evidence", told, lambda: _evidence(d), not told),
             Section("unknown", "Heat that nothing explains", words.unknown_lines(d), lambda: _unknown(d), True),
             Section("plan", "The next experiment", [], lambda: plan_section(d.plan), True),
             Section("gain", "Gain on the sealed run", words.gain_lines(d),
                     lambda: tables.gain_table(d) or f"<p>{words.no_gain(d)}</p>", not d.gain),
-            Section("pulls", "Pulls", words.pull_lines(d), lambda: tables.pulls_table(d)),
+            Section("pulls", "Fitted values", words.pull_lines(d), lambda: tables.pulls_table(d)),
             Section("limits", "Detection limits", words.limit_lines(d) if quiet else [],
                     lambda: tables.limits_table(d), quiet),
             Section("residuals", "Residuals", words.whiteness_lines(d), lambda: _residuals(d)),
@@ -151,15 +152,15 @@ def _evidence(d: Diagnosis) -> str:
     ]  # fmt: skip
     parts = [tables.items(acts)]
     parts += [
-        f"<h3>{escape(f'Rivals of {words.what(c.family)} at {words.place_words(c.place)}')}</h3>"
+        f"<h3>{escape(f'Rivals of {what(c.family)} at {words.place_words(c.place)}')}</h3>"
         + tables.rivals_table(c.rivals, d)
         for c in d.causes if c.rivals
     ]  # fmt: skip
     remedies = words.remedies(d)
     if remedies[1:]:
-        parts.append("<h3>What else would tell them apart</h3>" + tables.items(remedies[1:]))
+        parts.append("<h3>Other ways to separate them</h3>" + tables.items(remedies[1:]))
     elif d.verdict == "ambiguous" and not remedies:
-        parts.append("<p>No single measurement is known that would tell them apart.</p>")
+        parts.append("<p>No single measurement is known that would separate them.</p>")
     return "\n".join(parts)
 
 

@@ -42,15 +42,15 @@ def place_picture(d: Diagnosis, scene: Scene) -> Picture:
         _dots(axes, d, scene, where)
     return Picture(
         f"Where: {place_words(scene.place)}",
-        f"Orange is the place{behind}; a dot is a sensor, the larger the more of the evidence it carries, with its "
-        "number in the table.",
+        f"Orange is the place{behind}; a dot is a sensor, the larger the larger its share of the statistic, with "
+        "its number in the table.",
         fig,
     )
 
 
 def channels_told(d: Diagnosis) -> str:
-    """The channels that carry most of the evidence, and their rms over all diagnosed runs without and with the causes;
-    empty where no channel's share is known."""
+    """The channels with the largest shares of the statistic, and their rms over all diagnosed runs without and with the
+    causes; empty where no channel's share is known."""
     rows = []
     for k, (name, share) in enumerate(d.support.shares[:CHANNELS] if d.support else ()):
         before, after = [np.zeros(0)], [np.zeros(0)]
@@ -62,7 +62,7 @@ def channels_told(d: Diagnosis) -> str:
                 after.append((s.tcp_extended if of_tcp else s.extended)[:, column])
         left = [quantity(float(rms(np.concatenate(v))), "m" if name in COMPONENTS else "K") for v in (before, after)]
         rows.append([str(k + 1), f"TCP {name}" if name in COMPONENTS else name, f"{100 * share:.0f} %", *left])
-    return table(["", "channel", "of the evidence", "left without causes", "with them"], rows, (0, 2, 3, 4))
+    return table(["", "channel", "share", "residual without causes", "with causes"], rows, (0, 2, 3, 4))
 
 
 def _dots(axes: Axes, d: Diagnosis, scene: Scene, where: dict[str, tuple[float, float]]) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from twin.diagnose.faults.table import what
 from twin.diagnose.report.tables import folded, items, table
-from twin.diagnose.report.text import place_words, sized, what
+from twin.diagnose.report.text import place_words, sized
 from twin.diagnose.result.numbers import number
 from twin.diagnose.result.plan import Apart, Foresight, Plan
 
@@ -37,9 +38,9 @@ def plan_section(plan: Plan | None) -> str:
         rows = _experiments(f)
         lead = f"{what(f.family)} at {place_words(f.place)}: {_today(f)}"
         best = f"; best: {rows[0][2]}, {rows[0][1]} ({rows[0][0]})" if rows and _worth(f) else ""
-        head = ["times smaller", "seen then", "experiment", "what to do"]
+        head = ["times smaller", "detection limit then", "experiment", "what to do"]
         parts.append(folded(lead + best, table(head, rows, (0, 1))))
-    return "\n".join([*parts, folded("What this takes for granted", items(plan.assumptions))])
+    return "\n".join([*parts, folded("Assumptions", items(plan.assumptions))])
 
 
 def _experiments(f: Foresight) -> list[list[str]]:
@@ -52,17 +53,17 @@ def _worth(f: Foresight) -> bool:
 
 
 def _today(f: Foresight) -> str:
-    text = f"today seen {_seen(f, f.today)}, with the longest run again {_seen(f, f.again)}"
+    text = f"detection limit {_seen(f, f.today)} today, {_seen(f, f.again)} with the longest run again"
     return text if _worth(f) else f"{text}; no experiment lowers that much"
 
 
 def _separation(apart: Apart) -> str:
     needed, today = number(apart.needed), number(apart.today)
-    return f"To separate {apart.first} from {apart.second}: {needed} is needed, these data give {today}"
+    return f"To separate {apart.first} from {apart.second}: {needed} is needed, these data have {today}"
 
 
 def _seen(f: Foresight, limit: float) -> str:
-    """From which size on, or that none within physics is seen."""
+    """The limit, or that it lies beyond all sizes within physics."""
     if f.largest is not None and limit > f.largest:
-        return f"not up to {sized(f.family, f.largest, f.unit)}"
-    return f"from {sized(f.family, limit, f.unit)}"
+        return f"above {sized(f.family, f.largest, f.unit)}"
+    return sized(f.family, limit, f.unit)

@@ -40,12 +40,12 @@ def moved_words(d: Diagnosis) -> str:
         words + (f", most of it by {' and by '.join(map(_value, most))}" if most else "") for words, most in told
     ]
     sure = any(abs(p.pull) > SURE * p.sigma for _, most in said for p in most)
-    head = "the description as delivered is not right:" if sure else "within the tolerances of the description"
+    head = "the description as delivered is wrong:" if sure else "within the tolerances of the description"
     return f"{head} calibration moved {'; and '.join(clauses)}"
 
 
 def left_words(d: Diagnosis) -> str:
-    """What is left, and where most, if it is no white noise; empty where it is."""
+    """The residual, and where it is largest, if it is not white; empty where it is."""
     after = np.array([w[2] for w in d.whiteness], dtype=float)
     if not np.isfinite(after).any() or np.nanmedian(after) < WHITE:
         return ""
@@ -59,12 +59,12 @@ def left_words(d: Diagnosis) -> str:
             left += [(v / of, quantity(v, unit), name) for v, name in zip(sizes, names, strict=False)]
     weight, size, name = max(left)
     most = (
-        f", the most {name}, {size} (rms): twin calibrate takes all laws as described, and may leave less; what it "
-        "moves far from its prior is worth a look then"
+        f", the largest at {name}, {size} (rms): twin calibrate takes all laws as described and may leave less; then "
+        "check what it moves far from its prior"
     ) if weight >= 1.0 else ""  # fmt: skip
     return (
-        f"what is left is no noise (correlated by {np.nanmedian(after):.2f} from bin to bin), but no more than "
-        f"simulated machines without an effect leave{most}"
+        f"residuals are not white (lag-1 correlation {np.nanmedian(after):.2f}), but no larger than "
+        f"those of simulated fault-free machines{most}"
     )
 
 

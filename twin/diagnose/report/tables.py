@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from twin.diagnose.report.text import history_words, place_words, sized, what
+from twin.diagnose.faults.table import what
+from twin.diagnose.report.text import history_words, place_words, sized
 from twin.diagnose.result.diagnosis import Diagnosis, Rival
 from twin.diagnose.result.numbers import interval_and_unit, number, quantity, size_words
 
@@ -46,19 +47,19 @@ def channels_table(d: Diagnosis) -> str:
     for r in order:
         rms = "-" if r["rms"] is None else f"{r['rms']:.3f} K" if r["unit"] == "K" else f"{1e6 * r['rms']:.2f} um"
         rows.append([r["channel"], r["run"], rms, f"{100 * r['kept']:.0f} %", str(r["leaps"]), r["wrong"]])
-    head = ["channel", "run", "rms that is left", "kept", "leaps", "what is wrong"]
+    head = ["channel", "run", "rms residual", "kept", "leaps", "what is wrong"]
     return table(head, rows, (2, 3, 4))
 
 
 def rivals_table(rivals: Sequence[Rival], d: Diagnosis) -> str:
-    """Candidates or rivals, each beside what its family needs."""
+    """Candidates or rivals, each with the threshold of its family."""
     rows = []
     for k, r in enumerate(rivals):
         row = [str(k + 1), what(r.family), place_words(r.place), history_words(r.history) or "always"]
         row += [size_words(r.amplitude, r.ci95, r.unit) or "-", number(r.statistic)]
         row += [number(d.thresholds.get(r.family, math.nan))]
         rows.append([*row, f"{r.cosine:.2f}" if math.isfinite(r.cosine) else "-"])
-    head = ["", "what", "where", "when", "size", "statistic", "needed", "cosine"]
+    head = ["", "what", "where", "when", "size", "statistic", "threshold", "cosine"]
     return table(head, rows, range(4, len(head)))
 
 
@@ -70,7 +71,7 @@ def limits_table(d: Diagnosis) -> str:
             for v in (x.size, x.smallest, x.largest)
         ]
         rows.append([what(x.family), *sizes, place_words(x.place)])
-    head = ["what", "seen from (median of places)", "at the best place", "at the worst place", "place of the median"]
+    head = ["what", "limit (median location)", "at the best place", "at the worst place", "place of the median"]
     return table(head, rows, (1, 2, 3))
 
 
@@ -80,7 +81,7 @@ def gain_table(d: Diagnosis) -> str:
     for g in d.gain:
         low, high = g.ci95
         _, a, b, unit = interval_and_unit(low, low, high, g.unit)
-        interval, sure = f"{a} to {b} {unit}", "no difference beyond chance"
+        interval, sure = f"{a} to {b} {unit}", "not significant"
         if not math.isfinite(low + high):
             interval, sure = "-", ""
         elif low > 0 or high < 0:
@@ -105,7 +106,7 @@ def pulls_table(d: Diagnosis) -> str:
 
 
 def families_table(d: Diagnosis) -> str:
-    """Per family its statistic in these data, its threshold, and what simulated data without an effect gave; what comes
+    """Per family its statistic in these data, its threshold, and the largest of fault-free data; what comes
     nearest to its threshold, or is farthest above it, first."""
     known = dict.fromkeys([*d.observed, *d.thresholds, *d.nulls])
     rows = []
@@ -115,5 +116,5 @@ def families_table(d: Diagnosis) -> str:
         row = [number(d.observed[family]) if family in d.observed else "-", number(threshold)]
         row += [number(max(nulls)), f"{sum(v > threshold for v in nulls)} of {len(nulls)}"] if nulls else ["-", "-"]
         rows.append([what(family), *row])
-    head = ["family", "these data", "needed", "largest without an effect", "of them above what is needed"]
+    head = ["family", "these data", "threshold", "largest of fault-free data", "of these above the threshold"]
     return table(head, rows, (1, 2, 3, 4))

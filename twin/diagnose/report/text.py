@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from twin.diagnose.faults.channels_check import REFUTED
-from twin.diagnose.faults.table import family_of
+from twin.diagnose.faults.table import family_of, what
 from twin.diagnose.report.recalibration import SURE, left_words, moved_words
 from twin.diagnose.result.diagnosis import Cause, Diagnosis, Limit, Pull, Rival
 from twin.diagnose.result.numbers import interval_and_unit, number, quantity, rms, size_words
@@ -21,27 +21,22 @@ from twin.diagnose.result.spot import Spot
 LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
 MEASURED = (("K", "temperature"), ("m", "TCP direction"))  # units of channels, and what these are
 _SEEN = {  # before anything is fitted, by the history of a sensor at fault
-    "stuck": "Its reading stood still for {hours} h",
+    "stuck": "Its reading was constant for {hours} h",
     "leap": "Its reading leapt by {size} K at {at} h, faster than heat can",
     "noise": "Its reading is noise of {size} K from {at} h on",
     "rail": "Its reading rests at {size} °C from {at} h on",
 }
 # What follows from a verdict, for who acts on it
 _FOLLOWS = {
-    "named": "The extended model whose gain is shown below holds this.",
-    "ambiguous": "The data allow more than one edit of the description; what to measure next is said below.",
-    "unknown": "Where the heat enters is known, its law is not; look below at when it comes.",
-    "out_of_tolerance": "The structure of the model holds; the declared values do not, or an effect hides in them.",
-    "sensor": "The model of the machine is left as it is.",
-    "signal": "The model of the machine is left as it is.",
-    "too_poor": "No cause is named: with such a model many would fit. Add what would help first, and diagnose again.",
-    "nothing": "The model of the machine is left as it is. An effect below the following sizes could still be there.",
+    "named": "The extended model includes it; its gain is shown below.",
+    "ambiguous": "The data allow more than one edit of the description; what to measure next is stated below.",
+    "unknown": "Its location is known, its law is not; see its time history below.",
+    "out_of_tolerance": "The model structure is adequate; declared values are wrong, or they absorb a fault.",
+    "sensor": "The model of the machine is unchanged.",
+    "signal": "The model of the machine is unchanged.",
+    "too_poor": "No cause is named: with such a model many would fit. Extend it first (see the first note).",
+    "nothing": "The model of the machine is unchanged. Faults below the following detection limits may be present.",
 }
-
-
-def what(family: str) -> str:
-    entry = family_of(family)
-    return (entry and entry.what) or family.replace("_", " ")
 
 
 def place_words(place: str) -> str:
@@ -74,20 +69,21 @@ def setting_words(cause: Cause) -> str:
     if entry := family_of(cause.family):
         said += entry.said(cause)
     if (reference := settings.get("reference")) and cause.signal:
-        said.append(f"where {cause.signal} is {quantity(float(reference), str(settings.get('reference_unit', '')))}")
+        said.append(f"at {cause.signal} = {quantity(float(reference), str(settings.get('reference_unit', '')))}")
     if height := settings.get("height"):
         said.append(f"about {number(float(height))} m")
     return ", ".join(said)
 
 
 def cause_words(cause: Cause | Rival) -> str:
-    """As "heat that the description lacks at bed.x_motor: 85 W (95 % interval 80 to 90 W), following x_current²"."""
+    """As "missing heat source at bed.x_motor: 85 W (95 % interval 80 to 90 W), following x_current²"."""
     where = place_words(cause.place)
     entry = family_of(cause.family)
     if entry and entry.channel and where:
         head = f"{where} is at fault"
     else:
         link = "between" if Spot.read(cause.place).between else "in" if where.startswith("run ") else "at"
+        link = "that follows" if entry and entry.weighed else link  # a missing member has a driver
         head = what(cause.family) + (f" {link} {where}" if where else "")
     size = size_words(cause.amplitude, cause.ci95, cause.unit)
     if size and (whose := times(cause.family, cause.unit)):
@@ -126,7 +122,7 @@ def pull_words(pull: Pull, ci95: tuple[float, float] = (math.nan, math.nan)) -> 
     """`ci95`: 95 % interval of its value, where it is known."""
     return (
         f"{pull.path} is {size_words(pull.value, ci95, pull.unit)} instead of "
-        f"{quantity(pull.nominal, pull.unit)} ({pull.pull:+.1f} standard deviations of what was declared)"
+        f"{quantity(pull.nominal, pull.unit)} ({pull.pull:+.1f} prior standard deviations)"
     )
 
 
@@ -143,9 +139,9 @@ def verdict_sentence(d: Diagnosis) -> str:
     causes = joined([cause_words(c) for c in d.causes])
     if d.verdict == "nothing":
         limits = _seen(d)
-        seen = f"; {limit_words(limits[0])}, would have been seen at half of all places" if limits else ""
+        seen = f"; detection limit (median location): {limit_words(limits[0])}" if limits else ""
         moved, left = moved_words(d), left_words(d)
-        fits = "" if moved or left else ": within their noise the description explains them"
+        fits = "" if moved or left else ": the description explains them within their noise"
         if moved:
             head = f"{_sentence(moved)} With that, nothing else is missing that these data could show{seen}."
         else:
@@ -156,7 +152,7 @@ def verdict_sentence(d: Diagnosis) -> str:
     if d.verdict == "unknown":
         return _sentence(_unknown_words(d) + (f"; named besides: {causes}" if causes else ""))
     if d.verdict == "out_of_tolerance":
-        return _sentence(f"Declared values cannot hold: {_strained_words(d)}")
+        return _sentence(f"Wrong declared values: {_strained_words(d)}")
     if d.verdict == "ambiguous":
         return _sentence(_ambiguous_words(d))
     if not causes:
@@ -185,7 +181,7 @@ def alike(cause: Cause) -> list[str]:
 
 def _alike_words(cause: Cause) -> str:
     others = alike(cause)
-    return f" (these data do not tell {cause.place} from {' and '.join(others)})" if others else ""
+    return f" (data cannot separate {cause.place} from {' and '.join(others)})" if others else ""
 
 
 def follows(d: Diagnosis) -> str:
@@ -213,7 +209,7 @@ def _strained_words(d: Diagnosis) -> str:
 
 def _unknown_words(d: Diagnosis) -> str:
     if d.unknown is None:
-        return "the residuals hold an effect that nothing in the catalogue explains"
+        return "nothing in the catalogue explains the residuals"
     part, surface = d.unknown.part, d.unknown.surface
     besides = f", and more at {' and '.join(d.unknown.besides)}" if d.unknown.besides else ""
     text = f"heat enters part {part}, mostly at {surface}{besides}, and nothing in the catalogue explains it"
@@ -233,11 +229,11 @@ def _ambiguous_words(d: Diagnosis) -> str:
     first = next((c for c in d.causes if c.rivals), d.causes[0] if d.causes else None)
     these: list[Cause | Rival] = [first, *first.rivals] if first else list(d.ranked[:2])
     if not these:
-        return "something is missing, and these data do not tell what"
+        return "something is missing, and these data cannot identify it"
     ways = "; or ".join(cause_words(c) for c in these[:3])
     more = f"; or {len(these) - 3} more" if len(these) > 3 else ""
     besides = joined([cause_words(c) for c in d.causes if c is not first])
-    told = f"something is missing, and these data do not tell what: either {ways}{more}"
+    told = f"something is missing; these data fit either {ways}{more}"
     return told + (f"; besides: {besides}" if besides else "")
 
 
@@ -255,16 +251,16 @@ def chance(nulls: np.ndarray | None, threshold: float) -> str:
     if not n or not math.isfinite(threshold):
         return ""
     # none of n: with 95 % confidence the rate is below 3 / n
-    rare = "" if above else f", which makes it rarer than once in {max(1, round(n / 3))} with 95 % confidence"
+    rare = "" if above else f", so at most 1 in {max(1, round(n / 3))} would (95 % confidence)"
     return (
-        f"Of {n} simulated data sets of a machine without this effect, {above or 'none'} gave more than "
+        f"{above or 'None'} of {n} simulated fault-free data sets exceeded "
         f"{number(threshold)}{rare}; the largest gave {number(float(values.max()))}."
     )
 
 
 def evidence_sentence(d: Diagnosis, family: str, statistic: float, threshold: float) -> str:
     """The statistic of one finding against its threshold, in plain words."""
-    text = f"These data give a statistic of {number(statistic)}; {number(threshold)} is needed."
+    text = f"The statistic is {number(statistic)}, its threshold {number(threshold)}."
     return f"{text} {chance(d.nulls.get(family), threshold)}".strip()
 
 
@@ -274,21 +270,21 @@ def cause_evidence(d: Diagnosis, c: Cause) -> str:
         longest = max((w.end - w.start for w in c.windows), default=math.nan)
         at = min((w.start for w in c.windows), default=math.nan)
         figures = {"hours": number(longest / 3600.0), "size": number(c.amplitude), "at": number(at / 3600.0)}
-        return f"{_SEEN[c.history].format(**figures)}; no statistic is needed to see that."
+        return f"{_SEEN[c.history].format(**figures)}; this needs no statistic."
     entry = family_of(c.family)
     if entry and entry.weighed:
         gain, strong = number(c.statistic / 2.0), number(c.threshold / 2.0)
         return f"With it, and those before it, the logarithm of the evidence is {gain} larger; {strong} is strong."
     if c.history.endswith(REFUTED):
-        return f"All other channels refute it: a statistic of {number(c.statistic)}; {number(c.threshold)} is needed."
+        return f"All other channels refute it: statistic {number(c.statistic)}, threshold {number(c.threshold)}."
     if c.threshold == d.thresholds.get(c.family, c.threshold):
         asked = not (entry and entry.last(c))
         return evidence_sentence(d, c.family if asked else "", c.statistic, c.threshold)
     # a declared number: both are squares, of its distance from the declared one
     far, needed = (number(math.sqrt(max(v, 0.0))) for v in (c.statistic, c.threshold))
     if c.history == "always":  # freed of its tolerance
-        return f"It lies {far} standard deviations of its fit from what was declared; {needed} are needed."
-    return f"Calibration moves it {far} times as far as all but 3 % of simulated data sets without an effect do."
+        return f"It lies {far} standard deviations of its fit from the declared value; the threshold is {needed}."
+    return f"Calibration shifts it by {far} times the 97 % quantile of simulated fault-free data sets."
 
 
 def when(cause: Cause) -> str:
@@ -305,11 +301,11 @@ def support_words(support: Support) -> str:
     """How many channels carry the first cause, and which."""
     strongest = [f"{name} {100 * share:.0f} %" for name, share in support.shares[:3] if share >= LEAST_SHARE]
     n = number(support.participation, 1)
-    return f"{n} channels carry this (participation ratio): {', '.join(strongest)} of the evidence."
+    return f"Effective channels (participation ratio): {n}. Largest: {', '.join(strongest)}."
 
 
 def evidence_lines(d: Diagnosis) -> list[str]:
-    """What the verdict rests on, what follows from it, and what would tell rivals apart."""
+    """The evidence of the verdict, what follows from it, and what would separate rivals."""
     several = len(d.causes) > 1
     lines = [(f"{c.place}: " if several else "") + cause_evidence(d, c) for c in d.causes]
     lines += [support_words(d.support)] if d.support else []
@@ -318,7 +314,7 @@ def evidence_lines(d: Diagnosis) -> list[str]:
     if d.verdict in ("sensor", "signal"):
         lines.append(follows(d))
     if d.verdict in ("ambiguous", "named") and remedies(d):
-        lines.append(f"To tell rivals apart: {remedies(d)[0]}")
+        lines.append(f"To separate rivals: {remedies(d)[0]}")
     return lines
 
 
@@ -331,7 +327,7 @@ def unknown_lines(d: Diagnosis) -> list[str]:
 
 def pull_lines(d: Diagnosis) -> list[str]:
     far = [] if d.verdict == "out_of_tolerance" else beyond(d.pulls, 2.0)
-    return [f"Worth a look: {joined([pull_words(p) for p in far[:2]])}."] if far else []
+    return [f"Check: {joined([pull_words(p) for p in far[:2]])}."] if far else []
 
 
 def _seen(d: Diagnosis) -> list[Limit]:
@@ -341,7 +337,7 @@ def _seen(d: Diagnosis) -> list[Limit]:
 
 def limit_lines(d: Diagnosis) -> list[str]:
     shown = joined([limit_words(x) for x in _seen(d)[:5]])
-    return [f"At half of all places these data would have shown, in 95 of 100 cases: {shown}."] if shown else []
+    return [f"Detection limits (median location, probability 95 %): {shown}."] if shown else []
 
 
 def whiteness_lines(d: Diagnosis) -> list[str]:
@@ -349,7 +345,7 @@ def whiteness_lines(d: Diagnosis) -> list[str]:
     if not np.isfinite(before).any() or not np.isfinite(after).any():
         return []
     return [
-        f"What is left is correlated by {np.nanmedian(after):.2f} from bin to bin (median of channels; "
+        f"Lag-1 autocorrelation of residuals: {np.nanmedian(after):.2f} (median over channels; "
         f"{np.nanmedian(before):.2f} before)."
     ]
 
@@ -371,7 +367,7 @@ def gain_lines(d: Diagnosis) -> list[str]:
         lost = [g.channel for g in these if g.ci95_delivered[1] < 0.0]
         result.append(
             f"{head}: {counted} {which}: {a} as delivered, {b} recalibrated, {c} {extended} (root mean square, "
-            f"noise included); better beyond chance in {better}, worse in {worse}"
+            f"noise included); significantly better in {better}, worse in {worse}"
             + (f"; worse than as delivered: {', '.join(lost)}." if lost else ".")
         )
     return result
@@ -380,5 +376,5 @@ def gain_lines(d: Diagnosis) -> list[str]:
 def no_gain(d: Diagnosis) -> str:
     """Why there is none."""
     sealed = any(s.sealed for s in d.series)
-    why = "nothing was measured in the run kept aside" if sealed else "no run was kept aside"
+    why = "nothing was measured in the sealed run" if sealed else "no run was sealed"
     return f"There is no gain to report: {why}."

@@ -30,13 +30,13 @@ class Rival:
     unit: str
     statistic: float  # log-likelihood ratio, twice: as that of the cause it rivals
     cosine: float  # with that cause, after everything that can be calibrated is projected out
-    remedy: str = ""  # the sensor or the experiment that would tell them apart; "" where the data do
+    remedy: str = ""  # the sensor or the experiment that would separate them; "" where the data do
     ci95: tuple[float, float] = (math.nan, math.nan)  # of the amplitude, from the statistic alone
 
 
 @dataclass(frozen=True)
 class Cause:
-    """One thing that the description lacks or has wrong, or one channel that is at fault."""
+    """One thing missing or wrong in the description, or one channel at fault."""
 
     family: str  # name in the catalogue: "heat_source"
     place: str  # "bed.x_motor", "films.bed", "contacts.x_guide", "sensors.x_nut", "signals.x_current", "runs.NAME"
@@ -71,7 +71,7 @@ class Pull:
 
 @dataclass(frozen=True)
 class Limit:
-    """The smallest size of a cause that would have been named in these data."""
+    """The smallest size of a cause that passes its threshold in these data with a probability of 95 %."""
 
     family: str
     place: str  # the place with the median limit of the family

@@ -32,7 +32,7 @@ class Of(Enum):
         """As "film" of a film; none of what is told by its name alone."""
         if self in (Of.SURFACE, Of.AXIS, Of.TCP):
             return ""
-        return "surroundings" if self is Of.ENVIRONMENT else self.value.removesuffix("s")
+        return "environment" if self is Of.ENVIRONMENT else self.value.removesuffix("s")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.evidence.pulls import Loose
-from twin.diagnose.faults.table import family_of_parameter, fault_of
+from twin.diagnose.faults.table import family_of_parameter, fault_of, what
 from twin.diagnose.result.diagnosis import Cause, Rival
 from twin.diagnose.search.accepted import parameter_of, readings_columns
 from twin.diagnose.search.contest import bent
@@ -59,8 +59,8 @@ def not_named(found: Search, causes: Sequence[Cause]) -> str:
     not be named; "" where there is nothing."""
     told = {c.place for c in causes} | {r.place for c in causes for r in c.rivals}
     more = [h for h in _unnamed(found) if h.name not in told] if any(c.history == CALIBRATED for c in causes) else []
-    names = ", ".join(dict.fromkeys(f"{h.family.replace('_', ' ')} at {h.name} ({h.when.name})" for h in more))
-    return f"not named beside it, as its score passes its threshold and its refit does not: {names}" if names else ""
+    names = ", ".join(dict.fromkeys(f"{what(h.family)} at {h.name} ({h.when.name})" for h in more))
+    return f"not named in addition, as its score passes its threshold but its refit does not: {names}" if names else ""
 
 
 def _unnamed(found: Search) -> list[Hypothesis]:

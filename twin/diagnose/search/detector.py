@@ -201,7 +201,7 @@ def make_detector(
         return Fitter(study, surrogate, whiten, np.hstack([whiten(bare), *discretised, known, *modes]))
 
     fitter = fitter_of(whiten)
-    with progress("measurements without a cause: form", counts[0]) as advance:
+    with progress("fault-free simulations: discrepancy", counts[0]) as advance:
         shared = (fitter, J_of, instruments, form, other)
         left = np.stack(each(_null_residual, shared, list(range(counts[0])), lambda _: advance("")), axis=1)
     whiten = Whitener(study, _channels(study, left, floors))
@@ -215,7 +215,7 @@ def make_detector(
     columns = Columns.of(
         _whitened(whiten, raw), batches, heat_of(study, elements.histories.blocks, elements.heat_blocks), fitter.others
     )
-    with progress("measurements without a cause: thresholds", counts[1]) as advance:
+    with progress("fault-free simulations: thresholds", counts[1]) as advance:
         seeds = list(range(10_000, 10_000 + counts[1]))
         shared = (fitter, J_of, instruments, form, other)
         seen = each(_of_null, (shared, columns), seeds, lambda _: advance(""))

@@ -92,9 +92,9 @@ def _note(members: Found, refused: str) -> str:
         for a, before, after in zip(members.axes, s.alone, s.held_out, strict=True)
     )
     others = [j.name for j in s.joined if not j.sure]
-    more = f"; {', '.join(others)} help to predict and are not named" if others else ""
+    more = f"; {', '.join(others)} improve the prediction and are not named" if others else ""
     where = f"; not in the description: {refused}" if refused else ""
-    return f"missing members: left of stretches that they were not fitted to, rms: {figures}{more}{where}"
+    return f"missing members: rms residual on data not used in their fit: {figures}{more}{where}"
 
 
 def _left(found: Search, k: int, m: Measured, extended: bool = True) -> np.ndarray:

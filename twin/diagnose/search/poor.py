@@ -23,14 +23,14 @@ def poor_note(
 ) -> str:
     """In words, with the sensors that fit worst and what would help there; sigma [K] of one reading."""
     policy = found.detector.policy
-    variance = f"{dispersion.share:.2g} times the variance that noise and model discrepancy have"
+    variance = f"{dispersion.share:.2g} times the variance of noise and model discrepancy"
     if dispersion.share > policy.dispersed:
         told = (
-            f"the model is too poor: even the best explanation leaves {variance}, and a cause must explain "
-            f"{policy.excess:.0%} of what is left beside slow errors of single channels"
+            f"the model is too poor: the residual of the best explanation has {variance}, and a cause must explain "
+            f"{policy.excess:.0%} of what slow errors of single channels do not"
         )
     else:
-        told = f"even the best explanation leaves {variance}: a cause must explain {policy.excess:.0%} of the excess"
+        told = f"the best explanation still has {variance}: a cause must explain {policy.excess:.0%} of the excess"
     sensors = plans[0].sensors
     if not sensors or any(m.sensors != sensors for m in plans[: len(runs)]):
         return told

@@ -21,7 +21,7 @@ import numpy as np
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.evidence.settled import settled_alone
 from twin.diagnose.faults.fault import Family
-from twin.diagnose.faults.table import fault_of
+from twin.diagnose.faults.table import fault_of, what
 from twin.diagnose.result.diagnosis import Cause, Gain, Verdict
 from twin.diagnose.result.numbers import quantity, rms
 from twin.diagnose.search.accepted import Accepted, freed, settled
@@ -55,8 +55,8 @@ def judged(
     """The headline of a search in y (m,), held against the measurements of the sealed runs, the last of its study."""
     kept = tuple(c for c in causes if c.history != CALIBRATED or _stays(found, y, c, opened, seed))
     if len(kept) < len(causes):
-        gone = " and ".join(f"{c.family.replace('_', ' ')} at {c.place}" for c in causes if c not in kept)
-        note = f"withdrawn: {gone}. Without its tolerance calibration predicts the sealed run no better"
+        gone = " and ".join(f"{what(c.family)} at {c.place}" for c in causes if c not in kept)
+        note = f"withdrawn: {gone}. Calibration without its tolerance predicts the sealed run no better"
         left = verdict if any(c.history == CALIBRATED for c in kept) else "sensor" if kept else "nothing"
         return Judged(left, kept, (), gains(_channels(found, opened), seed, found.detector.policy), note)
     found = _beside_declared(found, y)
@@ -71,28 +71,26 @@ def judged(
     by_fit = _told_by_fit(found)
     if not extension or worth >= (1 if by_fit and opened else 0):
         return Judged(verdict, tuple(causes), extension, table, confirmed=bool(extension) and worth > 0)
-    names = " and ".join(dict.fromkeys(f"{c.family.replace('_', ' ')} at {c.place}" for c in extension))
+    names = " and ".join(dict.fromkeys(f"{what(c.family)} at {c.place}" for c in extension))
     for accepted in other_sizes(found, y):
         x, _ = settled(found.detector, y, accepted)
         if _worth(_channels(replace(found, accepted=accepted, x=x), opened), seed, policy) > 0:
             lead = next(a for a in accepted if a.hypothesis.family == extension[0].family)
             told = f"{fault_of(lead.hypothesis).curve.told(float(lead.amplitude[0])):.3g} {lead.hypothesis.batch.unit}"
-            note = f"not written: {names}, since the sealed run speaks for another size, such as {told}"
+            note = f"not written: {names}, since another size predicts the sealed run better, such as {told}"
             return Judged(verdict, tuple(causes), (), table, size=note)
     if by_fit:
         rest = tuple(c for c in causes if c not in extension)
-        note = (
-            f"withdrawn: {names}. Only the fit behind the scores is sure of it, and predicts the sealed run no better"
-        )
+        note = f"withdrawn: {names}. Only the detection fit supports it, and it predicts the sealed run no better"
         return Judged("sensor" if rest else "nothing", rest, (), table, note)
     worst = max((c for c in channels if c.moved), key=lambda c: float(rms(c.errors[2]) - rms(c.errors[1])) / c.noise)
     after, before = (quantity(float(rms(worst.errors[k])), worst.unit) for k in (2, 1))
     note = (
-        f"withdrawn: {names}. It explains the runs that were looked at, and predicts the sealed run worse beyond "
-        f"chance; most {worst.name}, of which it leaves {after} (rms), and a calibration without it {before}"
+        f"withdrawn: {names}. It fits the diagnosed runs but predicts the sealed run significantly "
+        f"worse, most of all {worst.name}: residual {after} (rms) with it, {before} recalibrated"
     )
-    if rivals := list(dict.fromkeys(f"{r.family.replace('_', ' ')} at {r.place}" for c in extension for r in c.rivals)):
-        note += f". Not asked of the sealed run, and nearly as likely in the others: {', '.join(rivals)}"
+    if rivals := list(dict.fromkeys(f"{what(r.family)} at {r.place}" for c in extension for r in c.rivals)):
+        note += f". Not tested on the sealed run, and nearly as likely in the others: {', '.join(rivals)}"
     rest = tuple(c for c in causes if c not in extension)
     left = "unknown" if _evident(found) else "sensor" if rest else "nothing"
     return Judged(left, rest, (), table, note, refuted=True)

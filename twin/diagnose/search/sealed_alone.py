@@ -25,8 +25,8 @@ def sealed_alone(series: Sequence[Series], policy: SearchPolicy) -> list[str]:
         most, name, unit, left = max(times, default=(0.0, "", "", 0.0))
         if most > policy.elsewhere:
             notes.append(
-                f"{s.run}: something is at work that the other runs do not have: {name} is left {quantity(left, unit)} "
-                f"(rms) here, and {quantity(known[name], unit)} there; diagnose it as one of the runs"
+                f"{s.run}: effect absent from the other runs: residual of {name} {quantity(left, unit)} "
+                f"(rms) here, at most {quantity(known[name], unit)} there; diagnose it as one of the runs"
             )
     return notes
 

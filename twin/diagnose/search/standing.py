@@ -10,6 +10,7 @@ import numpy as np
 from twin.calibrate.fit.measured import Measured
 from twin.diagnose.faults.acted import ended, units_of
 from twin.diagnose.faults.fault import Family
+from twin.diagnose.faults.table import what
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.search.accepted import Accepted, settled
 from twin.diagnose.search.forward import naming, stands
@@ -17,7 +18,7 @@ from twin.diagnose.search.look import Search
 from twin.diagnose.search.sealed import Judged, judged
 from twin.diagnose.search.verdict import verdict_of, with_faults
 
-REFUTED_LATER = "With it the sealed run is less likely, beyond chance"
+REFUTED_LATER = "With it the sealed run is significantly less likely"
 
 
 def standing(
@@ -41,8 +42,8 @@ def standing(
 
     whole = held_against(found)
     if whole.refuted and (over := _ended(found)) is not found and not (told := held_against(over)).refuted:
-        names = " and ".join(f"{c.family.replace('_', ' ')} at {c.place}" for c in told.causes if c.windows)
-        return over, replace(told, less=f"told until the end of the runs that were looked at: {names}. {REFUTED_LATER}")
+        names = " and ".join(f"{what(c.family)} at {c.place}" for c in told.causes if c.windows)
+        return over, replace(told, less=f"named until the end of the diagnosed runs: {names}. {REFUTED_LATER}")
     for run, again in () if whole.confirmed else _recurring(found, opened):
         told = held_against(again, found)
         if told.confirmed or (told.extension and (whole.refuted or whole.size)):
@@ -56,8 +57,8 @@ def standing(
         told = held_against(now)
     if told.refuted or not gone or told.verdict == "unknown":
         return found, whole
-    names = " and ".join(f"{a.hypothesis.family.replace('_', ' ')} at {a.hypothesis.name}" for a in gone)
-    less = f"withdrawn: {names}, with which the other causes predict the sealed run worse beyond chance"
+    names = " and ".join(f"{what(a.hypothesis.family)} at {a.hypothesis.name}" for a in gone)
+    less = f"withdrawn: {names}, with which the other causes predict the sealed run significantly worse"
     return now, replace(told, less=less)
 
 

@@ -20,7 +20,7 @@ SIZES = ((1.0, "nominal"), (0.5, "half"), (2.0, "twice"))
 
 
 class Limit(Protocol):
-    """The smallest size of a family that would have been named, as a diagnosis states it."""
+    """The detection limit of a family, as a diagnosis states it."""
 
     @property
     def family(self) -> str: ...
