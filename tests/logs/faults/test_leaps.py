@@ -36,6 +36,16 @@ def test_heat_however_fast_is_no_leap(time_constant, size):
     assert leaps_of(heated(time_constant) + noise(size)) == []
 
 
+def test_a_light_bearing_whose_spindle_stood_for_six_rows_does_not_leap():
+    """It begins to warm at its last reading; the median of the three before is a fifth of its first step above that."""
+    values = 38.2 + noise(0.05)
+    stood = [38.49, 36.30, 35.22, 34.60, 34.21, 33.92, 33.60]
+    warms = [34.87, 35.46, 35.78, 35.78, 36.06, 35.96, 35.97]
+    values[200:214] = [*stood, *warms]
+    values[214:] -= 2.15
+    assert leaps_of(values) == []
+
+
 @pytest.mark.parametrize("size", [3.0, -12.0])
 @pytest.mark.parametrize("rounded", [3, 1])
 def test_a_leap_on_the_way_up_has_its_row_and_size(size, rounded):
