@@ -23,7 +23,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.rom.parameter import Parameter
 
 # kinds whose number may be named out of its tolerance
-NAMED = ("source", "film", "joint", "contact", "capacity", "expansion")
+NAMED = ("source", "film", "joint", "contact", "capacity", "expansion", "environment")
 # prior standard deviations: no limit is lower; three times a spread of a quarter of a tolerance (before any result)
 LEAST = 0.75
 TAIL = 0.03  # of synthetic measurements that may have a parameter farther off: as of all other causes together

@@ -59,7 +59,7 @@ def what(name: str) -> str:
 # Of kinds of declared parameters, see `twin.rom.parameter`
 _OF_PARAMETER = {
     "source": loss_law, "film": film_gain, "contact": joint, "joint": joint, "capacity": capacity,
-    "expansion": expansion,
+    "expansion": expansion, "environment": zone,
 }  # fmt: skip
 
 

@@ -84,7 +84,7 @@ def searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
     first search, of channels as they leap: where that is no chance, causes must explain more (`raised`). What one path
     of heat explains better is that (`paths`)."""
     found, own = _searched(detector, y)
-    return otherwise(found, y), own
+    return otherwise(found, y, own.least(detector.policy) > 0.0), own
 
 
 def _searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:

@@ -4,9 +4,9 @@ conductance follows a speed.
 They do what other causes do, nearly: an oil line from a warm motor to a bed is heat there with the motor's power, or
 the motor's heat elsewhere; a joint that conducts more while a spindle turns is a loss that falls with its own
 temperature; and at a part that shows what two causes do, a sensor is at fault. There are as many as pairs of places,
-and would raise the threshold of everything. So where a search has found anything, or heat of any history, one path must
-explain clearly more than all of that together, and takes its place; where it explains as much it is its rival. A
-machine in which nothing was found is not asked.
+and would raise the threshold of everything. So where a search has found anything, heat of any history, or a number out
+of its tolerance, or leaves more than noise does, one path must explain clearly more than all of that together, and
+takes its place; where it explains as much it is its rival. Another machine is not asked.
 """
 
 from __future__ import annotations
@@ -31,10 +31,11 @@ from twin.diagnose.search.look import Search, with_cosines
 from twin.diagnose.search.refit import refit
 
 
-def otherwise(found: Search, y: np.ndarray) -> Search:
+def otherwise(found: Search, y: np.ndarray, more: bool = False) -> Search:
     """A search in y (m,), or what it is where one path of heat explains more than all that it has found, or than all
-    but faults of readings; with that path among the rivals where it explains as much."""
-    if not found.accepted and not _heat(found):
+    but faults of readings; with that path among the rivals where it explains as much. more: whether it leaves more than
+    noise and model discrepancy do, though it has found nothing."""
+    if not (found.accepted or found.loose or more or _heat(found)):
         return found
     study, first = found.detector.study, found.detector.columns.raw.shape[1]
     nominal = [nominal_run(study, k) for k in study.fitted]
@@ -105,7 +106,7 @@ def _instead(
         return []
     if min(more) > margin:
         return [_Told(now, True, misfit(detector, start) - misfit(detector, now.fitted) - price)]
-    if heat or max(more) + freedom <= -margin:
+    if heat or not replaced or max(more) + freedom <= -margin:
         return []
     lead = next((a for a in replaced if not fault_of(a.hypothesis).read), replaced[0])
     best = replace(best, statistic=max(best.statistic, gained + price))
