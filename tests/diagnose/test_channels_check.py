@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from tests.logs.faults.test_usable import changed, made
 from twin.calibrate.channels.finding import Finding
 from twin.calibrate.channels.judge import Judgement, judge
-from twin.diagnose.faults.channels_check import channels_at_fault, warm_place_note
+from twin.diagnose.faults.channels_check import channels_at_fault, judged_channels, warm_place_note
 from twin.diagnose.result.diagnosis import Cause
 from twin.logs.run import Run, Table
 
@@ -148,3 +149,20 @@ def test_a_place_that_is_always_warmer_is_no_fault_where_the_model_does_not_know
     assert told.findings == known
     (warm,) = told.warm
     assert warm_place_note(warm).startswith("oil is off by 5.8 K (95 % interval 4.7 to 6.8 K)")
+
+
+def test_an_offset_of_a_sensor_in_all_runs_is_left_to_the_search(monkeypatch):
+    """The others refute it as well where an undescribed source warms its place at all times. Of air, which drives the
+    model, and of one run alone, they are believed."""
+
+    def offset(channel: str, *runs: int) -> Finding:
+        return Finding("offset", (channel,), runs, 0.0, HOUR, 5.75, (4.7, 6.8), 116.0, 25.0)
+
+    always, once, air, oil = offset("bed", 0, 1), offset("bed", 1), offset("room", 0, 1), offset("oil", 0, 1)
+    runs = 2 * [Run(Table(TIME, {}, {}), Table(TIME, temperatures(), dict.fromkeys(NAMES, "degC")))]
+    every = Judgement((always, once, air, oil), (), ())
+    monkeypatch.setattr(sys.modules[judge.__module__], "judged", lambda *_: every)
+    model = SimpleNamespace(sensors=("bed",), ambient_sensors=(("room", 0),))
+    told = judged_channels(runs, model)
+    assert told.findings == (once, air)
+    assert told.warm == (oil,)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,13 +12,16 @@ import pytest
 from tests.diagnose import small_case
 from tests.diagnose.test_lumped import MACHINE, loads, twin
 from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.extend import write_extension
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.missing_joint import pairs
-from twin.diagnose.faults.paths import paths_of
+from twin.diagnose.faults.paths import Paths, paths_of
 from twin.diagnose.faults.table import family_of
 from twin.diagnose.model.bank import nominal_run, respond
 from twin.diagnose.pipeline import Result, Settings, diagnose
+from twin.diagnose.search.forward import search
+from twin.diagnose.search.paths import otherwise
 from twin.errors import DescriptionError
 from twin.logs.read import read_run
 from twin.logs.write import write_run
@@ -91,6 +95,21 @@ def test_a_joint_that_conducts_with_a_speed_is_named_with_it(artefact: Path, tmp
     edit = entry.edit(cause, result.search.detector.study)
     with pytest.raises(DescriptionError, match="no switch"):  # it is named, and not written
         extended_description(read_artefact(artefact).description, [edit])
+
+
+def test_paths_are_asked_where_anything_is_out_of_order_and_only_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    study, detector = small_case.study(), small_case.made_detector()
+    y = np.concatenate([study.outputs(k, np.zeros(len(study.scale))) for k in study.fitted])
+    sound = search(detector, y)
+    asked: list[int] = []
+    monkeypatch.setattr(sys.modules[otherwise.__module__], "paths_of", lambda *of: asked.append(1) or Paths((), (), ()))
+    monkeypatch.setattr(sys.modules[otherwise.__module__], "_with", lambda detector, *_: (detector, []))
+    assert otherwise(sound, y) is sound
+    assert not asked
+    assert otherwise(sound, y, more=True) is sound
+    loose = replace(sound, loose=(Loose(0, 3.0, 0.1, 2.0),))
+    assert otherwise(loose, y) is loose
+    assert len(asked) == 2
 
 
 def test_only_parts_that_no_contact_joins_may_be_joined() -> None:

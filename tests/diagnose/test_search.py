@@ -83,6 +83,19 @@ def test_a_sensor_that_is_off_is_a_sensor_that_is_off():
     assert causes[0].amplitude == pytest.approx(18.0, rel=0.1)  # K/day
 
 
+def test_a_sensor_that_drifts_in_one_run_alone_is_no_heat():
+    """Heat of any history at a part without a sensor beside it does the same."""
+    study, y = small_case.study(), measured(seed=2)
+    last = study.runs[study.fitted[-1]]
+    (b, s), _ = last.shapes
+    own = y[study.rows[-1]][: b * s].reshape(b, s)
+    own[:, 1] += last.measured.bin_time * 3.0 / 14400.0  # 3 K in four hours
+    verdict, (cause,) = verdict_of(searched(small_case.made_detector(), y)[0], FAMILIES)
+    assert (verdict, cause.family, cause.place) == ("sensor", "sensor", "sensors.housing")
+    assert cause.history == f"drift in {last.run.name}"
+    assert cause.amplitude == pytest.approx(18.0, rel=0.1)  # K/day
+
+
 def test_swapped_sensors_are_put_back_and_leave_nothing():
     """Two channels tens of kelvins apart would bend every parameter: with the channels back, nothing else is found."""
     study, y = small_case.study(), measured(seed=4)
