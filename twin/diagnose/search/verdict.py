@@ -88,7 +88,9 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         # two histories of one place, and two factors of one signal, are written otherwise into the description
         two = fault_of(lead).corrects or (lead.when.signal and other.when.name != lead.when.name)
         same = alike and not two
-        passes = as_good(other, lead, policy) and other.statistic >= thresholds[other.family]
+        # heat where a source may be is one of many like it, and would not be named alone: beside that source it is
+        least = 0.0 if fault_of(lead).elsewhere and Spot.read(lead.name).partner == other.name else 1.0
+        passes = as_good(other, lead, policy) and other.statistic >= least * thresholds[other.family]
         if not same and (unproved or passes):
             return "ambiguous", causes
     # a sensor at fault does not keep what is beside it out of the description
