@@ -131,6 +131,23 @@ def test_of_equal_misfits_the_data_have_decided_nothing(statistic, less, wanted)
     assert bool(cause.rivals[0].remedy) == (wanted == "ambiguous")
 
 
+@pytest.mark.parametrize(("at", "wanted"), [("bed", "ambiguous"), ("nut", "named")])
+def test_heat_where_a_source_is_said_to_be_is_its_rival_below_its_own_threshold(at, wanted):
+    """One of many places, so that its threshold is higher; beside that source it is the one place."""
+    detector = small_case.made_detector()
+    moved = next(b for b in detector.columns.batches if b.kind == "moved")
+    heat = next(b for b in detector.columns.batches if b.kind == "heat")
+    there = next(i for i, p in enumerate(moved.places) if p.endswith(">bed"))
+    lead = Hypothesis(moved, there, moved.histories[0], 40.0, (0.3,))
+    other = Hypothesis(heat, heat.places.index(at), heat.histories[0], 42.0, (30.0,))
+    one = Accepted(lead, (), np.full(1, 0.3), np.eye(1), 40.0, 36.0, ((other, 0.9),))
+    thresholds = detector.thresholds | {"heat_source": 50.0, "misplaced_source": 36.0}
+    found = SimpleNamespace(
+        detector=replace(detector, thresholds=thresholds), accepted=(one,), steps=[SimpleNamespace(parts={})]
+    )
+    assert verdict_of(found, FAMILIES)[0] == wanted
+
+
 def test_limits_of_factors_are_factors():
     detector = small_case.made_detector()
     gain = next(b for b in detector.columns.batches if b.kind == "gain")

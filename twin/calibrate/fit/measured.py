@@ -147,7 +147,10 @@ def _temperatures(
     centre, mean_of, temperature, count = _bins(edges, time[inside], values[inside], bin_length)
     lost = int((~np.isfinite(temperature) & (count > 0)).sum())
     if lost:
-        skipped.append(f"{lost} of {temperature.size} bin means with too few samples, or samples to one side")
+        skipped.append(
+            f"{lost} of {temperature.size} means of temperatures over a bin are not used: too few samples in it, or "
+            "all to one side"
+        )
     return centre, mean_of, temperature, count
 
 

@@ -336,7 +336,13 @@ def _seen(d: Diagnosis) -> list[Limit]:
 
 
 def limit_lines(d: Diagnosis) -> list[str]:
-    shown = joined([limit_words(x) for x in _seen(d)[:5]])
+    of_family = dict[str, list[Limit]]()
+    for x in _seen(d)[:5]:  # of a film as a factor, and in W/(m^2 K) of a surface
+        of_family.setdefault(x.family, []).append(x)
+    shown = joined([
+        " or ".join([limit_words(first), *(sized(x.family, x.size, x.unit) for x in others)])
+        for first, *others in of_family.values()
+    ])  # fmt: skip
     return [f"Detection limits (median location, probability 95 %): {shown}."] if shown else []
 
 
@@ -354,19 +360,21 @@ def gain_lines(d: Diagnosis) -> list[str]:
     """What the extended model brings on each sealed run: the channels that the causes move, then the others."""
     result, runs = [], list(dict.fromkeys(g.run for g in d.gain))
     extended = "with what was withdrawn" if any(n.startswith("withdrawn: ") for n in d.notes) else "extended"
-    groups = product(runs, ((True, "that the causes move"), (False, "that they do not move")), MEASURED)
+    others = " that they do not move" if any(g.affected for g in d.gain) else ""
+    groups = product(runs, ((True, " that the causes move"), (False, others)), MEASURED)
     for run, (affected, which), (unit, name) in groups:
-        these = [g for g in d.gain if g.run == run and g.affected == affected and g.unit == unit]
+        known = (g for g in d.gain if np.isfinite([g.delivered, g.recalibrated, g.extended]).all())
+        these = [g for g in known if g.run == run and g.affected == affected and g.unit == unit]
         if not these:
             continue
         rows = np.array([[g.delivered, g.recalibrated, g.extended] for g in these], dtype=float)
-        a, b, c = (quantity(v, unit) for v in rms(rows[np.isfinite(rows).all(axis=1)]).tolist())
+        a, b, c = (quantity(v, unit) for v in rms(rows).tolist())
         head = f"Sealed run {run}" if len(runs) > 1 else "Sealed run"
         counted = f"{len(these)} {name}{'s' if len(these) > 1 else ''}"
         better, worse = sum(g.ci95[0] > 0 for g in these), sum(g.ci95[1] < 0 for g in these)
         lost = [g.channel for g in these if g.ci95_delivered[1] < 0.0]
         result.append(
-            f"{head}: {counted} {which}: {a} as delivered, {b} recalibrated, {c} {extended} (root mean square, "
+            f"{head}: {counted}{which}: {a} as delivered, {b} recalibrated, {c} {extended} (root mean square, "
             f"noise included); significantly better in {better}, worse in {worse}"
             + (f"; worse than as delivered: {', '.join(lost)}." if lost else ".")
         )
