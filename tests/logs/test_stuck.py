@@ -33,6 +33,16 @@ def test_frozen_loads_with_their_lines(folder, column, first, says):
     assert high >= first + 100
 
 
+def test_a_power_that_is_nought_for_hours_while_its_spindle_turns_is_told_where_it_never_is_elsewhere():
+    loads = loaded(RAM)[0].loads
+    power, turns = loads.columns["spindle_power"].copy(), loads.columns["spindle_speed"] != 0.0
+    power[200:320] = 0.0
+    says = "'spindle_power' is 0 W to the last digit while 'spindle_speed' goes on"
+    assert [p.what for p in new_findings(RAM, spindle_power=power) if "to the last digit" in p.what] == [says]
+    power[np.flatnonzero(turns)[::10]] = 0.0  # a drive that coasts
+    assert not [p for p in new_findings(RAM, spindle_power=power) if "to the last digit" in p.what]
+
+
 def temperatures(n: int = 600) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(4)
     time = np.arange(n) * 10.0

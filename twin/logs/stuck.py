@@ -13,6 +13,7 @@ from twin.logs.found import held, span, warning
 from twin.logs.run import Table
 
 _ROWS = 20  # a shorter standstill is not looked at
+_IDLE = 0.02  # of what turns: a drive that is nought more often may coast, or its log ends there
 _EXPECTED = 25.0  # changes that its neighbours made one expect, for a standstill to be told
 
 
@@ -145,12 +146,19 @@ def _frozen_drive(loads: Table, speed: str, drive: str, where: str) -> Problem |
     moves = np.diff(values) != 0.0
     first, last = longest_rest(~(turns & ~moves))
     rows = last - first
-    if rows < _ROWS or values[first] == 0.0:
-        return None
     elsewhere = np.count_nonzero(turns) - rows
+    if rows < _ROWS or (values[first] == 0.0 and _at_nought(values, turns, first, last) > _IDLE * elsewhere):
+        return None
     share = np.count_nonzero(turns & moves) / elsewhere if elsewhere >= _ROWS else 0.0
     # a channel that changes from row to row with this probability does not rest so long by chance
     if share < 0.5 or rows * -np.log1p(-min(share, 0.99)) < _EXPECTED:
         return None
     what = f"'{drive}' is {values[first]:g} {loads.units[drive]} to the last digit while '{speed}' goes on"
     return warning(what, span(where, first, last), "a frozen channel? leave its cells empty if so")
+
+
+def _at_nought(values: np.ndarray, turns: np.ndarray, first: int, last: int) -> int:
+    """Rows outside of first .. last in which a drive turns and its channel is nought."""
+    nought = turns & (values[:-1] == 0.0)
+    nought[first : last + 1] = False
+    return int(np.count_nonzero(nought))
