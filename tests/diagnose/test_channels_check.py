@@ -148,7 +148,8 @@ def test_a_place_that_is_always_warmer_is_no_fault_where_the_model_does_not_know
     told = judge(runs, sensors={"bed"})
     assert told.findings == known
     (warm,) = told.warm
-    assert warm_place_note(warm).startswith("oil is off by 5.8 K (95 % interval 4.7 to 6.8 K)")
+    assert warm_place_note(warm, ()).startswith("oil is off by 5.8 K (95 % interval 4.7 to 6.8 K)")
+    assert warm_place_note(warm, ()).endswith("the model has no sensor there")
 
 
 def test_an_offset_of_a_sensor_in_all_runs_is_left_to_the_search(monkeypatch):
@@ -165,4 +166,7 @@ def test_an_offset_of_a_sensor_in_all_runs_is_left_to_the_search(monkeypatch):
     model = SimpleNamespace(sensors=("bed",), ambient_sensors=(("room", 0),))
     told = judged_channels(runs, model)
     assert told.findings == (once, air)
-    assert told.warm == (oil,)
+    assert told.warm == (always, oil)
+    assert warm_place_note(always, model.sensors).endswith("no cause explains it")
+    nothing_read = Run(Table(TIME, {}, {}))  # a run of the tool alone is none of those with temperatures
+    assert judged_channels([*runs, nothing_read], model).findings == (once, air)

@@ -14,7 +14,7 @@ from twin.diagnose.evidence.fitter import Fitted
 from twin.diagnose.evidence.pulls import Loose, Pulls, Spread, as_rare, deviate
 from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.catalogue import FAMILIES
-from twin.diagnose.search.by_calibration import not_named, strained_of
+from twin.diagnose.search.by_calibration import _told, not_named, strained_of
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.loose import beside_free
@@ -40,6 +40,17 @@ def test_a_number_is_out_where_few_synthetic_measurements_move_one_so_far():
     assert strain[air] > 1.0
     assert pulls.strain(far, 0.0 * far)[named] > 1.0  # by either calibration
     assert pulls.strain(0.0 * far, far)[named] > 1.0
+
+
+def test_an_offset_of_air_is_told_in_kelvins_whatever_was_declared():
+    detector = small_case.made_detector()
+    known = list(detector.study.probed.parameters)
+    j = next(i for i, p in enumerate(known) if p.kind == "environment")
+    known[j] = replace(known[j], nominal=0.8, sigma=0.05)
+    study = replace(detector.study, probed=replace(detector.study.probed, parameters=tuple(known)))
+    size, (low, high), unit = _told(replace(detector, study=study), Loose(j, -4.0, 0.5, 2.0))
+    assert unit == "K"
+    assert (low, size, high) == pytest.approx((0.551, 0.6, 0.649))
 
 
 def test_the_limit_of_losses_does_not_follow_the_discrepancy_of_films():

@@ -27,6 +27,7 @@ from twin.diagnose.report.text import (
     chance,
     evidence_sentence,
     gain_lines,
+    limit_lines,
     pull_of,
     verdict_sentence,
     when,
@@ -549,3 +550,13 @@ def test_nothing_says_first_what_calibration_had_to_change():
     assert text.startswith("Within the tolerances of the description calibration moved")
     left = tuple((name, before, 0.5) for name, before, _ in d.whiteness)
     assert "lag-1 correlation 0.50" in verdict_sentence(replace(quiet, whiteness=left))
+
+
+def test_limits_of_one_family_stand_together():
+    limits = [
+        Limit("film_gain", "films.bed", 3.3, 2.0, 9.0, "1"), Limit("film_gain", "bed", 7.0, 2.0, 9.0, "W/(m^2*K)"),
+        Limit("heat_source", "bed", 26.0, 20.0, 30.0, "W"),
+    ]  # fmt: skip
+    said = "wrong film coefficient, 3.30 times the declared or 7.00 W/(m\u00b2\u00b7K); and missing heat source, 26 W"
+    line = f"Detection limits (median location, probability 95 %): {said}."
+    assert limit_lines(replace(diagnosis("nothing"), detection_limits=tuple(limits))) == [line]

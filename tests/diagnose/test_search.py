@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.fault import Unit
-from twin.diagnose.faults.readings import play
+from twin.diagnose.faults.readings import _drifts, play
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import curved_change, exchanged, motion
 from twin.diagnose.search.detector import Detector
@@ -94,6 +95,24 @@ def test_a_sensor_that_drifts_in_one_run_alone_is_no_heat():
     assert (verdict, cause.family, cause.place) == ("sensor", "sensor", "sensors.housing")
     assert cause.history == f"drift in {last.run.name}"
     assert cause.amplitude == pytest.approx(18.0, rel=0.1)  # K/day
+
+
+def test_drifts_of_one_run_are_of_those_that_read_the_sensor():
+    """One of three runs has the tool alone, one another sensor."""
+
+    def plan(run: str, *sensors: str) -> SimpleNamespace:
+        return SimpleNamespace(run=SimpleNamespace(name=run), measured=SimpleNamespace(sensors=sensors))
+
+    day = np.array([0.0, 86400.0])
+    plans = [plan("tool", "a"), plan("monday", "a", "b"), plan("tuesday", "b"), plan("friday", "a", "b")]
+    times = [day[:0], day, day, day]
+    made = {name: [v.tolist() for v in values] for name, values in _drifts("a", plans, times)}
+    assert made == {
+        "drift in monday": [[], [0.0, 1.0], [0.0, 0.0], [0.0, 0.0]],
+        "drift in monday that stays": [[], [0.0, 1.0], [1.0, 1.0], [1.0, 1.0]],
+        "drift in friday": [[], [0.0, 0.0], [0.0, 0.0], [0.0, 1.0]],
+    }
+    assert _drifts("a", plans[:2], times[:2]) == []  # of one run alone a drift is one in every run
 
 
 def test_swapped_sensors_are_put_back_and_leave_nothing():

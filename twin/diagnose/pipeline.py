@@ -208,11 +208,13 @@ def diagnose(
     verdict, beside = verdict_of(found, settings.families)  # of what was seen before any search nothing is counted
     shown = beside_sensors(found, y, settings.families) if verdict == "unknown" else found
     groups = {f.name: f.group for f in settings.families}
-    notes = [*(f"{m.name}: {text}" for m in plans for text in m.skipped), *map(warm_place_note, judgement.warm)]
+    notes = [f"{m.name}: {text}" for m in plans for text in m.skipped]
     notes += [f"{planned.run.name}: {text}" for planned in study.runs for text in _left_open(planned.run)]
     if coarse := too_coarse(artefact.model, study, settings.temperature_sigma, settings.tcp_sigma):
         notes.append(coarse.note)
     verdict, causes, extension = opened.verdict, opened.causes, opened.extension
+    warm = [f for f in judgement.warm if not causes or f.channels[0] not in sensors]  # of sensors a search has told
+    notes += [warm_place_note(f, sensors) for f in warm]
     notes += [
         f"recalibrate with twin calibrate: {c.parameter}" for c in causes if c.history == CALIBRATED and not c.rivals
     ]

@@ -45,7 +45,8 @@ def judge(
     the others explains what these refute. Nothing is changed.
     """
     found = judged([emptied(run) for run in runs], within, explained)
-    return found if sensors is None else _without_warm_places(found, sensors, len(runs))
+    measured = sum(run.temperatures is not None for run in runs)
+    return found if sensors is None else _without_warm_places(found, sensors, measured)
 
 
 def judged(

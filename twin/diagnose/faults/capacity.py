@@ -38,5 +38,5 @@ FAMILY = Family(
     "An oil tank, a workpiece, a fixture takes part and is not described; or a body stores otherwise than declared.",
     "C_t x_t' = k (T_surface - x_t)", "an extra slow pole at one place", "2 kJ/K", "positive",
     "every surface; every declared capacity", "machine", Singly(FAULTS),
-    what="wrong heat capacity", times="times the declared", edit=edit,
+    what="wrong or missing heat capacity", times="times the declared", edit=edit,
 )  # fmt: skip

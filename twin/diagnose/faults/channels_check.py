@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -40,17 +39,16 @@ def channels_at_fault(
 def judged_channels(runs: Sequence[Run], model: MachineModel, within: Collection[str] | None = None) -> Judgement:
     """What is wrong with the channels of runs, but for offsets of the machine's sensors in all of them: where a source
     warms one place at all times the others refute its sensor, too, and only a search compares the two."""
-    air = {name for name, _ in model.ambient_sensors}
-    found = judge(runs, within, air)
-    return replace(found, warm=tuple(f for f in found.warm if f.channels[0] not in model.sensors))
+    return judge(runs, within, {name for name, _ in model.ambient_sensors})
 
 
-def warm_place_note(f: Finding) -> str:
-    """Of an offset in all runs of a channel that the model has no sensor for."""
+def warm_place_note(f: Finding, sensors: Collection[str]) -> str:
+    """Of an offset in all runs of a channel that no cause explains; sensors: of the model."""
     off = size_words(f.size, f.interval, UNITS[f.what])
+    more = "no cause explains it" if f.channels[0] in sensors else "the model has no sensor there"
     return (
         f"{f.channels[0]} is off by {off} from what all other channels say, in all runs: "
-        "a place that is always warmer or colder looks the same, and the model has no sensor there"
+        f"a place that is always warmer or colder looks the same, and {more}"
     )
 
 

@@ -23,5 +23,5 @@ FAMILY = Family(
     15, "initial_state", "Initial temperature wrong",
     "The machine, or a part, was warmer or colder than the run says: yesterday's heat.",
     "T(0)", "decays with the model's own time constants from the first minute on", "0.2 K", "either",
-    "the machine and every part, in every run", "reading", Singly(FAULTS), what="wrong initial temperature",
+    "the machine and every part, in every run", "reading", Singly(FAULTS), what="initial temperature off",
 )  # fmt: skip

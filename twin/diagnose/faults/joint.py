@@ -46,7 +46,7 @@ FAMILY = Family(
     "A joint or guide conducts otherwise than described, perhaps since an event: preload lost, oil film gone; or the "
     "more the faster something turns.",
     "-kappa g(t) d d^T x", "residuals of opposite sign on both sides", "30 % of a conductance", "either",
-    "every contact; always, and from every hour on; where anything was found, with every speed", "machine",
+    "every contact; always, and from every hour on; once anything is out of order, with every speed", "machine",
     batches,
     what="wrong joint conductance", times="times the declared", declared=True,
     last=with_a_speed,

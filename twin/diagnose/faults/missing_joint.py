@@ -83,7 +83,7 @@ FAMILY = Family(
     21, "missing_joint", "Joint missing",
     "Two parts exchange heat that no contact of the description joins: an oil line, a cable, chips, faces that touch.",
     "-kappa d d^T x", "residuals of opposite sign on both, in proportion to their difference", "0.5 W/K", "positive",
-    "every surface or node with every one of another part that no contact joins to it, where anything was found; "
+    "every surface or node with every one of another part that no contact joins to it, once anything is out of order; "
     "always", "machine",
     after_others, what="missing joint", last=always_last,
 )  # fmt: skip

@@ -121,7 +121,7 @@ def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarra
     for name in names:
         add(("offset", name, "always"), column([(name, [np.ones(len(t)) for t in time])]))
         add(("drift", name, "always"), column([(name, [t / DAY for t in time])]))
-        for history, values in _drifts(plans, time):
+        for history, values in _drifts(name, plans, time):
             add(("drift", name, history), column([(name, values)]))
         add(("lag", name, "always"), column([(name, [-_rate(T, t) for T, t in zip(read[name], time, strict=True)])]))
         add(("detached", name, "always"), column([(name, [a - T for a, T in zip(air, read[name], strict=True)])]))
@@ -136,13 +136,16 @@ def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarra
             add(("swapped", f"{first}<>{second}", "always"), column([(first, change), (second, [-c for c in change])]))
 
 
-def _drifts(plans: Sequence[Planned], time: Sequence[np.ndarray]) -> list[tuple[str, list[np.ndarray]]]:
-    """Drifts of 1 K/day in one of several runs, over at its end, or with what has come together in all that follow."""
+def _drifts(name: str, plans: Sequence[Planned], time: Sequence[np.ndarray]) -> list[tuple[str, list[np.ndarray]]]:
+    """Drifts of a sensor by 1 K/day in one of several runs that read it, over at its end, or with what has come
+    together in all that follow."""
     found = list[tuple[str, list[np.ndarray]]]()
-    for r, plan in enumerate(plans if plans[1:] else ()):
+    reading = [r for r, plan in enumerate(plans) if name in plan.measured.sensors and len(time[r])]
+    for r in reading if reading[1:] else ():
+        plan = plans[r]
         within = [t / DAY if k == r else np.zeros(len(t)) for k, t in enumerate(time)]
         found.append((f"drift in {plan.run.name}", within))
-        if plans[r + 1 :]:
+        if r < reading[-1]:
             stays = [own + within[r][-1] * (k > r) for k, own in enumerate(within)]
             found.append((f"drift in {plan.run.name} that stays", stays))
     return found

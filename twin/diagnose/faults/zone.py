@@ -56,5 +56,5 @@ FAMILY = Family(
     "The air differs from where it is measured: warmer above, warmer in a zone, a door, a draught.",
     "a h_f M_f z, or g(t) h_f M_f dT", "goes with height, or with a door's hours; many sensors of one zone alike",
     "0.3 K (0.5 K at one film), 0.3 K/m", "either", "every environment, film and gradient; always and every window",
-    "machine", batches, what="wrong environment temperature",
+    "machine", batches, what="environment temperature off",
 )  # fmt: skip

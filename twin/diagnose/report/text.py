@@ -45,7 +45,10 @@ def place_words(place: str) -> str:
 
 
 def history_words(history: str) -> str:
-    return "" if history in ("", "always") else history.replace("^2", "²").replace("^3", "³")
+    """A power of a signal as such; other histories hold names of runs."""
+    if history in ("", "always"):
+        return ""
+    return history if " " in history else history.replace("^2", "²").replace("^3", "³")
 
 
 def times(family: str, unit: str) -> str:

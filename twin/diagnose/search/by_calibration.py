@@ -11,6 +11,7 @@ from twin.diagnose.evidence.fitter import bounds
 from twin.diagnose.evidence.pulls import Loose
 from twin.diagnose.faults.table import family_of_parameter, fault_of, what
 from twin.diagnose.result.diagnosis import Cause, Rival
+from twin.diagnose.result.spot import Of, Spot
 from twin.diagnose.search.accepted import parameter_of, readings_columns
 from twin.diagnose.search.contest import bent
 from twin.diagnose.search.detector import Detector
@@ -40,7 +41,7 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
         a = np.sign(own.x) * _response(detector, own.index)
         for h in distinct([*_unnamed(found), *_likelier(found, own)]):
             cosine = _cosine(a, readings_columns(detector, h) @ np.array(h.amplitude))
-            if h.name == place or cosine**2 < least:
+            if _is(h, place) or cosine**2 < least:
                 continue
             alone = p.kind == "expansion" or fault_of(h).read
             remedy = _measured(p) if alone else in_the_air(h) or sensor_between(place, h.name)
@@ -58,9 +59,17 @@ def not_named(found: Search, causes: Sequence[Cause]) -> str:
     """A note on what passes its threshold beside numbers that calibration moved, has nothing to do with them, and could
     not be named; "" where there is nothing."""
     told = {c.place for c in causes} | {r.place for c in causes for r in c.rivals}
-    more = [h for h in _unnamed(found) if h.name not in told] if any(c.history == CALIBRATED for c in causes) else []
+    if not any(c.history == CALIBRATED for c in causes):
+        return ""
+    more = [h for h in _unnamed(found) if not any(_is(h, place) for place in told)]
     names = ", ".join(dict.fromkeys(f"{what(h.family)} at {h.name} ({h.when.name})" for h in more))
     return f"not named in addition, as its score passes its threshold but its refit does not: {names}" if names else ""
+
+
+def _is(h: Hypothesis, place: str) -> bool:
+    """Whether a hypothesis is about the number of a place: of an environment its offset at all times is, and neither
+    warmer air for hours nor above."""
+    return h.name == place and not (Spot.read(place).of is Of.ENVIRONMENT and (h.when.windows or h.batch.unit != "K"))
 
 
 def _unnamed(found: Search) -> list[Hypothesis]:
@@ -81,7 +90,8 @@ def _told(detector: Detector, own: Loose) -> tuple[float, tuple[float, float], s
     """A number without its tolerance, as a factor with its 95 % interval; of what is declared as nought, or may be that
     within its tolerance, the value."""
     p, sure, ends = detector.study.probed.parameters[own.index], detector.policy.sure, bounds(detector.study)
-    unit, one = ("1", p.nominal) if p.scale == "log" or abs(p.nominal) > p.sigma else (p.unit, 1.0)
+    ratio = p.scale == "log" or (p.kind == "expansion" and abs(p.nominal) > p.sigma)
+    unit, one = ("1", p.nominal) if ratio else (p.unit, 1.0)
     gain, *both = (p.value(own.x + z * own.sigma) / one for z in (0.0, -sure, sure))
     low, high = sorted(both)
     lowest, highest = (detector.policy.nearly * float(end[own.index]) for end in ends)

@@ -98,22 +98,24 @@ def _searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
         weight, detector = now, weighted(described, now)
         start = begun(detector, y)
         first = search(detector, y, start)
-    own = dispersion_of(first)
+    named, own = first, dispersion_of(first)
     if own.heat or own.share > detector.policy.dispersed:
-        first = _rather_heat(start, y, first)
+        first = _rather_heat(start, y, named)
     own = replace(dispersion_of(first), weight=weight)
     if own.share > detector.policy.dispersed:
         poor = _with_errors(own, detector, y)
         wide = raised(described, poor)
         found = search(wide, y, begun(wide, y))
         if (heat := explained_by_heat(first)) > 0.0:
-            named = _closely(detector, y, first, found, heat)
-            if named is not None and _rather_heat(start, y, named) is named:
-                return named, replace(dispersion_of(named), weight=weight)
+            closest = _closely(detector, y, first, found, heat)
+            if closest is not None and _rather_heat(start, y, closest) is closest:
+                return closest, replace(dispersion_of(closest), weight=weight)
             return first, replace(own, left=float(first.left.sum()) - heat, heat=True)
         return (found if found.accepted else search_again(detector, y, start, first, math.inf)), poor
     if not (least := own.least(detector.policy)):
         return first, own
+    if first is not named:  # the number that heat explains better than is not asked again
+        return replace(first, detector=start.detector.at_least(least)), own
     return search_again(detector, y, start, first, least), own
 
 
@@ -127,7 +129,8 @@ def _rather_heat(start: Start, y: np.ndarray, found: Search) -> Search:
     before, heat = misfit(detector, fitted), enter()
     if before - _evidence(heat) > policy.dispersed * dispersion_of(found).measured:  # a second place has little
         heat = enter(share=policy.misfit)
-    named = before - misfit(detector, found.fitted) + _evidence(found.entering)
+    left = max([_evidence(found.entering), *found.steps[-1].parts.values()])  # a freed number leaves it by the hour
+    named = before - misfit(detector, found.fitted) + left
     if _evidence(heat) <= named + policy.close:
         return found
     return replace(

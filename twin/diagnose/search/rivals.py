@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from twin.diagnose.evidence.batch import Hypothesis
-from twin.diagnose.faults.table import fault_of
+from twin.diagnose.faults.table import fault_of, what
 from twin.diagnose.result.diagnosis import Rival
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.policy import POLICY, SearchPolicy
@@ -54,7 +54,7 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
     if signals:
         return f"a run in which {' and '.join(dict.fromkeys(signals))} work alone, and one in which they rest"
     if a.name == b.name:
-        both = f"{a.family} and {b.family}"
+        both = f"{what(a.family)} and {what(b.family)}"
         return f"a run in which the air is 5 K colder, and one that cools from standstill: {both} differ there"
     return f"temperature sensors at {a.name} and at {b.name}"
 

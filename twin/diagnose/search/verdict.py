@@ -89,8 +89,8 @@ def verdict_of(found: Search, families: Sequence[Family]) -> tuple[Verdict, tupl
         two = fault_of(lead).corrects or (lead.when.signal and other.when.name != lead.when.name)
         same = alike and not two
         # heat where a source may be is one of many like it, and would not be named alone: beside that source it is
-        least = 0.0 if fault_of(lead).elsewhere and Spot.read(lead.name).partner == other.name else 1.0
-        passes = as_good(other, lead, policy) and other.statistic >= least * thresholds[other.family]
+        there = fault_of(lead).elsewhere and other.batch.unit == "W" and Spot.read(lead.name).partner == other.name
+        passes = as_good(other, lead, policy) and (there or other.statistic >= thresholds[other.family])
         if not same and (unproved or passes):
             return "ambiguous", causes
     # a sensor at fault does not keep what is beside it out of the description

@@ -104,7 +104,7 @@ def size_of(truth: Mapping[str, Any], cause: Mapping[str, Any], known: Known) ->
     if (family == "signal" and history == "factor") or history == "stuck":
         return None
     if family == "sensor" or family == "measurement":
-        if truth["history"] != history:
+        if truth["history"] != history:  # a drift in every run that was found in one has no size to compare
             return None
         return size * DAY if (truth["unit"], cause["unit"]) == ("K/s", "K/day") else size
     if family == "not_thermal":
