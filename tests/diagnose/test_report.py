@@ -557,6 +557,6 @@ def test_limits_of_one_family_stand_together():
         Limit("film_gain", "films.bed", 3.3, 2.0, 9.0, "1"), Limit("film_gain", "bed", 7.0, 2.0, 9.0, "W/(m^2*K)"),
         Limit("heat_source", "bed", 26.0, 20.0, 30.0, "W"),
     ]  # fmt: skip
-    said = "wrong film coefficient, 3.30 times the declared or 7.00 W/(m\u00b2\u00b7K); and missing heat source, 26 W"
+    said = "wrong film coefficient, 3.30 times the declared or 7.00 W/(m\u00b2\u00b7K); and missing heat source, 26.0 W"
     line = f"Detection limits (median location, probability 95 %): {said}."
     assert limit_lines(replace(diagnosis("nothing"), detection_limits=tuple(limits))) == [line]
