@@ -30,14 +30,13 @@ from models.measured import VARIABLE, measured_data
 from models.recordings import lathe_days
 from models.scripts import load_script
 from twin.build.simulate import simulate_run
-from twin.calibrate.channels.judge import judge
 from twin.calibrate.fit.measured import Measured, measured
 from twin.calibrate.fit.problem import run_names
 from twin.cli.main import run as command
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.catalogue import FAMILIES as CATALOGUE
-from twin.diagnose.faults.channels_check import channels_at_fault
+from twin.diagnose.faults.channels_check import channels_at_fault, judged_channels
 from twin.diagnose.model.study import with_measured
 from twin.diagnose.pipeline import Settings, machine_of, prepare
 from twin.diagnose.result.diagnosis import Cause
@@ -52,6 +51,7 @@ from twin.machine.effects.edits import extended_description, loads_with
 from twin.machine.effects.effect import Effect
 from twin.machine.load import load_machine
 from twin.rom.artefact import read_artefact
+from twin.rom.model import MachineModel
 
 ROOT = Path(__file__).parents[1]
 MODEL, OUT = ROOT / "models" / "lathe", ROOT / "out" / "lathe_diagnosis"
@@ -109,7 +109,7 @@ def rows_of(path: Path, days: Sequence[str], faults: int, rng: np.random.Generat
     artefact = read_artefact(path)
     machine = machine_of(artefact, path)
     runs = [read_run(OUT / "runs" / day) for day in days]
-    usable, set_aside = checked(runs, artefact.model.sensors)
+    usable, set_aside = checked(runs, artefact.model)
     detector, plans = prepare(machine, usable, (), Settings(form=FORM, nulls=NULLS))
     study = detector.study
     made, limited = _row(detector, plans, set_aside, days, None)
@@ -125,7 +125,7 @@ def rows_of(path: Path, days: Sequence[str], faults: int, rng: np.random.Generat
             with_difference(run, simulate_run(faulty, loads_with(run, edit.signals))[0], own)
             for run, own in zip(runs, plain, strict=True)
         ]
-        usable, set_aside = checked(planted, artefact.model.sensors)
+        usable, set_aside = checked(planted, artefact.model)
         plans = [
             measured(study.probed.base, run, p.run.drive, p.run.name) for run, p in zip(usable, study.runs, strict=True)
         ]
@@ -133,9 +133,9 @@ def rows_of(path: Path, days: Sequence[str], faults: int, rng: np.random.Generat
     return rows
 
 
-def checked(runs: Sequence[Run], sensors: Sequence[str]) -> tuple[list[Run], list[Cause]]:
+def checked(runs: Sequence[Run], model: MachineModel) -> tuple[list[Run], list[Cause]]:
     """Runs without the channels that are at fault whatever the model says, and these, as `diagnose` does."""
-    return channels_at_fault(runs, judge(runs), sensors, run_names(runs))
+    return channels_at_fault(runs, judged_channels(runs, model), model.sensors, run_names(runs))
 
 
 def drawn(detector: Detector, rng: np.random.Generator) -> tuple[Cause, Effect] | None:
