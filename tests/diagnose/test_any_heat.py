@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,7 +15,7 @@ from twin.diagnose.evidence.whiten import Projector
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.search.any_heat import Entering, _responses, entering, heat_blocks, step_of
 from twin.diagnose.search.detector import Detector
-from twin.diagnose.search.dispersion import searched
+from twin.diagnose.search.dispersion import _explains_more, searched
 from twin.diagnose.search.forward import _may_cover
 from twin.diagnose.search.look import look
 from twin.diagnose.search.policy import POLICY
@@ -145,3 +148,20 @@ def test_what_acts_in_hours_is_refitted_only_where_it_may_explain_such_heat():
     assert may(hours, 50.0, beside=())
     assert not may(hours, 50.0, 100.0)
     assert may(hours, 50.0, 900.0)  # of one of its starts
+
+
+@pytest.mark.parametrize(
+    ("left", "by_hour", "more"), [((), 0.0, True), ((60.0,), 0.0, False), ((), 60.0, False), ((20.0,), 20.0, True)]
+)
+def test_heat_alone_is_held_against_what_is_named_and_the_heat_that_this_leaves(monkeypatch, left, by_hour, more):
+    """Of a freed number that is told by the hour alone."""
+
+    def heat(evidence: float) -> Entering:
+        return Entering("bed", "bed", AnyHistory(evidence, np.zeros(0), np.zeros(0), np.zeros((0, 0))), evidence)
+
+    monkeypatch.setattr(sys.modules[searched.__module__], "misfit", lambda _, fitted: fitted)
+    start = SimpleNamespace(detector=SimpleNamespace(policy=POLICY), fitted=1000.0)
+    parts = {"bed": by_hour} if by_hour else {}
+    found = SimpleNamespace(fitted=150.0, entering=tuple(map(heat, left)), steps=[SimpleNamespace(parts=parts)])
+    assert _explains_more((heat(900.0),), start, found) == more
+    assert not _explains_more((), start, found)

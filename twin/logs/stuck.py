@@ -13,7 +13,7 @@ from twin.logs.found import held, span, warning
 from twin.logs.run import Table
 
 _ROWS = 20  # a shorter standstill is not looked at
-_IDLE = 0.02  # of what turns: a drive that is nought more often may coast, or its log ends there
+_IDLE = 0.02  # of the turning rows: a drive that reads zero more often may coast (a judgement before any result)
 _EXPECTED = 25.0  # changes that its neighbours made one expect, for a standstill to be told
 
 

@@ -20,7 +20,7 @@ class Start(Fault):
 FAULTS = (Start("initial_state", "start", "K", "runs.", 0, 0.2, 30.0, several=True),)
 
 FAMILY = Family(
-    15, "initial_state", "Initial temperature wrong",
+    15, "initial_state", "Initial temperature off",
     "The machine, or a part, was warmer or colder than the run says: yesterday's heat.",
     "T(0)", "decays with the model's own time constants from the first minute on", "0.2 K", "either",
     "the machine and every part, in every run", "reading", Singly(FAULTS), what="initial temperature off",

@@ -52,7 +52,7 @@ def batches(context: Context) -> list[Batch]:
 
 
 FAMILY = Family(
-    6, "zone", "Environment temperature wrong",
+    6, "zone", "Environment temperature off",
     "The air differs from where it is measured: warmer above, warmer in a zone, a door, a draught.",
     "a h_f M_f z, or g(t) h_f M_f dT", "goes with height, or with a door's hours; many sensors of one zone alike",
     "0.3 K (0.5 K at one film), 0.3 K/m", "either", "every environment, film and gradient; always and every window",

@@ -41,7 +41,7 @@ def strained_of(found: Search) -> tuple[Cause, ...]:
         a = np.sign(own.x) * _response(detector, own.index)
         for h in distinct([*_unnamed(found), *_likelier(found, own)]):
             cosine = _cosine(a, readings_columns(detector, h) @ np.array(h.amplitude))
-            if _is(h, place) or cosine**2 < least:
+            if _of_number(h, place) or cosine**2 < least:
                 continue
             alone = p.kind == "expansion" or fault_of(h).read
             remedy = _measured(p) if alone else in_the_air(h) or sensor_between(place, h.name)
@@ -61,14 +61,14 @@ def not_named(found: Search, causes: Sequence[Cause]) -> str:
     told = {c.place for c in causes} | {r.place for c in causes for r in c.rivals}
     if not any(c.history == CALIBRATED for c in causes):
         return ""
-    more = [h for h in _unnamed(found) if not any(_is(h, place) for place in told)]
+    more = [h for h in _unnamed(found) if not any(_of_number(h, place) for place in told)]
     names = ", ".join(dict.fromkeys(f"{what(h.family)} at {h.name} ({h.when.name})" for h in more))
     return f"not named in addition, as its score passes its threshold but its refit does not: {names}" if names else ""
 
 
-def _is(h: Hypothesis, place: str) -> bool:
-    """Whether a hypothesis is about the number of a place: of an environment its offset at all times is, and neither
-    warmer air for hours nor above."""
+def _of_number(h: Hypothesis, place: str) -> bool:
+    """Whether a hypothesis is about the declared number of a place: the offset of an environment at all times, neither
+    in hours nor with height."""
     return h.name == place and not (Spot.read(place).of is Of.ENVIRONMENT and (h.when.windows or h.batch.unit != "K"))
 
 

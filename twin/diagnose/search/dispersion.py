@@ -98,44 +98,51 @@ def _searched(detector: Detector, y: np.ndarray) -> tuple[Search, Dispersion]:
         weight, detector = now, weighted(described, now)
         start = begun(detector, y)
         first = search(detector, y, start)
-    named, own = first, dispersion_of(first)
+    own, alone = dispersion_of(first), tuple[Entering, ...]()
     if own.heat or own.share > detector.policy.dispersed:
-        first = _rather_heat(start, y, named)
-    own = replace(dispersion_of(first), weight=weight)
+        alone = _heat_alone(start, y, own.measured)
+    if rather := _explains_more(alone, start, first):
+        first = replace(
+            first, x=start.x0, accepted=(), steps=start.glance[2:], fitted=start.fitted, entering=alone,
+            covariance=start.covariance,
+        )  # fmt: skip
+        own = dispersion_of(first)
+    own = replace(own, weight=weight)
     if own.share > detector.policy.dispersed:
         poor = _with_errors(own, detector, y)
         wide = raised(described, poor)
         found = search(wide, y, begun(wide, y))
         if (heat := explained_by_heat(first)) > 0.0:
             closest = _closely(detector, y, first, found, heat)
-            if closest is not None and _rather_heat(start, y, closest) is closest:
+            if closest is not None and not _explains_more(alone, start, closest):
                 return closest, replace(dispersion_of(closest), weight=weight)
             return first, replace(own, left=float(first.left.sum()) - heat, heat=True)
         return (found if found.accepted else search_again(detector, y, start, first, math.inf)), poor
     if not (least := own.least(detector.policy)):
         return first, own
-    if first is not named:  # the number that heat explains better than is not asked again
+    if rather:  # a number that heat explains better than is not tested again
         return replace(first, detector=start.detector.at_least(least)), own
     return search_again(detector, y, start, first, least), own
 
 
-def _rather_heat(start: Start, y: np.ndarray, found: Search) -> Search:
-    """The search in y (m,) as it began, where heat of any history alone explains more than all that was named and the
-    heat that this has left. A name needs nine tenths of what heat explains: of many thousand units the tenth is far
-    more than noise leaves, and one window may tell nine tenths of what changes for hours."""
-    detector, policy = start.detector, start.detector.policy
-    fitted, (seen, _, step) = start.fitted, start.glance
-    enter = partial(entering, detector, y, fitted, seen, step.parts, policy.entering)
-    before, heat = misfit(detector, fitted), enter()
-    if before - _evidence(heat) > policy.dispersed * dispersion_of(found).measured:  # a second place has little
-        heat = enter(share=policy.misfit)
-    left = max([_evidence(found.entering), *found.steps[-1].parts.values()])  # a freed number leaves it by the hour
-    named = before - misfit(detector, found.fitted) + left
-    if _evidence(heat) <= named + policy.close:
-        return found
-    return replace(
-        found, x=start.x0, accepted=(), steps=(step,), fitted=fitted, entering=heat, covariance=start.covariance
-    )
+def _heat_alone(start: Start, y: np.ndarray, measured: int) -> tuple[Entering, ...]:
+    """Heat of any history in y (m,) with nothing named, at a second place also where that has little of it, if one
+    place leaves more than `dispersed` per measured number."""
+    detector, policy, (seen, _, step) = start.detector, start.detector.policy, start.glance
+    enter = partial(entering, detector, y, start.fitted, seen, step.parts, policy.entering)
+    heat = enter()
+    left = misfit(detector, start.fitted) - _evidence(heat)
+    return enter(share=policy.misfit) if left > policy.dispersed * measured else heat
+
+
+def _explains_more(heat: Sequence[Entering], start: Start, found: Search) -> bool:
+    """Whether heat alone has more evidence than all that a search has named explains, with the heat that this has left
+    (beside a freed number by the hour). A name needs nine tenths of what heat explains: of many thousand units the
+    tenth is far more than noise leaves, and one window may tell nine tenths of what changes for hours."""
+    detector = start.detector
+    left = max([_evidence(found.entering), *found.steps[-1].parts.values()])
+    named = misfit(detector, start.fitted) - misfit(detector, found.fitted) + left
+    return bool(heat) and _evidence(heat) > named + detector.policy.close
 
 
 def _evidence(heat: Sequence[Entering]) -> float:
