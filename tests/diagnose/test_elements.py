@@ -89,6 +89,20 @@ def test_sensor_faults_touch_one_sensor(read):
     np.testing.assert_allclose(T[:, 0], -T[:, 1])
 
 
+def test_a_sensor_on_another_node_is_as_warm_as_that(read):
+    columns, index, outputs, _ = read
+    study = small_case.study()
+    T, w = study.runs[0].split(columns[: study.runs[0].size, index["elsewhere", "front>housing", "always"]])
+    own, _ = study.runs[0].split(outputs[0])
+    np.testing.assert_allclose(T[:, 0], own[:, 1] - own[:, 0], atol=1e-5)
+    assert not T[:, 1:].any()
+    assert not w.any()
+    nodes = {p.name for p in study.probed.places}
+    assert {p for kind, p, _ in index if kind == "elsewhere" and p.startswith("front>")} == {
+        f"front>{name}" for name in nodes - {"front"}
+    }
+
+
 def test_a_gain_is_a_declared_parameter(read):
     columns, index, _, J = read
     study = small_case.study()

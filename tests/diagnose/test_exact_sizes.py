@@ -13,6 +13,7 @@ from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.acted import slots_with, units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.readings import late
+from twin.diagnose.faults.sensor_readings import elsewhere
 from twin.diagnose.model.study import Planned
 from twin.diagnose.search.accepted import Accepted, curved_change, freed, motion, parameter_of
 from twin.diagnose.search.exact import exact
@@ -252,6 +253,28 @@ def test_what_comes_early_in_every_run_is_no_clock(early):
         y -= early * late(study, {k: study.states(k, x)}, -early)
     _, causes = verdict_of(search(small_case.made_detector(), y), FAMILIES)
     assert "clock" not in [c.history for c in causes]
+
+
+def test_a_sensor_on_another_node_is_named_and_predicts_the_sealed_run():
+    """With films, losses and joints half a tolerance off, which what it shows moves with."""
+    study = small_case.study()
+    x = 0.5 * np.random.default_rng(4).standard_normal(len(study.probed.parameters))
+    y = clean(x) + noise(4) + elsewhere(study, lambda k: study.states(k, x), "front", "housing")
+    found = search(small_case.made_detector(), y)
+    verdict, (cause,) = verdict_of(found, FAMILIES)
+    assert (verdict, cause.place, cause.history) == ("sensor", "sensors.front", "mounted on another part")
+    assert cause.settings == {"mounted": "housing"}
+    assert cause.ci95[0] < 1.0 < cause.ci95[1]
+    sealed = study.runs[2].measured
+    T, w = study.runs[2].split(study.outputs(2, x))
+    T[:, sealed.sensors.index("front")] = T[:, sealed.sensors.index("housing")]
+    T = T + small_case.NOISE / np.sqrt(5) * np.random.default_rng(5).standard_normal(T.shape)
+    channels = channels_of(
+        found, 2, replace(sealed, temperature=T, tcp=w), (np.full(T.shape[1], 0.05), np.full(3, 3e-7))
+    )
+    table = {g.channel: g for g in gains(channels, 1, POLICY)}
+    assert table["front"].affected
+    assert table["front"].extended < 0.2 * table["front"].recalibrated
 
 
 def test_swapped_sensors_are_swapped_back_on_the_sealed_run():

@@ -16,7 +16,8 @@ from twin.diagnose.evidence.whiten import measured_of
 from twin.diagnose.faults.acted import slots_with
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.fault import Unit
-from twin.diagnose.faults.readings import _drifts, play
+from twin.diagnose.faults.readings import play
+from twin.diagnose.faults.sensor_readings import _drifts
 from twin.diagnose.faults.table import OF_KIND
 from twin.diagnose.search.accepted import curved_change, exchanged, motion
 from twin.diagnose.search.detector import Detector

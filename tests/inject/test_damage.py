@@ -59,7 +59,7 @@ def of_kind(family: str, history: str, **more) -> Damage:
     unit = DAMAGES[family][history].unit
     place = PLACES.get(family, "tcp.dx:x" if history == "frame" else "tcp.dx")
     signal = {"detached": "air", "load": "current"}.get(history, "")
-    other = "sensors.b" if history == "swapped" else ""
+    other = "sensors.b" if history in ("swapped", "elsewhere") else ""
     if history == "splice":
         place, more = "run", {"start": 14400.0, **more}
     return Damage(family, place, SIZES[unit], history, signal, other, **more)
@@ -165,6 +165,14 @@ def test_swapped_sensors():
     assert np.array_equal(sensor("a", d), B)
     assert np.array_equal(sensor("b", d), A)
     with pytest.raises(LogError, match="itself"):
+        damaged(RUN, replace(d, other="sensors.a"))
+
+
+def test_a_sensor_mounted_where_another_one_is():
+    d = of_kind("sensor", "elsewhere")
+    assert np.array_equal(sensor("a", d), B)
+    assert np.array_equal(sensor("b", d), B)
+    with pytest.raises(LogError, match="mounted where it is"):
         damaged(RUN, replace(d, other="sensors.a"))
 
 

@@ -127,6 +127,7 @@ class Fault:
     faint: bool = False  # its score by the derivative is small when it is many times as large
     read: bool = False  # acts on what is read, not in the machine
     sizes: tuple[float, ...] = ()  # of what is read and not in proportion to its size: at which it is scored, too
+    moves: bool = False  # of a reading in proportion to its size: by how much, parameters change
     called: str = ""  # what its history is called, where it is not that of its columns
     exchanges: bool = False  # two channels, exactly
     corrects: bool = False  # a logged signal, by an exact factor
@@ -146,6 +147,11 @@ class Fault:
     def curved(self) -> bool:
         """Whether it acts on what is read, and not in proportion to its size."""
         return bool(self.sizes)
+
+    @property
+    def stepped(self) -> bool:
+        """Whether what is read otherwise is asked of `change`, of the motion at hand, and no column has it for all."""
+        return self.curved or self.moves
 
     def bare(self, name: str) -> str:
         """The name that its columns have, of a place of a hypothesis."""
@@ -218,7 +224,7 @@ class Fault:
 
     # readings
     def change(self, study: Study, states: Callable[[int], np.ndarray], name: str, size: float) -> np.ndarray:
-        """(m,) what the fitted runs read otherwise, of what is `curved`; states: of run k, (n + 1, r)."""
+        """(m,) what the fitted runs read otherwise, of what is `stepped`; states: of run k, (n + 1, r)."""
         raise NotImplementedError(f"{self.kind} is in proportion to its size")
 
     def read_in(
@@ -226,7 +232,7 @@ class Fault:
     ) -> np.ndarray:
         """(size,) what it adds to the reading of the one run of a study, of states (n + 1, r); known: its columns of
         that run, by name."""
-        if self.curved:
+        if self.stepped:
             return self.change(one, lambda _: states, name, size)
         column = known.get(self.bare(name))
         return np.zeros(one.runs[0].size) if column is None else np.asarray(size * column)

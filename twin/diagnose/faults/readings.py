@@ -3,6 +3,7 @@
 gain      parameter    one prior standard deviation of a declared parameter in ln or its unit
 offset    sensor       1 K;   shift  the same, by blocks;   drift  1 K/day;   lag  1 s;   detached  all of it
 swapped   a<>b         all of it
+elsewhere a>place      all of it
 clock     run          1 s later than stated, to first order; exactly by `late`
 scale     axis<part    1 m/m/K of an encoder scale as warm as a part, from the middle of the stroke
 expansion part         100 % more
@@ -17,23 +18,19 @@ In runs with `tcp_reference = "first"` all TCP rows lose what a cause does to th
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
-from twin.diagnose.faults.elements import Key, blocks_of
+from twin.diagnose.faults.elements import Key
+from twin.diagnose.faults.sensor_readings import Add, numbers, rate_of, sensor_columns
 from twin.diagnose.model.bank import Nominal
 from twin.diagnose.model.study import COMPONENTS, Planned, Study
 from twin.physics.play import play as follower
 from twin.rom.apply import member_mean
 from twin.rom.parameter import OF_LAWS
 
-Add = Callable[[Key, Sequence[np.ndarray]], None]  # a column in parts, one per fitted run
-
 WIDTH, NARROW = 4e-6, 0.5e-6  # m
-DAY = 86400.0  # s
 SET_GAP = 600.0  # s: rows closer than that belong to one measurement
 
 
@@ -56,32 +53,17 @@ def readings_of(
     for i, p in enumerate(study.probed.parameters):
         if p.kind not in OF_LAWS:
             add(("gain", p.path, "always"), [jac[:, i] / scale[i] for jac in J])
-    _sensors(study, plans, outputs, add, swaps)
+    sensor_columns(study, plans, nominal, outputs, add, swaps)
     if any(len(plan.measured.tcp) for plan in plans):
         _tcp(study, plans, nominal, add)
     for r, plan in enumerate(plans):
-        parts = [_numbers(p) for p in plans]
+        parts = [numbers(p) for p in plans]
         T, _ = plan.split(outputs[r])
         z, step = nominal[r].states, np.asarray(plan.rows.step)
         w_rate = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), (z[step + 1] - z[step]) * nominal[r].rate)
-        parts[r] = -_numbers(plan, _rate(T, plan.measured.bin_time), w_rate)
+        parts[r] = -numbers(plan, rate_of(T, plan.measured.bin_time), w_rate)
         add(("clock", plan.run.name, "always"), parts)
     return np.stack(columns, axis=1), index
-
-
-def _numbers(plan: Planned, T: np.ndarray | None = None, w: np.ndarray | None = None) -> np.ndarray:
-    """(size,) all that a run measures, of sensors T (b, s) and TCP rows w (k, 3), zero by default.
-
-    The TCP is counted from its first row where the run says so, as `Study.read` does.
-    """
-    T = np.zeros(plan.shapes[0]) if T is None else T
-    w = np.zeros(plan.shapes[1]) if w is None else w
-    return np.concatenate([T.ravel(), (w - w[0] if plan.measured.from_first and len(w) else w).ravel()])
-
-
-def _rate(T: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """dT/dt [K/s] of bin means (b, ...)."""
-    return np.asarray(np.gradient(T, time, axis=0)) if len(T) > 1 else np.zeros_like(T)
 
 
 def _only(c: int, values: np.ndarray) -> np.ndarray:
@@ -91,73 +73,13 @@ def _only(c: int, values: np.ndarray) -> np.ndarray:
     return w
 
 
-def _sensors(study: Study, plans: Sequence[Planned], outputs: Sequence[np.ndarray], add: Add, swaps: bool) -> None:
-    names = tuple(dict.fromkeys(s for plan in plans for s in plan.measured.sensors))
-    surround = study.probed.base.load_model.surroundings
-
-    def column(of: Sequence[tuple[str, Sequence[np.ndarray]]]) -> list[np.ndarray]:
-        parts = []
-        for r, plan in enumerate(plans):
-            T = np.zeros(plan.shapes[0])
-            for name, values in of:
-                if name in plan.measured.sensors:
-                    T[:, plan.measured.sensors.index(name)] = values[r]
-            parts.append(_numbers(plan, T))
-        return parts
-
-    read = {
-        name: [
-            plan.split(y)[0][:, plan.measured.sensors.index(name)] if name in plan.measured.sensors
-            else np.zeros(plan.shapes[0][0])
-            for plan, y in zip(plans, outputs, strict=True)
-        ]
-        for name in names
-    }  # fmt: skip
-    time = [plan.measured.bin_time - plan.run.drive.time[0] for plan in plans]
-    air = []
-    for plan in plans:
-        weight = plan.measured.mean_of[:, 1:]
-        air.append(weight @ plan.run.drive.environment[:, surround] / np.maximum(weight.sum(axis=1), 1e-9))
-    for name in names:
-        add(("offset", name, "always"), column([(name, [np.ones(len(t)) for t in time])]))
-        add(("drift", name, "always"), column([(name, [t / DAY for t in time])]))
-        for history, values in _drifts(name, plans, time):
-            add(("drift", name, history), column([(name, values)]))
-        add(("lag", name, "always"), column([(name, [-_rate(T, t) for T, t in zip(read[name], time, strict=True)])]))
-        add(("detached", name, "always"), column([(name, [a - T for a, T in zip(air, read[name], strict=True)])]))
-        for b, (i, begin, end) in enumerate(blocks_of(study)):
-            edges = plans[i].run.drive.time[[begin, end]] - plans[i].run.drive.time[0]
-            inside = (time[i] >= edges[0]) & (time[i] < edges[1])
-            of_block = [inside.astype(float) if r == i else np.zeros(len(t)) for r, t in enumerate(time)]
-            add(("shift", name, f"{b}"), column([(name, of_block)]))
-    for a, first in enumerate(names if swaps else ()):
-        for second in names[a + 1 :]:
-            change = [y - x for x, y in zip(read[first], read[second], strict=True)]
-            add(("swapped", f"{first}<>{second}", "always"), column([(first, change), (second, [-c for c in change])]))
-
-
-def _drifts(name: str, plans: Sequence[Planned], time: Sequence[np.ndarray]) -> list[tuple[str, list[np.ndarray]]]:
-    """Drifts of a sensor by 1 K/day in one of several runs that read it, over at its end, or with what has come
-    together in all that follow."""
-    found = list[tuple[str, list[np.ndarray]]]()
-    reading = [r for r, plan in enumerate(plans) if name in plan.measured.sensors and len(time[r])]
-    for r in reading if reading[1:] else ():
-        plan = plans[r]
-        within = [t / DAY if k == r else np.zeros(len(t)) for k, t in enumerate(time)]
-        found.append((f"drift in {plan.run.name}", within))
-        if r < reading[-1]:
-            stays = [own + within[r][-1] * (k > r) for k, own in enumerate(within)]
-            found.append((f"drift in {plan.run.name} that stays", stays))
-    return found
-
-
 def _tcp(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal], add: Add) -> None:
     (body,) = study.probed.base.bodies
     probed = study.probed
     times = [plan.measured.tcp_time - plan.run.drive.time[0] for plan in plans]
 
     def column(of: Sequence[np.ndarray]) -> list[np.ndarray]:
-        return [_numbers(plan, w=w) for plan, w in zip(plans, of, strict=True)]
+        return [numbers(plan, w=w) for plan, w in zip(plans, of, strict=True)]
 
     def component(c: int, values: Sequence[np.ndarray]) -> list[np.ndarray]:
         return column([_only(c, v) for v in values])
@@ -208,7 +130,7 @@ def play(study: Study, states: Callable[[int], np.ndarray], kind: str, name: str
     states: (n + 1, r) of run k; kind: of LAGS.
     """
     c, wide, runs = COMPONENTS.index(name), max(width, NARROW), [(k, study.runs[k]) for k in study.fitted]
-    return np.concatenate([_numbers(plan, w=_only(c, LAGS[kind](plan, states(k), c, wide))) for k, plan in runs])
+    return np.concatenate([numbers(plan, w=_only(c, LAGS[kind](plan, states(k), c, wide))) for k, plan in runs])
 
 
 def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.ndarray:
@@ -228,27 +150,7 @@ def late(study: Study, states: Mapping[int, np.ndarray], seconds: float) -> np.n
             T = plan.measured.mean_of @ (_state(read, np.arange(len(z)) - steps) - read)
             at = np.asarray(plan.rows.step) + np.asarray(plan.rows.share)
             w = np.einsum("kcr,kr->kc", np.asarray(plan.rows.row), _state(z, at - steps) - _state(z, at))
-        parts.append(_numbers(plan, T, w) / by)
-    return np.concatenate(parts)
-
-
-def lagged(study: Study, states: Callable[[int], np.ndarray], sensor: str, seconds: float) -> np.ndarray:
-    """(m,) what the fitted runs read more where a sensor follows with a time constant of `seconds` [s], per second.
-
-    states: (n + 1, r) of run k. A run begins with the sensor as warm as what it sits on.
-    """
-    (body,) = study.probed.base.bodies
-    parts = []
-    for k in study.fitted:
-        plan = study.runs[k]
-        T = np.zeros(plan.shapes[0])
-        if sensor in plan.measured.sensors:
-            i = plan.measured.sensors.index(sensor)
-            read = states(k) @ body.C[plan.measured.column[i]]
-            keep = math.exp(-plan.run.step / seconds)
-            followed, _ = lfilter([1.0 - keep], [1.0, -keep], read, zi=[keep * read[0]])
-            T[:, i] = plan.measured.mean_of @ (followed - read)
-        parts.append(_numbers(plan, T) / seconds)
+        parts.append(numbers(plan, T, w) / by)
     return np.concatenate(parts)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from twin.diagnose.evidence.batch import Batch
 from twin.diagnose.faults.context import Context, Singly, alone, of_stretches, to_the_end
 from twin.diagnose.faults.fault import Family, Fault
-from twin.diagnose.faults.readings import lagged
+from twin.diagnose.faults.sensor_readings import elsewhere, lagged
 from twin.diagnose.model.study import Study
 from twin.diagnose.result.diagnosis import Cause
 
@@ -23,6 +23,20 @@ class Lag(Fault):
         return size * lagged(study, states, self.bare(name), max(size, self.least))
 
 
+@dataclass(frozen=True)
+class Elsewhere(Fault):
+    """A sensor that is mounted on another part; its place is sensors.SENSOR>PLACE."""
+
+    def prior(self, q: int) -> tuple[np.ndarray, np.ndarray]:
+        """All that it shows is that place's, but for how the point where it sits differs from the mean there."""
+        return np.ones(q), np.full(q, POINT**-2.0)
+
+    def change(self, study: Study, states: Callable[[int], np.ndarray], name: str, size: float) -> np.ndarray:
+        sensor, place = self.bare(name).split(">")
+        return size * elsewhere(study, states, sensor, place)
+
+
+POINT = 0.2  # standard deviation of the rise of a point of a surface over its mean: chosen, as that of misplaced heat
 SHIFT = Fault("sensor", "shift", "K", "sensors.", 0, 0.3, 100.0, read=True, grows=False)
 DRIFT = Fault("sensor", "drift", "K/day", "sensors.", 0, 0.1, 20.0, read=True)
 SINGLE = (
@@ -34,6 +48,11 @@ SINGLE = (
     ),
     # all of the reading is the air's; half as much again for the error of a fit
     Fault("sensor", "detached", "1", "sensors.", 1, 0.05, 1.5, read=True, called="detached"),
+    # less than half: the place is its own
+    Elsewhere(
+        "sensor", "elsewhere", "1", "sensors.", 1, 0.5, 1.5, read=True, lasts=True, moves=True, partner="mounted",
+        own=0.2, called="mounted on another part",
+    ),
     Fault("sensor", "swapped", "1", "sensors.", 1, 0.0, fixed=True, read=True, exchanges=True, called="swapped"),
 )  # fmt: skip
 FAULTS = (*SINGLE, DRIFT, SHIFT)
@@ -55,7 +74,9 @@ def batches(context: Context) -> list[Batch]:
 
 
 def said(cause: Cause) -> list[str]:
-    """Of the quickest sensor it says as much of all."""
+    """Of the quickest sensor a lag says as much of all; where one that sits elsewhere does."""
+    if place := cause.settings.get("mounted"):
+        return [f"as if it sat on {place}"]
     return ["as if it followed late, or as if all temperatures were logged late"] if cause.history == "lag" else []
 
 

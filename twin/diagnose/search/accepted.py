@@ -189,7 +189,7 @@ def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.
     parameters of the motion that is read otherwise."""
     if fault_of(h).exchanges:  # `exchanged` has left nothing of it
         return np.zeros(detector.columns.raw.shape[0])
-    if fault_of(h).curved:
+    if fault_of(h).stepped:
         return detector.whiten(curved_change(detector, h, float(amplitude[0]), motion(detector, x)))
     return np.asarray(readings_columns(detector, h) @ amplitude)
 
@@ -205,7 +205,7 @@ def motion(detector: Detector, x: np.ndarray | None) -> Motion:
 
 
 def curved_change(detector: Detector, h: Hypothesis, size: float, states: Motion) -> np.ndarray:
-    """(m,) change of what is measured by what is curved."""
+    """(m,) change of what is measured by what is stepped."""
     return fault_of(h).change(detector.study, states, h.name, size)
 
 

@@ -227,4 +227,4 @@ def _told_badly(detector: Detector, h: Hypothesis) -> bool:
 
 def bent(detector: Detector, h: Hypothesis) -> bool:
     fault = fault_of(h)
-    return fault.bent or fault.curved or bool(edges_of(detector.study, h))
+    return fault.bent or fault.stepped or bool(edges_of(detector.study, h))

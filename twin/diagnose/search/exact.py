@@ -150,6 +150,8 @@ def _descended(
         outputs, derivatives = _outputs(detector, now, edges)
         J = jacobian(detector, now.x, [(now.h, now.a)], closely)
         projector = detector.fitter.projector(J, fitted.more)
+        if fault.moves:
+            read = detector.whiten(curved_change(detector, h, 1.0, motion(detector, now.x)))[:, None]
         there = detector.whiten(y - fitted.beside - outputs) - read @ now.a
         left = there + detector.whiten(J @ now.x)
         if others is None:

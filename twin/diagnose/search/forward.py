@@ -138,8 +138,9 @@ def naming(found: Search, y: np.ndarray, x: np.ndarray, causes: Sequence[Accepte
 def _named(
     detector: Detector, y: np.ndarray, fitted: Fitted, accepted: Sequence[Accepted], h: Hypothesis
 ) -> Hypothesis:
-    """A strong hypothesis by what is left once it is named; unchanged where that explains no more."""
-    if fault_of(h).curved or not strong(detector, h):
+    """A strong hypothesis, or one that moves a reading, by what is left once it is named; unchanged where that explains
+    no more."""
+    if fault_of(h).curved or not (fault_of(h).moves or strong(detector, h)):
         return h
     after, _ = refit(detector, y, beginning(fitted.x, detector.policy), [*accepted, as_scored(detector.study, h)])
     return replace(h, statistic=max(h.statistic, misfit(detector, fitted) - misfit(detector, after)))

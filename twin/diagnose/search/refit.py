@@ -82,7 +82,7 @@ def refit(
         bent, states = np.zeros(len(y)), motion(detector, there)
         for a, own in zip(accepted, of_each, strict=True):
             fault = fault_of(a.hypothesis)
-            if fault.curved:
+            if fault.stepped:
                 size = float(amplitude[own][0])
                 slope = curved_slope(detector, a.hypothesis, size, states)
                 D[:, own] = detector.whiten(slope)[:, None]

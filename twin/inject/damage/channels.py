@@ -25,7 +25,7 @@ class Damage:
     size: float  # SI
     history: str = ""  # the kind; "" for the family's first
     signal: str = ""  # a column that it follows
-    other: str = ""  # swapped: the other sensor, "sensors.y_nut"
+    other: str = ""  # swapped, elsewhere: the other sensor, "sensors.y_nut"
     start: float = -math.inf  # s
     end: float = math.inf
 

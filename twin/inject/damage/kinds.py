@@ -51,6 +51,7 @@ DAMAGES: dict[str, dict[str, Kind]] = {
         "stuck": Kind(sensors.stuck, "s", "keeps its value for this time"),
         "noise": Kind(sensors.noise, "K", "reads too much by twice this, with noise of this"),
         "rail": Kind(sensors.rail, "degC", "shows this, whatever it measures"),
+        "elsewhere": Kind(sensors.elsewhere, "", "is mounted where this sensor is, on another part"),
         "swapped": Kind(sensors.swapped, "", "has the name of this sensor, which has its name"),
     },
     "signal": {

@@ -9,7 +9,7 @@ import numpy as np
 
 from twin.errors import LogError
 from twin.inject.damage.channels import Damage, acts, column_at, grown, sensor_of, with_sensors
-from twin.logs.run import Run
+from twin.logs.run import Run, Table
 
 
 def offset(run: Run, d: Damage) -> Run:
@@ -75,12 +75,24 @@ def rail(run: Run, d: Damage) -> Run:
     return with_sensors(run, {name: np.where(acts(table.time, d) & np.isfinite(values), d.size, values)})
 
 
+def elsewhere(run: Run, d: Damage) -> Run:
+    """Is mounted beside another sensor, and shows what that does."""
+    table, name, other = _two(run, d, "mounted where it is")
+    return with_sensors(run, {name: np.where(acts(table.time, d), table.columns[other], table.columns[name])})
+
+
 def swapped(run: Run, d: Damage) -> Run:
     """Two sensors with each other's names."""
-    table, name = sensor_of(run, d.place)
-    _, other = sensor_of(run, d.other)
-    if other == name:
-        raise LogError("a sensor is swapped with itself", d.place, "name another sensor")
+    table, name, other = _two(run, d, "swapped with itself")
     during = acts(table.time, d)
     a, b = table.columns[name], table.columns[other]
     return with_sensors(run, {name: np.where(during, b, a), other: np.where(during, a, b)})
+
+
+def _two(run: Run, d: Damage, wrong: str) -> tuple[Table, str, str]:
+    """The temperatures and two columns of theirs. Raises LogError where one is not there or both are one."""
+    table, name = sensor_of(run, d.place)
+    _, other = sensor_of(run, d.other)
+    if other == name:
+        raise LogError(f"a sensor is {wrong}", d.place, "name another sensor")
+    return table, name, other
