@@ -86,6 +86,11 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Hidden]
         found.append(
             Hidden("heat_source", one(nodes), f"{2.0 * heat:.3g} W", ("--signal", one(currents), "--exponent", "2"))
         )
+    if len(sensors) > 1:
+        sensor = one(sensors)
+        found.append(
+            Hidden("sensor", sensor, one([s for s in sensors if s != sensor]), ("--history", "elsewhere"), True)
+        )
     return found
 
 
@@ -126,7 +131,7 @@ def answer(row: Row) -> str:
 
 def kind_of(row: Row) -> str:
     """Family, and what of its options makes it another effect."""
-    option = next((o for o in row["hidden"][3:] if o in ("--from", "--signal", "lag", "detached")), "")
+    option = next((o for o in row["hidden"][3:] if o in ("--from", "--signal", "lag", "detached", "elsewhere")), "")
     return f"{row['hidden'][0]} {option.strip('-')}"
 
 

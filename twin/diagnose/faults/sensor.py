@@ -1,4 +1,4 @@
-"""A temperature sensor is at fault: offset, drift, lag, contact to the part lost, two of them swapped."""
+"""A temperature sensor is at fault: offset, drift, lag, contact to the part lost, another part, two of them swapped."""
 
 from __future__ import annotations
 
@@ -82,9 +82,12 @@ def said(cause: Cause) -> list[str]:
 
 FAMILY = Family(
     9, "sensor", "Temperature sensor at fault",
-    "Offset, drift, lag, contact to the part lost, stuck, or two sensors swapped. The machine model is left alone.",
-    "y + a;  a t;  filter;  (1 - w) y + w T_air", "one channel only: neighbours and TCP agree with the model",
+    "Offset, drift, lag, contact to the part lost, mounted on another part, stuck, or two sensors swapped. "
+    "The machine model is left alone.",
+    "y + a;  a t;  filter;  (1 - w) y + w T_air;  (1 - w) y + w T_place",
+    "one channel only: neighbours and TCP agree with the model",
     "0.15 K, 0.1 K/day, 2 min, 5 %", "either",
-    "every sensor, offsets also from every hour on, drifts in every run or one; every pair", "sensor",
+    "every sensor, offsets also from every hour on, drifts in every run or one; every pair; every place of other parts",
+    "sensor",
     batches, what="temperature sensor at fault", channel=True, kind_told=True, said=said,
 )  # fmt: skip

@@ -42,6 +42,8 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
     wrong = next((h for h in (a, b) if fault_of(h).corrects), None)
     if wrong is not None:
         return reading_beside(wrong)
+    if moved := next((h for h in (a, b) if fault_of(h).moves), None):
+        return f"a look at where {Spot.read(moved.name).name} is mounted"
     if any(Spot.read(h.name).between for h in (a, b)):
         return "a run of loads and rests, an hour each: through a joint heat goes on while one of its sides is warm"
     if a.name != b.name and a.when.name == b.when.name:
