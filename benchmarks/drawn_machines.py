@@ -126,7 +126,7 @@ def simulated(machine: Path, runs: Sequence[Path], out: Path, drawn: DrawnMachin
     made = []
     for k, run in enumerate(runs):
         target = out / run.name
-        noise = ("--noise-temperature", f"{drawn.noise[0]:.4f} K", "--noise-tcp", f"{1e6 * drawn.noise[1]:.3f} um")
+        noise = ("--noise", f"{drawn.noise[0]:.4f} K", "--tcp-noise", f"{1e6 * drawn.noise[1]:.3f} um")
         asked = ["simulate", machine, run, "-o", target, *noise, "--tcp-every", "20 min", "--seed", 100 * seed + k]
         if command([str(a) for a in asked]):
             raise RuntimeError(f"simulate {machine} {run}")

@@ -32,7 +32,7 @@ import twin
 FOLDER = Path("tests/diagnose/four_nodes")
 OUT = Path("out/hidden_effect")
 SEED = 1
-noise = {"noise_temperature": "0.1 K", "noise_tcp": "1 um"}  # of the measurements
+noise = {"noise": "0.1 K", "tcp_noise": "1 um"}  # of the measurements
 
 # %% [markdown]
 # ## The model under test

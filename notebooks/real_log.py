@@ -83,7 +83,7 @@ def loads(folder: Path, plan: tuple[tuple[float, float], ...]) -> Path:
     return folder
 
 
-options = twin.SimulateOptions(noise_temperature="0.05 K", tcp_every="1 min", noise_tcp="0.3 um")
+options = twin.SimulateOptions(noise="0.05 K", tcp_every="1 min", tcp_noise="0.3 um")
 whole = {
     day: twin.simulate(real, loads(OUT / "loads" / day, plan), OUT / "whole" / day, replace(options, seed=k))
     for k, (day, plan) in enumerate(PLAN.items())

@@ -73,7 +73,7 @@ def test_the_lines_of_the_readme_run(repository):
         code = code.replace(written, small)
     machine, days = "tests/machines/spindle", {}
     for seed, day in enumerate(("monday", "tuesday", "wednesday")):
-        noise = twin.SimulateOptions(noise_temperature="0.1 K", noise_tcp="1 um", seed=seed)
+        noise = twin.SimulateOptions(noise="0.1 K", tcp_noise="1 um", seed=seed)
         days[day] = twin.simulate(machine, f"{machine}/runs/warm_up", f"out/{day}", noise)
     exec(compile(code, "README.md", "exec"), days)
     assert Path("out/report/report.json").is_file()

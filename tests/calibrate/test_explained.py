@@ -23,7 +23,7 @@ def spindle(tmp_path_factory):
     out = tmp_path_factory.mktemp("bearing")
     machine = with_bearing(out / "machine", 1.6)
     twin("build", machine, "-o", out / "m.h5")
-    twin("simulate", machine, loads(out / "day", 0), "-o", out / "shown", "--noise-temperature", "0.05 K")
+    twin("simulate", machine, loads(out / "day", 0), "-o", out / "shown", "--noise", "0.05 K")
     return read_artefact(out / "m.h5"), read_run(out / "shown")
 
 

@@ -82,7 +82,7 @@ def test_what_is_not_used_is_named(slide_artefact, measured, tmp_path):
         (["--method", "paper", "--tolerance", "2 um"], "predicts no uncertainty"),
         (["--method", "gain", "--earlier", RUN], "nothing to learn"),
         (["--interval", "-3 min"], "out of range"),
-        (["--sensor-noise", "2 bananas"], "--sensor-noise"),
+        (["--noise", "2 bananas"], "--noise"),
         (["-o", RUN], "run folder"),
     ],
 )

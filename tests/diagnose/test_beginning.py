@@ -140,7 +140,7 @@ def test_a_machine_that_is_warm_from_the_hours_before_hides_nothing(tmp_path):
     twin("build", MACHINE, "-o", tmp_path / "four.h5")
     for seed, day in enumerate(("monday", "tuesday")):
         loads(tmp_path / f"{day}_loads", 4 * seed)
-        twin("simulate", MACHINE, tmp_path / f"{day}_loads", "-o", tmp_path / f"{day}_whole", "--noise-temperature",
+        twin("simulate", MACHINE, tmp_path / f"{day}_loads", "-o", tmp_path / f"{day}_whole", "--noise",
              "0.1 K", "--seed", seed)  # fmt: skip
         run = later(read_run(tmp_path / f"{day}_whole"), 2.5 * HOUR)
         first = [float(v[0]) for n, v in run.temperatures.columns.items() if n != "air"]

@@ -25,7 +25,7 @@ def test_air_that_all_other_channels_refute_and_the_machine_felt_is_no_fault(tmp
     real = tmp_path / "real"
     real.mkdir()
     (real / "machine.toml").write_text(other(drawn.text, 1000 * SEED, described), encoding="utf-8")
-    noise = [f"--noise-temperature={drawn.noise[0]} K", f"--noise-tcp={drawn.noise[1] * 1e6} um", "--tcp-every=20 min"]
+    noise = [f"--noise={drawn.noise[0]} K", f"--tcp-noise={drawn.noise[1] * 1e6} um", "--tcp-every=20 min"]
     for k, name in enumerate(RUNS):
         log, out = described / "runs" / name, tmp_path / name
         assert command(["simulate", str(real), str(log), "-o", str(out), *noise, f"--seed={1000 + k}"]) == 0

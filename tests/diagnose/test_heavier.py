@@ -23,7 +23,7 @@ def test_a_capacity_that_a_loss_would_imitate_is_compared_with_it_exactly(tmp_pa
     runs = []
     for seed in (0, 4):
         run = loads(tmp_path / f"{seed}", seed)
-        noise = ("--noise-temperature", "0.1 K", "--noise-tcp", "1 um", "--seed", seed)
+        noise = ("--noise", "0.1 K", "--tcp-noise", "1 um", "--seed", seed)
         twin("simulate", tmp_path / "heavy", run, "-o", tmp_path / f"measured_{seed}", *noise)
         runs.append(read_run(tmp_path / f"measured_{seed}"))
     detector = prepare(load_machine(MACHINE), runs, [], Settings(nulls=40, form=32))[0]

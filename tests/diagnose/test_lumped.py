@@ -45,7 +45,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The artefact, and measured days: with nothing hidden, with heat at the column, with a sensor that drifts."""
     out = tmp_path_factory.mktemp("lumped")
     monday, tuesday = loads(out / "monday", 0), loads(out / "tuesday", 4)
-    noise = ("--noise-temperature", "0.1 K", "--noise-tcp", "1 um")
+    noise = ("--noise", "0.1 K", "--tcp-noise", "1 um")
     twin("build", MACHINE, "-o", out / "four.h5")
     twin("hide", "heat_source", "column", f"{HEAT:g} W", MACHINE, "-o", out / "hidden")
     twin("simulate", MACHINE, monday, "-o", out / "nothing", *noise, "--seed", 1)
@@ -114,7 +114,7 @@ def test_displacements_alone_from_their_first_row_on_are_enough(made: Path) -> N
     """As the measured spindle has it: no sensor on the machine, and deviations that count from the first."""
     run = made / "tcp_only"
     twin(
-        "simulate", made / "hidden", made / "monday", "-o", run, "--tcp-every", "20 min", "--noise-tcp", "0.1 um",
+        "simulate", made / "hidden", made / "monday", "-o", run, "--tcp-every", "20 min", "--tcp-noise", "0.1 um",
         "--seed", 4,
     )  # fmt: skip
     (run / "temperatures.csv").unlink()

@@ -45,7 +45,7 @@ def diagnosed(artefact: Path, real: Path, logs: list[Path], out: Path) -> Result
     """Two days of a real machine, and one that is sealed."""
     runs = []
     for seed, log in zip(SEEDS, logs, strict=True):
-        noise = ("--noise-temperature", "0.1 K", "--noise-tcp", "1 um", "--seed", seed)
+        noise = ("--noise", "0.1 K", "--tcp-noise", "1 um", "--seed", seed)
         twin("simulate", real, log, "-o", out / f"measured_{seed}", *noise)
         run = read_run(out / f"measured_{seed}")
         columns = {name: values for name, values in run.loads.columns.items() if name != "hidden_1"}

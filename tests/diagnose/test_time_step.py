@@ -80,7 +80,7 @@ def test_the_error_of_a_step_is_that_of_the_worst_sensor():
 def test_a_light_bearing_that_warms_is_no_cause(tmp_path):
     """In steps of a minute it is off in every run alike, which would be told as a cause."""
     machine = with_bearing(tmp_path / "machine", 1.6)
-    noise = ("--noise-temperature", "0.05 K", "--noise-tcp", "1 um", "--substeps", 8)
+    noise = ("--noise", "0.05 K", "--tcp-noise", "1 um", "--substeps", 8)
     for seed, day in enumerate(("monday", "tuesday")):
         loads(tmp_path / day, 4 * seed)
         twin("simulate", machine, tmp_path / day, "-o", tmp_path / f"{day}_shown", *noise, "--seed", seed)

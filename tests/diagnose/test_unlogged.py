@@ -46,7 +46,7 @@ def test_what_a_machine_did_meanwhile_is_no_cause(tmp_path):
     days = []
     for seed, day in enumerate(("monday", "tuesday")):
         loads(tmp_path / f"{day}_loads", 4 * seed)
-        noise = ("--noise-temperature", "0.1 K", "--seed", seed)
+        noise = ("--noise", "0.1 K", "--seed", seed)
         twin("simulate", MACHINE, tmp_path / f"{day}_loads", "-o", tmp_path / f"{day}_whole", *noise)
         whole = replace(read_run(tmp_path / f"{day}_whole"), tcp=None)
         days.append(tmp_path / day)

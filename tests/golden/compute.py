@@ -25,7 +25,7 @@ from twin.cli.main import run as twin
 
 TESTS = Path(__file__).parents[1]
 NOISE = ("--noise", "0.05 K", "--tcp-noise", "0.3 um")
-SIMULATED = ("--noise-temperature", "0.05 K", "--noise-tcp", "0.3 um")
+SIMULATED = ("--noise", "0.05 K", "--tcp-noise", "0.3 um")
 # What the measured machine has otherwise than the described one.
 CHANGES = {
     "slide": (
@@ -84,7 +84,7 @@ def machine_values(name: str, folder: Path) -> Values:
     only = [v for pattern in ONLY[name] for v in ("--only", pattern)]
     command("calibrate", artefact, measured, "-o", fitted, *NOISE, *only, "--budget", "10 h")
     command("score", fitted, measured, "--sealed", sealed, "-o", folder / "score")
-    interval = ("--interval", "2 min", "--sensor-noise", "0.05 K")
+    interval = ("--interval", "2 min", "--noise", "0.05 K")
     begun = _begun(measured, folder / "begun")
     for target, method, run in (("state", "state", measured), ("gain", "gain", measured), ("first", "state", begun)):
         command("update", artefact, run, "-o", folder / target, "--method", method, *interval)

@@ -43,7 +43,7 @@ def threshold_values(detector: Detector) -> Values:
 def lumped_values(folder: Path) -> Values:
     """Reports of a lumped machine with nothing hidden, and with heat at its column."""
     artefact, day = folder / "four.h5", _day(folder / "day")
-    noise = ("--noise-temperature", "0.1 K", "--noise-tcp", "1 um")
+    noise = ("--noise", "0.1 K", "--tcp-noise", "1 um")
     command("build", LUMPED, "-o", artefact)
     command("hide", "heat_source", "column", "40 W", LUMPED, "-o", folder / "hidden")
     values: dict[str, Any] = {}

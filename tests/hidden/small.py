@@ -17,7 +17,7 @@ from twin.inject.machines.text_edits import spread_values, with_divisions
 
 SLIDE = Path(__file__).parents[1] / "machines" / "slide" / "machine.toml"
 HOURS, RUNS, SAMPLING = 4, 2, 120.0
-NOISE = ("--noise-temperature", "0.05 K", "--noise-tcp", "0.5 um", "--tcp-every", "15 min")
+NOISE = ("--noise", "0.05 K", "--tcp-noise", "0.5 um", "--tcp-every", "15 min")
 SENSORS = {
     "rail": ("rail_1", (0.3, -0.1, 0.13)),
     "screw": ("screw", (0.2, 0.0, 0.135)),

@@ -79,7 +79,7 @@ def test_build_refuses_what_check_refuses(tmp_path, capsys):
         ("--dt", "0 s"),
         ("--dt", "-60 s"),
         ("--tcp-every", "0 s"),
-        ("--noise-tcp", "-1 um"),
+        ("--tcp-noise", "-1 um"),
         ("--seed", "-1"),
         ("--size", "0 mm"),
     ],
@@ -139,9 +139,9 @@ def test_simulated_truth_and_reduced_run_agree(built_artefact, tmp_path):
 
 @pytest.mark.long
 def test_noise_is_added_as_asked_and_repeats(tmp_path):
-    arguments = ["simulate", str(SLIDE), str(SLIDE / "runs" / "short"), "--noise-temperature", "0.1 K"]
+    arguments = ["simulate", str(SLIDE), str(SLIDE / "runs" / "short"), "--noise", "0.1 K"]
     for name, seed in (("a", "3"), ("b", "3"), ("c", "4"), ("clean", None)):
-        extra = ["--seed", seed] if seed else ["--noise-temperature", "0 K"]
+        extra = ["--seed", seed] if seed else ["--noise", "0 K"]
         assert run([*arguments, "-o", str(tmp_path / name), *extra]) == 0
     a, b, c, clean = (read_run(tmp_path / n).temperatures.columns for n in ("a", "b", "c", "clean"))
     noise = np.array([a[k] - clean[k] for k in clean])

@@ -49,7 +49,7 @@ def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plate_measured")
     text = (PLATE / "machine.toml").read_text(encoding="utf-8")
     (folder / "machine.toml").write_text(text.replace('natural = "10 W', 'natural = "7.5 W'), encoding="utf-8")
-    noise = ("--noise-temperature", "0.02 K")
+    noise = ("--noise", "0.02 K")
     assert run(["simulate", str(folder), str(HEATING), "-o", str(folder / "run"), *noise]) == 0
     return folder / "run"
 
@@ -162,7 +162,7 @@ def test_diagnosis_finds_a_second_heater(artefact, tmp_path):
     text = (PLATE / "machine.toml").read_text(encoding="utf-8")
     heater = '[sources.second]\nlaw = "constant_heat"\nsurface = "plate.x_max"\nparameters = { power = "800 W" }\n'
     (tmp_path / "machine.toml").write_text(text + heater, encoding="utf-8")
-    noise = ("--noise-temperature", "0.05 K")
+    noise = ("--noise", "0.05 K")
     assert run(["simulate", str(tmp_path), str(HEATING), "-o", str(tmp_path / "run"), *noise]) == 0
     few = ("--nulls", "20")
     assert run(["diagnose", str(artefact), str(tmp_path / "run"), "-o", str(tmp_path / "out"), *few]) == 0

@@ -42,9 +42,9 @@ def _names(ctx: click.Context, param: click.Parameter, value: str | None) -> tup
 @click.option("--restart", is_flag=True, help="segments are tests of their own, each from its own initial state")
 @click.option("--hold-interval", default="0 s", show_default=True, type=Quantity("s", zero=True),
               help="time between the measurements that 'hold last' may use; 0: all of them")  # fmt: skip
-@click.option("--tcp-uncertainty", default="1 um", show_default=True, type=Quantity("m"),
+@click.option("--tcp-noise", default="1 um", show_default=True, type=Quantity("m"),
               help="standard deviation where tcp.csv has none")  # fmt: skip
-@click.option("--temperature-uncertainty", default="0.1 K", show_default=True, type=Quantity("K"),
+@click.option("--noise", default="0.1 K", show_default=True, type=Quantity("K"),
               help="standard deviation of a sensor")  # fmt: skip
 @click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
 @click.option("--substeps", type=click.IntRange(1), help="substeps of the integrator; default: as the certificate says")

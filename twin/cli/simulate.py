@@ -21,7 +21,7 @@ def _options() -> type[Any]:
 
 @click.command(
     epilog="Example: twin simulate models/five_axis/machine.toml models/five_axis/runs/experiment_a -o out/truth "
-    "--noise-temperature '0.08 K' --noise-tcp '1 um' --hours 1"
+    "--noise '0.08 K' --tcp-noise '1 um' --hours 1"
 )
 @click.argument("machine", type=click.Path())
 @click.argument("run", type=click.Path())
@@ -36,9 +36,9 @@ def _options() -> type[Any]:
 @click.option("--hours", type=click.FloatRange(0, min_open=True), help="stop after this time; the whole run by default")
 @click.option("--tcp-every", default="30 min", show_default=True, type=Quantity("s"),
               help="TCP rows, where the run has no tcp.csv")  # fmt: skip
-@click.option("--noise-temperature", default="0 K", show_default=True, type=Quantity("delta_degC", zero=True),
+@click.option("--noise", default="0 K", show_default=True, type=Quantity("delta_degC", zero=True),
               help="standard deviation at sensors")  # fmt: skip
-@click.option("--noise-tcp", default="0 um", show_default=True, type=Quantity("m", zero=True),
+@click.option("--tcp-noise", default="0 um", show_default=True, type=Quantity("m", zero=True),
               help="standard deviation of TCP rows")  # fmt: skip
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="seed of the noise")
 @bundled(_options)

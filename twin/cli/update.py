@@ -38,7 +38,7 @@ def _options() -> type[Any]:
               help="most by which the correction moves in a minute")  # fmt: skip
 @click.option("--tcp-noise", default="1 um", show_default=True, type=Quantity("m"),
               help="standard deviation of TCP measurements without a sigma")  # fmt: skip
-@click.option("--sensor-noise", default="0.1 K", show_default=True, type=Quantity("delta_degC"),
+@click.option("--noise", default="0.1 K", show_default=True, type=Quantity("delta_degC"),
               help="standard deviation of a temperature reading")  # fmt: skip
 @click.option("--dt", default="60 s", show_default=True, type=Quantity("s"), help="time step")
 @click.option("-o", "--output", type=click.Path(), help="folder for update.h5, tcp.csv, summary.json, state")

@@ -189,7 +189,7 @@ def diagnose(
     >>> import twin
     >>> model = twin.build("tests/diagnose/four_nodes")
     >>> truth = twin.hide("tests/diagnose/four_nodes", "heat_source", "column", "60 W", "out/hidden")
-    >>> options = twin.SimulateOptions(noise_temperature="0.1 K", noise_tcp="1 um")
+    >>> options = twin.SimulateOptions(noise="0.1 K", tcp_noise="1 um")
     >>> monday = twin.simulate(truth, "tests/diagnose/four_nodes/runs/monday", "out/monday", options)
     >>> found = twin.diagnose(model, monday, options=twin.DiagnoseOptions(nulls=20))
     >>> found.verdict, found.causes[0].family, found.causes[0].place

@@ -30,8 +30,8 @@ class ScoreOptions:
     substeps: int | None = None
     restart: bool = False  # segments are tests of their own, each from its own initial state
     hold_interval: Quantity = "0 s"  # between the measurements that "hold last" may use; 0: all of them
-    tcp_uncertainty: Quantity = "1 um"  # standard deviation where tcp.csv has none
-    temperature_uncertainty: Quantity = "0.1 K"
+    tcp_noise: Quantity = "1 um"  # standard deviation where tcp.csv has none
+    noise: Quantity = "0.1 K"
     inputs: Sequence[str] = ()  # columns that learned baselines read; empty: all temperatures
 
     def settings(self) -> Settings:
@@ -42,8 +42,8 @@ class ScoreOptions:
             dt=positive("dt", self.dt, "s"),
             substeps=self.substeps,
             restart=self.restart,
-            tcp_sigma=positive("tcp_uncertainty", self.tcp_uncertainty, "m"),
-            temperature_sigma=positive("temperature_uncertainty", self.temperature_uncertainty, "K"),
+            tcp_sigma=positive("tcp_noise", self.tcp_noise, "m"),
+            temperature_sigma=positive("noise", self.noise, "K"),
             interval=positive("hold_interval", self.hold_interval, "s", zero=True),
             inputs=tuple(self.inputs),
         )

@@ -25,8 +25,8 @@ class SimulateOptions:
     substeps: int = 1  # steps of the second-order method per step
     hours: float | None = None  # stop after this time; the whole run by default
     tcp_every: Quantity = "30 min"  # TCP rows, where the run has no tcp.csv
-    noise_temperature: Quantity = "0 K"  # standard deviation at sensors
-    noise_tcp: Quantity = "0 um"  # and of TCP rows
+    noise: Quantity = "0 K"  # standard deviation at sensors
+    tcp_noise: Quantity = "0 um"  # and of TCP rows
     seed: int = 0  # of the noise
 
 
@@ -62,7 +62,7 @@ def simulate(
     measured data.
 
     >>> import twin
-    >>> options = twin.SimulateOptions(noise_temperature="0.1 K", seed=1)
+    >>> options = twin.SimulateOptions(noise="0.1 K", seed=1)
     >>> truth = twin.simulate("tests/machines/spindle", "tests/machines/spindle/runs/warm_up", options=options)
     >>> truth.synthetic
     ('temperatures', 'tcp', 'loads')
@@ -89,8 +89,8 @@ def simulation(
 
     o = options or SimulateOptions()
     noise = Noise(
-        positive("noise_temperature", o.noise_temperature, "delta_degC", zero=True),
-        positive("noise_tcp", o.noise_tcp, "m", zero=True),
+        positive("noise", o.noise, "delta_degC", zero=True),
+        positive("tcp_noise", o.tcp_noise, "m", zero=True),
         o.seed,
     )
     size = None if o.size is None else positive("size", o.size, "m")

@@ -30,7 +30,7 @@ class UpdateOptions:
     tolerance: Quantity | None = None  # or let a scheduler ask, so that the standard deviation stays below this
     slew: Quantity = "5 um"  # most by which the correction moves in a minute
     tcp_noise: Quantity = "1 um"  # of TCP measurements without a sigma
-    sensor_noise: Quantity = "0.1 K"  # of a temperature reading
+    noise: Quantity = "0.1 K"  # of a temperature reading
     dt: Quantity = "60 s"
 
     def plan(self) -> Plan:
@@ -56,7 +56,7 @@ class UpdateOptions:
             dt=positive("dt", self.dt, "s"),
             slew=positive("slew", self.slew, "m") / 60.0,
             tcp_noise=positive("tcp_noise", self.tcp_noise, "m"),
-            sensor_noise=positive("sensor_noise", self.sensor_noise, "delta_degC"),
+            sensor_noise=positive("noise", self.noise, "delta_degC"),
         )
 
 

@@ -90,14 +90,14 @@ def rows(tcp: Tcp, which: np.ndarray) -> Tcp:
     return Tcp(tcp.time[which], tcp.axes, tcp.position[which], tcp.displacement[which])
 
 
-def measured(run: Run, middle: Tcp, noise_temperature: float, noise_tcp: float, seed: int) -> Run:
+def measured(run: Run, middle: Tcp, noise: float, tcp_noise: float, seed: int) -> Run:
     """Sensors every minute and R-tests every hour, with noise [K], [m]; the first R-test ends 5 min after the start."""
     rng = np.random.default_rng(seed)
     assert run.temperatures is not None
-    noisy = {k: v + noise_temperature * rng.standard_normal(len(v)) for k, v in run.temperatures.columns.items()}
+    noisy = {k: v + noise * rng.standard_normal(len(v)) for k, v in run.temperatures.columns.items()}
     tests = rows(middle, np.isclose(middle.time % HOUR, 0.0) & (middle.time > 0) | np.isclose(middle.time, 5 * MINUTE))
-    sigma = np.full(len(tests.time), noise_tcp) if noise_tcp > 0 else None
-    displacement = tests.displacement + noise_tcp * rng.standard_normal(tests.displacement.shape)
+    sigma = np.full(len(tests.time), tcp_noise) if tcp_noise > 0 else None
+    displacement = tests.displacement + tcp_noise * rng.standard_normal(tests.displacement.shape)
     return replace(
         run,
         temperatures=Table(run.temperatures.time, noisy, run.temperatures.units),
@@ -111,8 +111,8 @@ def main() -> None:
     parser.add_argument("--off", type=float, default=0.3, help="by how much parameters are off, default 0.3")
     parser.add_argument("--seed", type=int, default=1, help="of the signs, default 1; the noise has its own")
     parser.add_argument("--size", type=float, default=0.09, help="of the mesh [m], default 0.09; 0: the shipped one")
-    parser.add_argument("--noise-temperature", type=float, default=0.08, help="standard deviation [K], default 0.08")
-    parser.add_argument("--noise-tcp", type=float, default=1.0, help="standard deviation [um], default 1")
+    parser.add_argument("--noise", type=float, default=0.08, help="standard deviation [K], default 0.08")
+    parser.add_argument("--tcp-noise", type=float, default=1.0, help="standard deviation [um], default 1")
     arguments = parser.parse_args()
     folders = [arguments.output / f"{name}{kind}" for name in EXPERIMENTS for kind in ("", "_truth", "_path")]
     for folder in folders:
@@ -130,7 +130,7 @@ def main() -> None:
         assert run.tcp is not None
         half = len(run.tcp.time) // 2
         middle, path = rows(run.tcp, np.arange(half)), rows(run.tcp, np.arange(half, 2 * half))
-        noise = (arguments.noise_temperature, arguments.noise_tcp * 1e-6)
+        noise = (arguments.noise, arguments.tcp_noise * 1e-6)
         write_run(arguments.output / name, measured(run, middle, *noise, 100 * arguments.seed + number))
         write_run(arguments.output / f"{name}_truth", replace(run, tcp=middle))
         write_run(arguments.output / f"{name}_path", replace(run, tcp=path))

@@ -21,13 +21,13 @@ HERE = Path(__file__).parent
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the five run folders")
-    parser.add_argument("--noise-temperature", type=float, default=0.0, help="standard deviation [K], default 0")
-    parser.add_argument("--noise-tcp", type=float, default=0.0, help="standard deviation [um], default 0")
+    parser.add_argument("--noise", type=float, default=0.0, help="standard deviation [K], default 0")
+    parser.add_argument("--tcp-noise", type=float, default=0.0, help="standard deviation [um], default 0")
     arguments = parser.parse_args()
     for name in TESTS:
         refuse_to_destroy(arguments.output / name)
     for seed, name in enumerate(TESTS, start=1):
-        noise = Noise(arguments.noise_temperature, arguments.noise_tcp * 1e-6, seed)
+        noise = Noise(arguments.noise, arguments.tcp_noise * 1e-6, seed)
         run, balance = simulate_run(HERE.parent, HERE / name, tcp_every=300.0, noise=noise)
         write_run(arguments.output / name, run)
         print(f"{arguments.output / name}: heat balance closes to {balance:.1e} of the throughput")

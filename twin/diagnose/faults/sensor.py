@@ -76,7 +76,7 @@ def batches(context: Context) -> list[Batch]:
 def said(cause: Cause) -> list[str]:
     """Of the quickest sensor a lag says as much of all; where one that sits elsewhere does."""
     if place := cause.settings.get("mounted"):
-        return [f"as if it sat on {place}"]
+        return [f"the share of {place} in what it shows"]
     return ["as if it followed late, or as if all temperatures were logged late"] if cause.history == "lag" else []
 
 
