@@ -135,7 +135,7 @@ class Fault:
     everywhere: bool = False  # of no one place: it may switch as often as the weather
     elsewhere: bool = False  # all of a source's heat at another place, compared with the description
     replaces: bool = False  # a law of another shape: what its source emits as described has no tolerance beside it
-    beside: bool = False  # beside a declared number of its family and unit, whose detection limit alone is told
+    beside: bool = False  # beside another of its family and unit, whose detection limit alone is told
     partner: str = ""  # what the second of the two names of its place is called in settings
 
     @property

@@ -50,8 +50,8 @@ SINGLE = (
     Fault("sensor", "detached", "1", "sensors.", 1, 0.05, 1.5, read=True, called="detached"),
     # less than half: the place is its own
     Elsewhere(
-        "sensor", "elsewhere", "1", "sensors.", 1, 0.5, 1.5, read=True, lasts=True, moves=True, partner="mounted",
-        own=0.2, called="mounted on another part",
+        "sensor", "elsewhere", "1", "sensors.", 1, 0.5, 1.5, read=True, lasts=True, moves=True, beside=True,
+        partner="mounted", own=0.2, called="mounted on another part",
     ),
     Fault("sensor", "swapped", "1", "sensors.", 1, 0.0, fixed=True, read=True, exchanges=True, called="swapped"),
 )  # fmt: skip
