@@ -29,6 +29,7 @@ from twin.diagnose.report.text import (
     gain_lines,
     limit_lines,
     pull_of,
+    unknown_lines,
     verdict_sentence,
     when,
 )
@@ -318,13 +319,31 @@ def test_a_size_says_what_it_holds_for(family, unit, settings, wanted):
     assert wanted in cause_words(cause)
 
 
+@pytest.mark.parametrize(
+    ("correlation", "wanted"),
+    [(0.83, "goes with hydraulics (correlation +0.83)"), (-0.83, "goes against hydraulics (correlation -0.83)"),
+     (-0.25, "No logged signal goes with the unexplained heat: hydraulics does most (correlation -0.25)")],
+)  # fmt: skip
+def test_what_unknown_heat_goes_with(correlation, wanted):
+    d = diagnosis("unknown")
+    (line,) = unknown_lines(replace(d, unknown=replace(d.unknown, correlated_signals=(("hydraulics", correlation),))))
+    assert wanted in line
+
+
+def test_heat_that_is_taken_away_leaves():
+    d = diagnosis("unknown")
+    time, power, sigma = d.unknown.history["run_1"]
+    cold = replace(d, unknown=replace(d.unknown, history={"run_1": (time, tuple(-q for q in power), sigma)}))
+    told = verdict_sentence(cold)
+    assert "Heat leaves part column" in told
+    assert "its peak is 40 W (95 % interval 28 to 52 W)" in told
+
+
 def test_chance_counts_what_fault_free_data_gave():
     values = np.arange(1.0, 101.0)
     some, none = chance(values, 90.0), chance(values, 100.0)
     assert some.startswith("10 of 100 simulated fault-free data sets exceeded 90.0; the largest gave 100")
-    assert (
-        "None of 100 simulated fault-free data sets exceeded 100, so at most 1 in 33 would (95 % confidence)" in none
-    )  # 3 / n
+    assert "exceeded 100, so at most 1 in 33 machines within its tolerances would (95 % confidence)" in none  # 3 / n
     assert chance(np.zeros(0), 3.0) == chance(None, 3.0) == chance(values, np.nan) == ""
     d = replace(diagnosis("named"), nulls={"heat_source": values})
     assert evidence_sentence(d, "heat_source", 431.2, 95.0).startswith("The statistic is 431, its threshold 95.0.")

@@ -169,3 +169,41 @@ def test_what_is_not_refuted_stays_as_it_was_found():
     now, told = standing(found, y, FAMILIES, (), opened, 1)
     assert now is found
     assert (told.verdict, told.less, told.note) == ("named", "", "")
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_swapped_sensors_have_each_others_names_in_the_sealed_run_too(again: bool):
+    """Where they have not there, the fault is withdrawn with a note: two channels tens of kelvins off are no chance."""
+    study, rng = small_case.study(), np.random.default_rng(4)
+    x = 0.5 * rng.standard_normal(len(study.probed.parameters))
+    y = study.all_outputs(x)
+    y = y + small_case.made_detector().whiten.colour(rng.standard_normal(len(y)))
+    for _, T, _ in study.split(y):
+        T[:] = T[:, [1, 0, *range(2, T.shape[1])]]
+    found = search(small_case.made_detector(), y)
+    assert [a.hypothesis.batch.kind for a in found.accepted] == ["swapped"]
+    sealed = study.runs[2].measured
+    T, w = study.runs[2].split(study.outputs(2, x))
+    T = T[:, [1, 0, *range(2, T.shape[1])]] if again else T
+    now, told = standing(found, y, FAMILIES, (), [replace(sealed, temperature=T, tcp=w)], 1)
+    if again:
+        assert (now, told.verdict, told.less) == (found, "sensor", "")
+        return
+    assert not [a for a in now.accepted if a.hypothesis.batch.kind == "swapped"]
+    assert told.less.startswith("withdrawn: sensor front<>housing (swapped), with which the sealed run is less likely")
+    assert "swapped" not in [c.history for c in told.causes]
+
+
+def test_a_sensor_that_reads_too_much_stays_though_it_was_mended():
+    """1.5 K too much in the runs that were looked at, and right in the sealed one: its own channel says nothing."""
+    study, rng = small_case.study(), np.random.default_rng(7)
+    x = 0.5 * rng.standard_normal(len(study.probed.parameters))
+    y = study.all_outputs(x)
+    y = y + small_case.made_detector().whiten.colour(rng.standard_normal(len(y)))
+    for _, T, _ in study.split(y):
+        T[:, 1] += 1.5
+    found = search(small_case.made_detector(), y)
+    assert [a.hypothesis.name for a in found.accepted] == ["sensors.housing"]
+    T, w = study.runs[2].split(study.outputs(2, x))
+    now, told = standing(found, y, FAMILIES, (), [replace(study.runs[2].measured, temperature=T, tcp=w)], 1)
+    assert (now, told.verdict, told.less) == (found, "sensor", "")

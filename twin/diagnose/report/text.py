@@ -19,6 +19,7 @@ from twin.diagnose.result.place import Support
 from twin.diagnose.result.spot import Spot
 
 LEAST_SHARE = 0.05  # of the evidence: a channel with less is not told
+LINKED = 0.5  # correlation of a signal that heat goes with: a quarter of its variance
 MEASURED = (("K", "temperature"), ("m", "TCP direction"))  # units of channels, and what these are
 _SEEN = {  # before anything is fitted, by the history of a sensor at fault
     "stuck": "Its reading was constant for {hours} h",
@@ -214,16 +215,18 @@ def _unknown_words(d: Diagnosis) -> str:
     if d.unknown is None:
         return "nothing in the catalogue explains the residuals"
     part, surface = d.unknown.part, d.unknown.surface
-    besides = f", and more at {' and '.join(d.unknown.besides)}" if d.unknown.besides else ""
-    text = f"heat enters part {part}, mostly at {surface}{besides}, and nothing in the catalogue explains it"
+    besides = f", and also at {' and '.join(d.unknown.besides)}" if d.unknown.besides else ""
     hours = [
         (t, q, sigma, run) for run, (time, heat, spread) in d.unknown.history.items()
         for t, q, sigma in zip(time, heat, spread, strict=False) if abs(q) > 0.0
     ]  # fmt: skip
+    at, largest, sigma, run = max(hours, key=lambda hour: abs(hour[1]), default=(0.0, 0.0, 0.0, ""))
+    way = "leaves" if largest < 0.0 else "enters"
+    text = f"heat {way} part {part}, mostly at {surface}{besides}, and nothing in the catalogue explains it"
     if not hours:
         return text
-    at, largest, sigma, run = max(hours, key=lambda hour: abs(hour[1]))
-    middle, low, high, unit = interval_and_unit(largest, largest - SURE * sigma, largest + SURE * sigma, "W")
+    most = abs(largest)
+    middle, low, high, unit = interval_and_unit(most, most - SURE * sigma, most + SURE * sigma, "W")
     return f"{text}; its peak is {middle} {unit} (95 % interval {low} to {high} {unit}), {at / 3600:.1f} h into {run}"
 
 
@@ -254,7 +257,8 @@ def chance(nulls: np.ndarray | None, threshold: float) -> str:
     if not n or not math.isfinite(threshold):
         return ""
     # none of n: with 95 % confidence the rate is below 3 / n
-    rare = "" if above else f", so at most 1 in {max(1, round(n / 3))} would (95 % confidence)"
+    few = max(1, round(n / 3))
+    rare = "" if above else f", so at most 1 in {few} machines within its tolerances would (95 % confidence)"
     return (
         f"{above or 'None'} of {n} simulated fault-free data sets exceeded "
         f"{number(threshold)}{rare}; the largest gave {number(float(values.max()))}."
@@ -325,7 +329,10 @@ def unknown_lines(d: Diagnosis) -> list[str]:
     if not d.unknown or not d.unknown.correlated_signals:
         return []
     name, correlation = d.unknown.correlated_signals[0]
-    return [f"The unexplained heat follows {name} best (correlation {correlation:+.2f})."]
+    if abs(correlation) < LINKED:
+        return [f"No logged signal goes with the unexplained heat: {name} does most (correlation {correlation:+.2f})."]
+    way = "with" if correlation > 0.0 else "against"
+    return [f"The unexplained heat goes {way} {name} (correlation {correlation:+.2f})."]
 
 
 def pull_lines(d: Diagnosis) -> list[str]:

@@ -125,7 +125,9 @@ def _forward(described: Detector, y: np.ndarray, start: Start) -> Search:
 def naming(found: Search, y: np.ndarray, x: np.ndarray, causes: Sequence[Accepted]) -> Search:
     """A search in y (m,) as if it had named these causes, refitted from parameters x (n,)."""
     detector = found.detector
-    fitted, accepted = refit(detector, y, beginning(x, detector.policy), causes)
+    fitted, accepted = detector.fitter(y), list[Accepted]()
+    if causes:
+        fitted, accepted = refit(detector, y, beginning(x, detector.policy), causes)
     seen, _, step = look(detector, fitted)
     x, covariance = settled(detector, y, accepted)
     left = entering(detector, y, fitted, seen, step.parts, detector.policy.entering)

@@ -13,7 +13,7 @@ behind the scores is sure of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -145,6 +145,26 @@ def _worth(channels: Sequence[Channel], seed: int, policy: SearchPolicy) -> int:
     """Whether the sealed runs are likelier with the causes (1), less likely (-1), or neither beyond chance."""
     low, high = likelihood_ratio(channels, seed, policy)
     return int(low > 0.0) - int(high < 0.0)
+
+
+def less_likely(found: Search, other: Search, opened: Sequence[Measured], sensors: Collection[str], seed: int) -> str:
+    """The channel that speaks most against a search, where the sealed runs are significantly less likely with it than
+    with another one, by what both predict of all channels but some sensors'; "" where they are not."""
+    policy, both = found.detector.policy, zip(_channels(found, opened), _channels(other, opened), strict=True)
+    compared = [
+        replace(a, errors=[a.errors[0], b.errors[2], a.errors[2]], moved=_apart(a, b) > policy.noticed * a.noise)
+        for a, b in both if a.name not in sensors
+    ]  # fmt: skip
+    if _worth(compared, seed, policy) >= 0:
+        return ""
+    worst = max((c for c in compared if c.moved), key=lambda c: float(rms(c.errors[2]) - rms(c.errors[1])) / c.noise)
+    after, before = (quantity(float(rms(worst.errors[k])), worst.unit) for k in (2, 1))
+    return f"{worst.name}: residual {after} (rms) with it, {before} without"
+
+
+def _apart(a: Channel, b: Channel) -> float:
+    """By how much two searches predict a channel otherwise (rms, in its unit)."""
+    return float(rms(a.errors[2] - b.errors[2]))
 
 
 def other_sizes(found: Search, y: np.ndarray) -> Iterator[tuple[Accepted, ...]]:

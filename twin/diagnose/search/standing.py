@@ -8,14 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
+from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.acted import ended, units_of
 from twin.diagnose.faults.fault import Family
-from twin.diagnose.faults.table import what
+from twin.diagnose.faults.table import fault_of, what
 from twin.diagnose.result.diagnosis import Cause
+from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, settled
+from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import naming, stands
 from twin.diagnose.search.look import Search
-from twin.diagnose.search.sealed import Judged, judged
+from twin.diagnose.search.sealed import Judged, judged, less_likely
 from twin.diagnose.search.verdict import verdict_of, with_faults
 
 REFUTED_LATER = "With it the sealed run is significantly less likely"
@@ -25,7 +28,18 @@ def standing(
     found: Search, y: np.ndarray, families: Sequence[Family], faults: Sequence[Cause], opened: Sequence[Measured],
     seed: int,
 ) -> tuple[Search, Judged]:  # fmt: skip
-    """A search in y (m,) and its headline, held against the measurements of the sealed runs.
+    """A search in y (m,) and its headline, held against the measurements of the sealed runs: without the faults of
+    sensors that these refute."""
+    found, refuted = _with_sound_sensors(found, y, families, opened, seed)
+    found, told = _of_machine(found, y, families, faults, opened, seed)
+    return found, replace(told, less="; ".join(text for text in (refuted, told.less) if text))
+
+
+def _of_machine(
+    found: Search, y: np.ndarray, families: Sequence[Family], faults: Sequence[Cause], opened: Sequence[Measured],
+    seed: int,
+) -> tuple[Search, Judged]:  # fmt: skip
+    """The causes in the machine held against the sealed runs.
 
     Where these refute several causes in the machine together, the weakest goes and the others are fitted and judged
     again. If they are refuted down to the last one, so is all that was found. Where they refute what has come to stay,
@@ -60,6 +74,34 @@ def standing(
     names = " and ".join(f"{what(a.hypothesis.family)} at {a.hypothesis.name}" for a in gone)
     less = f"withdrawn: {names}, with which the other causes predict the sealed run significantly worse"
     return now, replace(told, less=less)
+
+
+def _with_sound_sensors(
+    found: Search, y: np.ndarray, families: Sequence[Family], opened: Sequence[Measured], seed: int
+) -> tuple[Search, str]:
+    """The search without faults of temperature sensors that the sealed runs refute, the weakest first, and a note: all
+    channels together are significantly less likely with them than without. What always acts on a reading and is not
+    predicted there may go on or be mended: its own channel says nothing."""
+    notes = list[str]()
+    for a in sorted(found.accepted, key=lambda a: a.statistic) if opened else ():
+        if not _of_sensor(a, families):
+            continue
+        h, other = a.hypothesis, without(found, y, a)
+        fault, spot = fault_of(h), Spot.read(h.name)
+        mendable = not (fault.exchanges or fault.lasts) and _always(found.detector, h)
+        read = replace(found, accepted=tuple(b for b in found.accepted if b is not a))  # as it is, by the same model
+        hidden = (spot.name,) if mendable else ()
+        told = less_likely(found, other, opened, hidden, seed) or less_likely(found, read, opened, hidden, seed)
+        if told and all(stands(other.detector, b) for b in other.accepted):
+            found = other
+            notes.append(f"withdrawn: {spot.words} ({h.when.name}), with which the sealed run is less likely; {told}")
+    return found, "; ".join(notes)
+
+
+def _always(detector: Detector, h: Hypothesis) -> bool:
+    """Whether what it does to a reading is the same in all runs."""
+    first = int(h.batch.columns[h.place][0])
+    return any(c == first and history == "always" for (_, _, history), c in detector.index.items())
 
 
 def _ended(found: Search) -> Search:
