@@ -86,12 +86,15 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Hidden]
         found.append(
             Hidden("heat_source", one(nodes), f"{2.0 * heat:.3g} W", ("--signal", one(currents), "--exponent", "2"))
         )
-    if len(sensors) > 1:
-        sensor = one(sensors)
-        found.append(
-            Hidden("sensor", sensor, one([s for s in sensors if s != sensor]), ("--history", "elsewhere"), True)
-        )
-    return found
+    return [*found, *_elsewhere(rng, sensors)]
+
+
+def _elsewhere(rng: np.random.Generator, sensors: Sequence[str]) -> list[Hidden]:
+    """One of two sensors drawn is mounted where the other one is."""
+    if len(sensors) < 2:
+        return []
+    sensor, other = (str(name) for name in rng.choice(sensors, 2, replace=False))
+    return [Hidden("sensor", sensor, other, ("--history", "elsewhere"), True)]
 
 
 def measured(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,10 +11,15 @@ import pytest
 
 from tests.diagnose import small_case
 from twin.calibrate.fit.measured import measured
+from twin.diagnose.evidence.batch import Hypothesis
+from twin.diagnose.faults import coolant
+from twin.diagnose.faults.acted import units_of
 from twin.diagnose.faults.catalogue import FAMILIES
 from twin.diagnose.faults.context import Context
+from twin.diagnose.faults.elements import elements_of, histories_of
 from twin.diagnose.faults.readings import readings_of
-from twin.diagnose.model.study import make_study
+from twin.diagnose.model.bank import nominal_run
+from twin.diagnose.model.study import Study, make_study
 
 pytestmark = pytest.mark.long
 
@@ -99,7 +105,7 @@ def test_a_sensor_on_another_node_is_as_warm_as_that(read):
     assert not w.any()
     nodes = {p.name for p in study.probed.places}
     assert {p for kind, p, _ in index if kind == "elsewhere" and p.startswith("front>")} == {
-        f"front>{name}" for name in nodes - {"front"}
+        f"front>{name}" for name in nodes - {"bearing_front"}
     }
 
 
@@ -145,3 +151,43 @@ def test_every_family_lists_hypotheses_over_columns_that_exist(read):
                 assert when.weights.shape == (batch.q, batch.columns.shape[1]), (family.name, when.name)
                 assert all(0.0 <= w.start < w.end for w in when.windows)
     assert empty == ["coarse_model", "missing_member", "missing_joint"]  # judged otherwise, or after all others
+
+
+def with_valve(values: Sequence[np.ndarray]) -> Study:
+    """The study with a logged signal of these values (n,) in each run."""
+    study = small_case.study()
+    base = study.probed.base
+    valve = replace(base.load_model.signals[0], name="valve", unit="1", low=0.0, high=1.0)
+    load = replace(base.load_model, signals=(*base.load_model.signals, valve))
+    runs = tuple(
+        replace(p, run=replace(p.run, signals={**p.run.signals, "valve": own}))
+        for p, own in zip(study.runs, values, strict=True)
+    )
+    return replace(study, probed=replace(study.probed, base=replace(base, load_model=load)), runs=runs)
+
+
+def test_a_valve_is_a_switch_and_what_has_many_levels_is_none():
+    steps = [p.run.drive.n_steps for p in small_case.study().runs]
+    valve = [np.arange(n) % 60 < 25.5 for n in steps]
+    some = [np.where(np.arange(n) % 60 == 25, 0.4, own) for n, own in zip(steps, valve, strict=True)]  # of a step
+    ramp = [np.arange(n) % 60 / 60.0 for n in steps]
+    assert histories_of(with_valve(some)).switches == ("valve",)
+    assert histories_of(with_valve(ramp)).switches == ()
+    assert histories_of(with_valve([np.ones(n) for n in steps])).switches == ()  # always on: no valve
+
+
+def test_a_coolant_flows_while_a_valve_is_open():
+    """A film and its heat with the history of the signal, in the sealed run, too."""
+    steps = [p.run.drive.n_steps for p in small_case.study().runs]
+    valve = [(np.arange(n) % 60 < 25).astype(float) for n in steps]
+    study = with_valve(valve)
+    elements = elements_of(study, [nominal_run(small_case.study(), k) for k in range(len(steps))])
+    (batch,) = (b for b in coolant.batches(Context(study, elements, elements.index)) if b.histories[0].signal)
+    assert [h.signal for h in batch.histories] == ["valve"]
+    h = Hypothesis(batch, 0, batch.histories[0], 0.0, (60.0, -10.0))
+    columns, weights = h.combination()
+    assert columns.tolist() == [elements.index[kind, h.name, "valve"] for kind in ("film", "heat")]
+    np.testing.assert_array_equal(weights, np.eye(2))
+    for unit in units_of(study, h):
+        for shape, own in zip(unit.shapes, valve, strict=True):
+            np.testing.assert_allclose(shape, own)

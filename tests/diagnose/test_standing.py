@@ -194,7 +194,7 @@ def test_swapped_sensors_have_each_others_names_in_the_sealed_run_too(again: boo
     assert "swapped" not in [c.history for c in told.causes]
 
 
-def test_a_sensor_that_reads_too_much_stays_though_it_was_mended():
+def test_a_sensor_that_reads_too_much_stays_though_it_was_repaired():
     """1.5 K too much in the runs that were looked at, and right in the sealed one: its own channel says nothing."""
     study, rng = small_case.study(), np.random.default_rng(7)
     x = 0.5 * rng.standard_normal(len(study.probed.parameters))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.diagnose.evidence.batch import Batch, History, Hypothesis
-from twin.diagnose.faults.context import Context, windows_of
+from twin.diagnose.faults.context import Context, logged, windows_of
 from twin.diagnose.faults.fault import Described, Family, Fault, Slot, Unit, as_found
 from twin.diagnose.faults.heat_source import HEAT
 from twin.diagnose.model.bank import Nominal
@@ -106,11 +106,19 @@ FAULTS = (COOLANT,)
 
 
 def batches(context: Context) -> list[Batch]:
-    """A film to a medium of its own temperature, in every window."""
+    """A film to a medium of its own temperature, in every window, and while a logged signal is on."""
     blocks, heat = context.elements.block_of, context.elements.heat_blocks
     histories = [History(name, np.kron(np.eye(2), w), windows=windows) for name, w, windows in windows_of(context)]
     rows = [(p.name, [*blocks["film", p.name], *heat[p.name]]) for p in context.outer]
-    return COOLANT.batches(rows, histories)
+    return [*COOLANT.batches(rows, histories), *_switched(context)]
+
+
+def _switched(context: Context) -> list[Batch]:
+    """With every logged signal that is on or off."""
+    index, names = context.index, context.elements.histories.switches
+    rows = [(p.name, [index[kind, p.name, name] for kind in ("film", "heat") for name in names]) for p in context.outer]
+    own = [logged(context, name, np.kron(np.eye(2), row)) for name, row in zip(names, np.eye(len(names)), strict=True)]
+    return COOLANT.batches(rows, own)
 
 
 def said(cause: Cause) -> list[str]:
@@ -130,6 +138,7 @@ FAMILY = Family(
     8, "coolant", "Coolant or chips on a surface",
     "A liquid of its own temperature wets a surface while a valve is open.",
     "g(t) h (-A_p x + M_p (T_medium - T_ref))", "sharp onset and end; pulls the surface to one temperature",
-    "5 W/(m^2 K)", "positive", "every surface with a film; every window of hours", "machine", batches,
+    "5 W/(m^2 K)", "positive", "every surface with a film; every window of hours, every logged switch", "machine",
+    batches,
     what="coolant or chips", said=said, edit=edit,
 )  # fmt: skip

@@ -51,6 +51,7 @@ EXPONENT = 0.6  # of speeds in forced convection
 HEATING = {"A": (2.0,), "m/s": (1.0,), "1/s": (1.0, 5.0 / 3.0), "W": (1.0,), "1": (1.0,)}  # exponents by unit, of heat
 # s of running of running-in of a bearing or a guide: a judgement, of what shows in runs of a day
 RUNNING_IN = 7200.0, 21600.0
+BETWEEN = 0.1  # share of steps within which a switch may be on for a part of the time
 RUNS = 0.01  # of its largest heat: a source that emits more runs
 LAWS = (1.0, 5.0 / 3.0, 2.0, 8.0 / 3.0)  # exponents of speeds in losses
 
@@ -65,6 +66,7 @@ class Histories:
     speeds: dict[str, tuple[np.ndarray, ...]]  # "x_speed^0.6": of convection
     blocks: tuple[tuple[int, int, int], ...]  # (fitted run, first step, end)
     unit: dict[str, tuple[str, float, float]]  # history -> signal, exponent, value [SI] at which s = 1
+    switches: tuple[str, ...] = ()  # of the signals: on or off, as a valve
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ def histories_of(study: Study) -> Histories:
         table[name] = tuple(np.abs(run.signals[signal] / scale) ** exponent for run in runs)
         unit[name] = (signal, exponent, scale)
 
-    seen: list[np.ndarray] = []
+    seen, switches = list[np.ndarray](), list[str]()
     for signal in _of_drives(load):
         name = signal.name
         if any(name not in run.signals for run in runs):
@@ -124,11 +126,13 @@ def histories_of(study: Study) -> Histories:
         if any(np.abs(shape - other).max() < 1e-3 for other in seen):
             continue  # motor speed and axis speed are one history
         seen.append(shape)
+        if signal.unit == "1" and np.mean((shape > 0.01) & (shape < 0.99)) < BETWEEN < np.mean(shape < 0.5):
+            switches.append(name)
         for e in HEATING.get(signal.unit, ()):
             add(signals, name if e == 1.0 else f"{name}^{e:.3g}", name, e, top)
         if signal.unit in SPEEDS:
             add(speeds, f"{name}^{EXPONENT:g}", name, EXPONENT, top)
-    return Histories(signals, speeds, blocks_of(study), unit)
+    return Histories(signals, speeds, blocks_of(study), unit, tuple(switches))
 
 
 def blocks_of(study: Study, length: float = BLOCK) -> tuple[tuple[int, int, int], ...]:
@@ -194,7 +198,8 @@ def elements_of(study: Study, nominal: Sequence[Nominal]) -> Elements:
         add("heat", place.name, [b] * len(runs), histories.signals, True)
         e = environment_at(study, p)
         flow = [-x @ probed.A[p].T + a[:, [e]] * probed.M[p] for x, a in zip(z, air, strict=True)]
-        add("film", place.name, flow, {**always, **histories.speeds}, True)
+        switched = {name: histories.signals[name] for name in histories.switches}
+        add("film", place.name, flow, {**always, **histories.speeds, **switched}, True)
         stored = [-np.outer(np.diff(own.states @ b, axis=0) * own.rate, b) for own in nominal]
         add("capacity", place.name, stored, always)
     for f, name in enumerate(films):

@@ -13,7 +13,7 @@ behind the scores is sure of it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,9 +69,12 @@ def judged(
     channels, policy = _channels(found, opened), found.detector.policy
     table, worth = gains(channels, seed, policy), _worth(channels, seed, policy)
     by_fit = _told_by_fit(found)
-    if not extension or worth >= (1 if by_fit and opened else 0):
-        return Judged(verdict, tuple(causes), extension, table, confirmed=bool(extension) and worth > 0)
     names = " and ".join(dict.fromkeys(f"{what(c.family)} at {c.place}" for c in extension))
+    if not extension or worth >= (1 if by_fit and opened else 0):
+        if extension and (bad := _worse(table)):
+            note = f"not written: {names}. With it the channels that it moves are predicted worse, most of all {bad}"
+            return Judged(verdict, tuple(causes), (), table, size=note)
+        return Judged(verdict, tuple(causes), extension, table, confirmed=bool(extension) and worth > 0)
     for accepted in other_sizes(found, y):
         x, _ = settled(found.detector, y, accepted)
         if _worth(_channels(replace(found, accepted=accepted, x=x), opened), seed, policy) > 0:
@@ -94,6 +97,18 @@ def judged(
     rest = tuple(c for c in causes if c not in extension)
     left = "unknown" if _evident(found) else "sensor" if rest else "nothing"
     return Judged(left, rest, (), table, note, refuted=True)
+
+
+def _worse(table: Sequence[Gain]) -> str:
+    """The channel that the causes move and that is predicted significantly worse with them, and most so, where all of
+    its unit that they move are, if not beyond chance; "" where none is."""
+    moved = [g for g in table if g.affected and np.isfinite(g.extended)]
+    worse = [
+        g for g in moved
+        if g.ci95[1] < 0.0
+        and sum(c.extended**2 - c.recalibrated**2 for c in moved if (c.run, c.unit) == (g.run, g.unit)) > 0.0
+    ]  # fmt: skip
+    return max(worse, key=lambda g: g.extended / g.recalibrated).channel if worse else ""
 
 
 def _evident(found: Search) -> bool:
@@ -147,13 +162,13 @@ def _worth(channels: Sequence[Channel], seed: int, policy: SearchPolicy) -> int:
     return int(low > 0.0) - int(high < 0.0)
 
 
-def less_likely(found: Search, other: Search, opened: Sequence[Measured], sensors: Collection[str], seed: int) -> str:
+def less_likely(found: Search, other: Search, opened: Sequence[Measured], seed: int) -> str:
     """The channel that speaks most against a search, where the sealed runs are significantly less likely with it than
-    with another one, by what both predict of all channels but some sensors'; "" where they are not."""
+    with another one; "" where they are not."""
     policy, both = found.detector.policy, zip(_channels(found, opened), _channels(other, opened), strict=True)
     compared = [
         replace(a, errors=[a.errors[0], b.errors[2], a.errors[2]], moved=_apart(a, b) > policy.noticed * a.noise)
-        for a, b in both if a.name not in sensors
+        for a, b in both
     ]  # fmt: skip
     if _worth(compared, seed, policy) >= 0:
         return ""

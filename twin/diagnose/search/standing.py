@@ -8,14 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
-from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.acted import ended, units_of
 from twin.diagnose.faults.fault import Family
 from twin.diagnose.faults.table import fault_of, what
 from twin.diagnose.result.diagnosis import Cause
 from twin.diagnose.result.spot import Spot
 from twin.diagnose.search.accepted import Accepted, settled
-from twin.diagnose.search.detector import Detector
 from twin.diagnose.search.forward import naming, stands
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.sealed import Judged, judged, less_likely
@@ -79,29 +77,21 @@ def _of_machine(
 def _with_sound_sensors(
     found: Search, y: np.ndarray, families: Sequence[Family], opened: Sequence[Measured], seed: int
 ) -> tuple[Search, str]:
-    """The search without faults of temperature sensors that the sealed runs refute, the weakest first, and a note: all
-    channels together are significantly less likely with them than without. What always acts on a reading and is not
-    predicted there may go on or be mended: its own channel says nothing."""
+    """The search without faults of temperature sensors that would go on in the sealed runs and that these refute, the
+    weakest first, and a note: they are significantly less likely than with channels as they are read, by the same model
+    or by one that was fitted to them so. Of other faults the sealed runs say nothing: a sensor may be repaired."""
     notes = list[str]()
     for a in sorted(found.accepted, key=lambda a: a.statistic) if opened else ():
-        if not _of_sensor(a, families):
+        h, fault = a.hypothesis, fault_of(a.hypothesis)
+        if not (_of_sensor(a, families) and (fault.exchanges or fault.lasts)):
             continue
-        h, other = a.hypothesis, without(found, y, a)
-        fault, spot = fault_of(h), Spot.read(h.name)
-        mendable = not (fault.exchanges or fault.lasts) and _always(found.detector, h)
-        read = replace(found, accepted=tuple(b for b in found.accepted if b is not a))  # as it is, by the same model
-        hidden = (spot.name,) if mendable else ()
-        told = less_likely(found, other, opened, hidden, seed) or less_likely(found, read, opened, hidden, seed)
+        read = replace(found, accepted=tuple(b for b in found.accepted if b is not a))
+        other = without(found, y, a)
+        told = less_likely(found, other, opened, seed) or less_likely(found, read, opened, seed)
         if told and all(stands(other.detector, b) for b in other.accepted):
-            found = other
-            notes.append(f"withdrawn: {spot.words} ({h.when.name}), with which the sealed run is less likely; {told}")
+            found, names = other, f"{Spot.read(h.name).words} ({h.when.name})"
+            notes.append(f"withdrawn: {names}, with which the sealed run is less likely; {told}")
     return found, "; ".join(notes)
-
-
-def _always(detector: Detector, h: Hypothesis) -> bool:
-    """Whether what it does to a reading is the same in all runs."""
-    first = int(h.batch.columns[h.place][0])
-    return any(c == first and history == "always" for (_, _, history), c in detector.index.items())
 
 
 def _ended(found: Search) -> Search:
