@@ -74,12 +74,14 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         (replace(h, statistic=one.statistic), 1.0) for h, cosine, heat in factors_of(detector, j)
         if h.name in fits or _does_the_same(detector, one, cosine, heat)
     )  # fmt: skip
+    # of a number that little tells anything would be within chance: half of what it removes is the least
+    enough = max(removed - detector.policy.close, 0.5 * removed)
     # a part that expands too much moves the expansion of its material, or of another: with the part's free it stays
     known = {one.hypothesis.name, *(h.name for h, _ in one.rivals)}
     family = [h for h in ranked if h.family == one.hypothesis.family and h.name not in known]
     near = [
         h for h in family
-        if h.statistic > removed - detector.policy.close
+        if h.statistic > enough
         and abs(beside(detector, before, j, h)) < detector.policy.stands * off
     ]  # fmt: skip
     # nor is a number out of its tolerance for sure where a cause beside which it is not explains more: too little to be
@@ -97,16 +99,17 @@ def closed(start: Start, y: np.ndarray, relaxed: tuple[Fitted, Accepted]) -> Sea
         if h.name == one.hypothesis.name and h.family != one.hypothesis.family
         and (bent(detector, h) or not h.when.windows) and not _stays(detector, there, one, h)
     ]  # fmt: skip
-    likely += [h for h in here if h.statistic > removed - detector.policy.close]
+    likely += [h for h in here if h.statistic > enough and possible(detector, h, h.amplitude[0])]
     # what does the same elsewhere is told from it by nothing: heat of a source that never rests, and warmer air there
     as_much = [
         h for h in ranked
         if h.name not in known and h.family != one.hypothesis.family and h.name != _heated(detector, j)
-        and h.statistic > removed - detector.policy.close and not bent(detector, h) and not h.when.windows
+        and h.statistic > enough and not bent(detector, h) and not h.when.windows
     ]  # fmt: skip
     likely += [
         h for h, cosine in with_cosines(detector, before, one.hypothesis, as_much)
-        if removed * (1.0 - cosine**2) < detector.policy.apart and not _stays(detector, there, one, h)
+        if cosine**2 > detector.policy.covers and removed * (1.0 - cosine**2) < detector.policy.apart
+        and not _stays(detector, there, one, h)
     ]  # fmt: skip
     near = distinct([*near, *likely])
     rivals += tuple(pair for h in near for pair in with_cosines(detector, before, one.hypothesis, [h]))
