@@ -337,7 +337,8 @@ def unknown_lines(d: Diagnosis) -> list[str]:
 
 def pull_lines(d: Diagnosis) -> list[str]:
     far = [] if d.verdict == "out_of_tolerance" else beyond(d.pulls, 2.0)
-    return [f"Check: {joined([pull_words(p) for p in far[:2]])}."] if far else []
+    beside = " (beside unknown heat they may have absorbed some of it)" if d.verdict == "unknown" else ""
+    return [f"Check: {joined([pull_words(p) for p in far[:2]])}{beside}."] if far else []
 
 
 def _seen(d: Diagnosis) -> list[Limit]:
