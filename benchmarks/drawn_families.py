@@ -8,7 +8,7 @@ acts on one reading. A row per trial goes to out/drawn/families_SEED.jsonl, and 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -57,6 +57,7 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Hidden]
 
     nodes, hours = list(machine.nodes), float(drawn.hours)
     sensors = [f"sensors.{n}" for n, s in machine.sensors.items() if s.environment is None]
+    part_of = {f"sensors.{n}": s.part for n, s in machine.sensors.items()}
     own = [n for n, s in machine.sources.items() if s.contact is None]
     currents = [n for n, s in machine.signals.items() if str(s.unit) == "A"]
     environment = next(e for e in machine.environment.values() if e.signal)
@@ -86,15 +87,14 @@ def effects(drawn: DrawnMachine, machine: Machine, power: float) -> list[Hidden]
         found.append(
             Hidden("heat_source", one(nodes), f"{2.0 * heat:.3g} W", ("--signal", one(currents), "--exponent", "2"))
         )
-    return [*found, *_elsewhere(rng, sensors)]
+    return [*found, *_elsewhere(rng, sensors, part_of)]
 
 
-def _elsewhere(rng: np.random.Generator, sensors: Sequence[str]) -> list[Hidden]:
-    """One of two sensors drawn is mounted where the other one is."""
-    if len(sensors) < 2:
-        return []
-    sensor, other = (str(name) for name in rng.choice(sensors, 2, replace=False))
-    return [Hidden("sensor", sensor, other, ("--history", "elsewhere"), True)]
+def _elsewhere(rng: np.random.Generator, sensors: Sequence[str], part_of: Mapping[str, str | None]) -> list[Hidden]:
+    """One sensor is mounted where one of another node is; none where all are on one."""
+    sensor = str(rng.choice(sensors))
+    others = [s for s in sensors if part_of[s] != part_of[sensor]]
+    return [Hidden("sensor", sensor, str(rng.choice(others)), ("--history", "elsewhere"), True)] if others else []
 
 
 def measured(

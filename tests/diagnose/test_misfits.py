@@ -187,14 +187,17 @@ def test_what_bends_is_no_rival_by_its_score_alone(monkeypatch):
 
 
 def test_another_cause_at_the_place_of_a_number_is_its_rival_by_what_it_removes(monkeypatch):
-    """Motion that cools a film is more of that film, or less."""
+    """Motion that cools a film is more of that film, or less: where it removes as much but for chance, and of a number
+    that removes little at least half of that."""
     _, ranked, ended = relaxed_source()
     module = sys.modules[closed.__module__]
-    monkeypatch.setattr(module, "misfit", lambda *_: 0.0)
+    monkeypatch.setattr(module, "_explained", lambda *_: False)
     monkeypatch.setattr(module, "_stays", lambda *_: False)
     film = next(h for h in ranked if h.family == "forced_convection")
     there = replace(film, batch=replace(film.batch, places=("sources.front",) * len(film.batch.places)), statistic=1.0)
-    for removes, told in ((-7.0, False), (-5.0, True)):
+    for number, removes, told in ((20.0, 13.0, False), (20.0, 15.0, True), (6.0, 1.0, False), (6.0, 4.0, True)):
+        before_and_after = iter((number, 0.0))
+        monkeypatch.setattr(module, "misfit", lambda *_, left=before_and_after: next(left))
         monkeypatch.setattr(module, "exact", lambda d, y, f, h, removes=removes: replace(h, statistic=removes))
         found = ended([there])
         assert found is not None

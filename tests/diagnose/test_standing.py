@@ -13,11 +13,13 @@ from twin.calibrate.fit.measured import Measured
 from twin.diagnose.evidence.batch import Hypothesis
 from twin.diagnose.faults.acted import lasts, slots_with, units_of
 from twin.diagnose.faults.catalogue import FAMILIES
+from twin.diagnose.faults.sensor_readings import elsewhere
+from twin.diagnose.result.diagnosis import Gain
 from twin.diagnose.search.accepted import Accepted
 from twin.diagnose.search.forward import search
 from twin.diagnose.search.look import Search
 from twin.diagnose.search.policy import POLICY
-from twin.diagnose.search.sealed import judged
+from twin.diagnose.search.sealed import _worse, judged
 from twin.diagnose.search.standing import standing
 from twin.diagnose.search.verdict import cause_of
 
@@ -207,3 +209,33 @@ def test_a_sensor_that_reads_too_much_stays_though_it_was_repaired():
     T, w = study.runs[2].split(study.outputs(2, x))
     now, told = standing(found, y, FAMILIES, (), [replace(study.runs[2].measured, temperature=T, tcp=w)], 1)
     assert (now, told.verdict, told.less) == (found, "sensor", "")
+
+
+@pytest.mark.parametrize("again", [True, False])
+def test_a_sensor_on_another_part_is_there_in_the_sealed_run_too(again: bool):
+    study, rng = small_case.study(), np.random.default_rng(4)
+    x = 0.5 * rng.standard_normal(len(study.probed.parameters))
+    y = study.all_outputs(x) + elsewhere(study, lambda k: study.states(k, x), "housing", "bearing_front")
+    y = y + small_case.made_detector().whiten.colour(rng.standard_normal(len(y)))
+    found = search(small_case.made_detector(), y)
+    assert [a.hypothesis.name for a in found.accepted] == ["sensors.housing>bearing_front"]
+    sealed = study.runs[2].measured
+    T, w = (np.array(own) for own in study.runs[2].split(study.outputs(2, x)))
+    if again:
+        T[:, sealed.sensors.index("housing")] = T[:, sealed.sensors.index("front")]
+    now, told = standing(found, y, FAMILIES, (), [replace(sealed, temperature=T, tcp=w)], 1)
+    if again:
+        assert (now, told.verdict, told.less) == (found, "sensor", "")
+    else:
+        assert not now.accepted
+        assert told.less.startswith("withdrawn: sensor housing (mounted on another part), with which the sealed run is")
+
+
+@pytest.mark.parametrize(("better", "bad"), [(4.0, "dx of friday"), (9.0, "")])
+def test_what_all_channels_together_are_predicted_worse_with(better: float, bad: str):
+    """dx by 3 um worse, significantly; dy by less or more than that better."""
+    worse = Gain("friday", "dx", "m", 9e-6, 5e-6, 8e-6, (-4e-6, -2e-6), True)
+    other = Gain("friday", "dy", "m", 9e-6, better * 1e-6, 1e-6, (-1e-6, 4e-6), True)
+    kelvin = Gain("friday", "front", "K", 3.0, 2.0, 0.1, (1.8, 2.0), True)
+    told = _worse([worse, other, kelvin])
+    assert told.startswith(bad) if bad else told == ""

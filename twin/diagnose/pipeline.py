@@ -308,7 +308,10 @@ def _scene(machine: Machine, probed: ProbedModel, causes: Sequence[Cause], unkno
     """Where the first cause is, or the heat that nothing explains."""
     if unknown is not None:
         return scene_of(machine, probed, unknown.surface)
-    return scene_of(machine, probed, causes[0].place, str(causes[0].settings.get("surface", ""))) if causes else None
+    if not causes:
+        return None
+    settings = causes[0].settings
+    return scene_of(machine, probed, causes[0].place, str(settings.get("surface", settings.get("mounted", ""))))
 
 
 def _lag_1(residual: np.ndarray) -> float:

@@ -51,7 +51,9 @@ EXPONENT = 0.6  # of speeds in forced convection
 HEATING = {"A": (2.0,), "m/s": (1.0,), "1/s": (1.0, 5.0 / 3.0), "W": (1.0,), "1": (1.0,)}  # exponents by unit, of heat
 # s of running of running-in of a bearing or a guide: a judgement, of what shows in runs of a day
 RUNNING_IN = 7200.0, 21600.0
-BETWEEN = 0.1  # share of steps within which a switch may be on for a part of the time
+# of a switch: the share of steps in which it may be on for a part of the time, and that in which it must be off: a
+# judgement before any result
+BETWEEN, OFF = 0.1, 0.1
 RUNS = 0.01  # of its largest heat: a source that emits more runs
 LAWS = (1.0, 5.0 / 3.0, 2.0, 8.0 / 3.0)  # exponents of speeds in losses
 
@@ -126,13 +128,19 @@ def histories_of(study: Study) -> Histories:
         if any(np.abs(shape - other).max() < 1e-3 for other in seen):
             continue  # motor speed and axis speed are one history
         seen.append(shape)
-        if signal.unit == "1" and np.mean((shape > 0.01) & (shape < 0.99)) < BETWEEN < np.mean(shape < 0.5):
+        if signal.unit == "1" and _switches(whole):
             switches.append(name)
         for e in HEATING.get(signal.unit, ()):
             add(signals, name if e == 1.0 else f"{name}^{e:.3g}", name, e, top)
         if signal.unit in SPEEDS:
             add(speeds, f"{name}^{EXPONENT:g}", name, EXPONENT, top)
     return Histories(signals, speeds, blocks_of(study), unit, tuple(switches))
+
+
+def _switches(values: np.ndarray) -> bool:
+    """Whether a signal (n,) is off or on, 0 or 1, as a description has switches."""
+    partly = (values > 0.0) & (np.abs(values - 1.0) > 1e-6)
+    return bool(np.mean(partly) < BETWEEN and np.mean(values == 0.0) > OFF and np.any(values == 1.0))
 
 
 def blocks_of(study: Study, length: float = BLOCK) -> tuple[tuple[int, int, int], ...]:

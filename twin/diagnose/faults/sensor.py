@@ -32,7 +32,7 @@ class Elsewhere(Fault):
         return np.ones(q), np.full(q, POINT**-2.0)
 
     def change(self, study: Study, states: Callable[[int], np.ndarray], name: str, size: float) -> np.ndarray:
-        sensor, place = self.bare(name).split(">")
+        sensor, place = self.bare(name).split(">", 1)
         return size * elsewhere(study, states, sensor, place)
 
 

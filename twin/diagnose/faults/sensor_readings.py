@@ -88,7 +88,8 @@ def _elsewhere(study: Study, plans: Sequence[Planned], nominal: Sequence[Nominal
     (body,), base = study.probed.base.bodies, study.probed.base
     warm = np.stack([member_field(body, m) for m in range(len(body.members))], axis=1)
     own = dict(zip(base.sensors, np.abs(body.C @ warm).argmax(axis=1).tolist(), strict=True))
-    for name in dict.fromkeys(s for plan in plans for s in plan.measured.sensors if s in own):
+    # not of sensors that are planned: their names hold a colon, as none of a description does
+    for name in dict.fromkeys(s for plan in plans for s in plan.measured.sensors if s in own and ":" not in s):
         for place in study.probed.places:
             if body.members[own[name]] not in place.members:
                 change = elsewhere(study, lambda k: nominal[k].states, name, place.name)

@@ -184,24 +184,27 @@ def readings_columns(detector: Detector, h: Hypothesis) -> np.ndarray:
     return np.asarray(detector.columns.raw[:, columns].astype(float) @ weights.T)
 
 
-def read_change(detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(m,) white change by a cause at its amplitude (q,), by what acts in the machine to first order; x (n,):
-    parameters of the motion that is read otherwise."""
+def read_change(
+    detector: Detector, h: Hypothesis, amplitude: np.ndarray, x: np.ndarray, accepted: Sequence[Accepted] = ()
+) -> np.ndarray:
+    """(m,) white change by a cause at its amplitude (q,), by what acts in the machine to first order; x (n,), accepted:
+    parameters and causes of the motion that is read otherwise."""
     if fault_of(h).exchanges:  # `exchanged` has left nothing of it
         return np.zeros(detector.columns.raw.shape[0])
     if fault_of(h).stepped:
-        return detector.whiten(curved_change(detector, h, float(amplitude[0]), motion(detector, x)))
+        return detector.whiten(curved_change(detector, h, float(amplitude[0]), motion(detector, x, accepted)))
     return np.asarray(readings_columns(detector, h) @ amplitude)
 
 
 Motion = Callable[[int], np.ndarray]  # states (n + 1, r) of run k
 
 
-def motion(detector: Detector, x: np.ndarray | None) -> Motion:
-    """Of parameters x (n,), each run stepped once; None: of the nominal machine, which costs no step."""
+def motion(detector: Detector, x: np.ndarray | None, accepted: Sequence[Accepted] = ()) -> Motion:
+    """Of parameters x (n,) with causes that act in the machine, each run stepped once; None: of the nominal machine,
+    which costs no step."""
     if x is None:
         return lambda k: detector.nominal[k].states
-    return cache(lambda k: detector.study.states(k, x))
+    return cache(lambda k: detector.study.states(k, x, *acting(detector, accepted, k)))
 
 
 def curved_change(detector: Detector, h: Hypothesis, size: float, states: Motion) -> np.ndarray:
@@ -272,7 +275,7 @@ def settled(detector: Detector, y: np.ndarray, accepted: Sequence[Accepted]) -> 
         there = with_shifts(study, accepted, x)
         read = np.zeros(len(y))
         for a in reading:
-            read += read_change(detector, a.hypothesis, a.amplitude, there)
+            read += read_change(detector, a.hypothesis, a.amplitude, there, accepted)
         return detector.whiten(y - outputs_with(detector, accepted, there)) - read
 
     return settle(detector.fitter, outputs, left, untied_beside(study, accepted))

@@ -312,9 +312,10 @@ def stands(detector: Detector, a: Accepted) -> bool:
     batch = a.hypothesis.batch
     if batch.fixed:
         return True
-    first = float(a.amplitude[0])
+    first, fault = float(a.amplitude[0]), fault_of(a.hypothesis)
+    known = fault.prior(batch.q)[1] if fault.moves or fault.elsewhere else np.zeros(batch.q)  # which no data tell
     return (
-        float(a.amplitude @ np.linalg.pinv(a.covariance, hermitian=True) @ a.amplitude)
+        float(a.amplitude @ (np.linalg.pinv(a.covariance, hermitian=True) - np.diag(known)) @ a.amplitude)
         > detector.policy.stands * a.threshold
         and abs(first) >= detector.policy.stands * batch.smallest
         and possible(detector, a.hypothesis, first)

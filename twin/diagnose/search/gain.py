@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from twin.calibrate.fit.measured import Measured
+from twin.diagnose.faults.elements import Key
 from twin.diagnose.faults.readings import readings_of
 from twin.diagnose.faults.table import fault_of
 from twin.diagnose.model.study import COMPONENTS
@@ -39,7 +40,7 @@ def predicted(found: Search, k: int) -> Predicted:
 
 
 def _read(found: Search, k: int) -> np.ndarray:
-    """(size,) what causes that act on the reading of the TCP add in run k."""
+    """(size,) what causes that act on readings, and go on, add in run k."""
     study = found.detector.study
     wanted = [a for a in found.accepted if fault_of(a.hypothesis).lasts]
     result = np.zeros(study.runs[k].size)
@@ -48,9 +49,11 @@ def _read(found: Search, k: int) -> np.ndarray:
     one = replace(study, runs=(study.runs[k],), fitted=(0,))
     there = with_shifts(study, found.accepted, found.x)
     z = study.states(k, there, *acting(found.detector, found.accepted, k))
-    nominal = replace(found.detector.nominal[k], states=z)
-    y = study.outputs(k, np.zeros(len(found.x)))
-    columns, index = readings_of(one, [nominal], [y], [np.zeros((len(y), len(found.x)))])
+    columns, index = np.zeros((0, 0)), dict[Key, int]()
+    if not all(fault_of(a.hypothesis).stepped for a in wanted):
+        nominal = replace(found.detector.nominal[k], states=z)
+        y = study.outputs(k, np.zeros(len(found.x)))
+        columns, index = readings_of(one, [nominal], [y], [np.zeros((len(y), len(found.x)))], swaps=False)
     for a in wanted:
         fault, h = fault_of(a.hypothesis), a.hypothesis
         known = {p: columns[:, c] for (kind, p, when), c in index.items() if (kind, when) == (fault.kind, "always")}

@@ -79,7 +79,8 @@ def refit(
         there = shifted(study, x, gains, amplitude)
         sizes = [(a.hypothesis, amplitude[own]) for a, own in zip(accepted, of_each, strict=True)]
         J = jacobian(detector, x, sizes, closely)
-        bent, states = np.zeros(len(y)), motion(detector, there)
+        now_named = [replace(a, amplitude=amplitude[own]) for a, own in zip(accepted, of_each, strict=True)]
+        bent, states = np.zeros(len(y)), motion(detector, there, now_named)
         for a, own in zip(accepted, of_each, strict=True):
             fault = fault_of(a.hypothesis)
             if fault.stepped:

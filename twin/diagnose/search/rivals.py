@@ -46,7 +46,8 @@ def remedy(a: Hypothesis, b: Hypothesis) -> str:
         return f"a look at where {Spot.read(moved.name).name} is mounted"
     if any(Spot.read(h.name).between for h in (a, b)):
         return "a run of loads and rests, an hour each: through a joint heat goes on while one of its sides is warm"
-    if {Spot.read(h.name).of for h in (a, b)} & {Of.MATERIAL, Of.PART}:  # no temperature separates their numbers
+    # of a part's number and its material's, which no temperature separates
+    if a.name != b.name and {Spot.read(h.name).of for h in (a, b)} <= {Of.MATERIAL, Of.PART}:
         return f"a measurement of {a.name}, or of {b.name}, by itself"
     if a.name != b.name and a.when.name == b.when.name:
         return in_the_air(a) or in_the_air(b) or sensor_between(a.name, b.name)

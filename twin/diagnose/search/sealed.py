@@ -73,7 +73,7 @@ def judged(
     if not extension or worth >= (1 if by_fit and opened else 0):
         if extension and (bad := _worse(table)):
             note = f"not written: {names}. With it the channels that it moves are predicted worse, most of all {bad}"
-            return Judged(verdict, tuple(causes), (), table, size=note)
+            return Judged(verdict, tuple(causes), (), table, size=note, confirmed=worth > 0)
         return Judged(verdict, tuple(causes), extension, table, confirmed=bool(extension) and worth > 0)
     for accepted in other_sizes(found, y):
         x, _ = settled(found.detector, y, accepted)
@@ -101,14 +101,18 @@ def judged(
 
 def _worse(table: Sequence[Gain]) -> str:
     """The channel that the causes move and that is predicted significantly worse with them, and most so, where all of
-    its unit that they move are, if not beyond chance; "" where none is."""
+    its unit that they move in its run are worse together (rms), if not beyond chance; "" where none is."""
     moved = [g for g in table if g.affected and np.isfinite(g.extended)]
     worse = [
         g for g in moved
         if g.ci95[1] < 0.0
         and sum(c.extended**2 - c.recalibrated**2 for c in moved if (c.run, c.unit) == (g.run, g.unit)) > 0.0
     ]  # fmt: skip
-    return max(worse, key=lambda g: g.extended / g.recalibrated).channel if worse else ""
+    if not worse:
+        return ""
+    most = max(worse, key=lambda g: g.extended / g.recalibrated)
+    after, before = (quantity(value, most.unit) for value in (most.extended, most.recalibrated))
+    return f"{most.channel} of {most.run}: residual {after} (rms) with it, {before} recalibrated"
 
 
 def _evident(found: Search) -> bool:

@@ -81,15 +81,16 @@ def _with_sound_sensors(
     weakest first, and a note: they are significantly less likely than with channels as they are read, by the same model
     or by one that was fitted to them so. Of other faults the sealed runs say nothing: a sensor may be repaired."""
     notes = list[str]()
-    for a in sorted(found.accepted, key=lambda a: a.statistic) if opened else ():
-        h, fault = a.hypothesis, fault_of(a.hypothesis)
+    for h in [a.hypothesis for a in sorted(found.accepted, key=lambda a: a.statistic)] if opened else ():
+        a, fault = next(a for a in found.accepted if a.hypothesis is h), fault_of(h)  # refitted if another one has gone
         if not (_of_sensor(a, families) and (fault.exchanges or fault.lasts)):
             continue
         read = replace(found, accepted=tuple(b for b in found.accepted if b is not a))
         other = without(found, y, a)
         told = less_likely(found, other, opened, seed) or less_likely(found, read, opened, seed)
         if told and all(stands(other.detector, b) for b in other.accepted):
-            found, names = other, f"{Spot.read(h.name).words} ({h.when.name})"
+            found, spot = other, Spot.read(h.name)
+            names = f"{spot.words if fault.exchanges else f'sensor {spot.name}'} ({h.when.name})"
             notes.append(f"withdrawn: {names}, with which the sealed run is less likely; {told}")
     return found, "; ".join(notes)
 
