@@ -114,6 +114,19 @@ def test_another_temperature_of_a_film_s_air_is_told_from_heat_by_that_of_the_ai
     )
 
 
+def test_a_look_tells_where_a_sensor_is_and_a_measurement_whose_number_it_is():
+    batches = {b.kind: b for b in small_case.made_detector().columns.batches}
+    moved, heat = (Hypothesis(batches[k], 0, batches[k].histories[0], 800.0, (1.0,)) for k in ("elsewhere", "heat"))
+    sensor = moved.name.removeprefix("sensors.").partition(">")[0]
+    assert remedy(moved, heat) == remedy(heat, moved) == f"a look at where {sensor} is mounted"
+    steel, column = (
+        replace(heat, batch=replace(heat.batch, places=(name,)))
+        for name in ("materials.steel.expansion", "parts.column")
+    )
+    assert remedy(steel, column) == "a measurement of materials.steel.expansion, or of parts.column, by itself"
+    assert "by itself" not in remedy(steel, heat)
+
+
 @pytest.mark.parametrize(
     ("statistic", "less", "wanted"), [(800.0, 3.0, "ambiguous"), (800.0, 9.0, "named"), (50_000.0, 100.0, "ambiguous")]
 )

@@ -160,19 +160,13 @@ def test_spliced_rows_are_of_a_later_time_under_stamps_that_go_on():
         damaged(replace(RUN, temperatures=None, tcp=None), d)
 
 
-def test_swapped_sensors():
-    d = of_kind("sensor", "swapped")
+@pytest.mark.parametrize(("history", "other", "told"), [("swapped", A, "itself"), ("elsewhere", B, "mounted where it")])
+def test_two_sensors(history, other, told):
+    """Each with the other's name, or one where the other one is."""
+    d = of_kind("sensor", history)
     assert np.array_equal(sensor("a", d), B)
-    assert np.array_equal(sensor("b", d), A)
-    with pytest.raises(LogError, match="itself"):
-        damaged(RUN, replace(d, other="sensors.a"))
-
-
-def test_a_sensor_mounted_where_another_one_is():
-    d = of_kind("sensor", "elsewhere")
-    assert np.array_equal(sensor("a", d), B)
-    assert np.array_equal(sensor("b", d), B)
-    with pytest.raises(LogError, match="mounted where it is"):
+    assert np.array_equal(sensor("b", d), other)
+    with pytest.raises(LogError, match=told):
         damaged(RUN, replace(d, other="sensors.a"))
 
 

@@ -127,7 +127,7 @@ class Fault:
     faint: bool = False  # its score by the derivative is small when it is many times as large
     read: bool = False  # acts on what is read, not in the machine
     sizes: tuple[float, ...] = ()  # of what is read and not in proportion to its size: at which it is scored, too
-    moves: bool = False  # of a reading in proportion to its size: by how much, parameters change
+    moves: bool = False  # a reading to another place, in proportion to its size: by how much, parameters change
     called: str = ""  # what its history is called, where it is not that of its columns
     exchanges: bool = False  # two channels, exactly
     corrects: bool = False  # a logged signal, by an exact factor

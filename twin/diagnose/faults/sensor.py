@@ -36,7 +36,7 @@ class Elsewhere(Fault):
         return size * elsewhere(study, states, sensor, place)
 
 
-POINT = 0.2  # standard deviation of the rise of a point of a surface over its mean: chosen, as that of misplaced heat
+POINT = 0.2  # standard deviation of a point's rise over its surface's mean: a judgement, as `own` of misplaced heat
 SHIFT = Fault("sensor", "shift", "K", "sensors.", 0, 0.3, 100.0, read=True, grows=False)
 DRIFT = Fault("sensor", "drift", "K/day", "sensors.", 0, 0.1, 20.0, read=True)
 SINGLE = (

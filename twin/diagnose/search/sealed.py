@@ -86,11 +86,9 @@ def judged(
         rest = tuple(c for c in causes if c not in extension)
         note = f"withdrawn: {names}. Only the detection fit supports it, and it predicts the sealed run no better"
         return Judged("sensor" if rest else "nothing", rest, (), table, note)
-    worst = max((c for c in channels if c.moved), key=lambda c: float(rms(c.errors[2]) - rms(c.errors[1])) / c.noise)
-    after, before = (quantity(float(rms(worst.errors[k])), worst.unit) for k in (2, 1))
     note = (
         f"withdrawn: {names}. It fits the diagnosed runs but predicts the sealed run significantly "
-        f"worse, most of all {worst.name}: residual {after} (rms) with it, {before} recalibrated"
+        f"worse, most of all {_worst(channels)} recalibrated"
     )
     if rivals := list(dict.fromkeys(f"{what(r.family)} at {r.place}" for c in extension for r in c.rivals)):
         note += f". Not tested on the sealed run, and nearly as likely in the others: {', '.join(rivals)}"
@@ -176,9 +174,15 @@ def less_likely(found: Search, other: Search, opened: Sequence[Measured], seed: 
     ]  # fmt: skip
     if _worth(compared, seed, policy) >= 0:
         return ""
-    worst = max((c for c in compared if c.moved), key=lambda c: float(rms(c.errors[2]) - rms(c.errors[1])) / c.noise)
+    return f"{_worst(compared)} without"
+
+
+def _worst(channels: Sequence[Channel]) -> str:
+    """The moved channel that the last model predicts worse than the second one by most standard deviations of noise,
+    with what both leave of it."""
+    worst = max((c for c in channels if c.moved), key=lambda c: float(rms(c.errors[2]) - rms(c.errors[1])) / c.noise)
     after, before = (quantity(float(rms(worst.errors[k])), worst.unit) for k in (2, 1))
-    return f"{worst.name}: residual {after} (rms) with it, {before} without"
+    return f"{worst.name}: residual {after} (rms) with it, {before}"
 
 
 def _apart(a: Channel, b: Channel) -> float:
